@@ -142,8 +142,10 @@ def test_a_torque_that_a_joint_cannot_give_is_said_as_printed_and_what_is_said_t
     path, value = re.findall(r"with `(\S+) = (.*?)` it does", printed)[0]
     mended = ["--set", "device.set=./elbow.toml", "--set", "reference.level=9 N m", "--set", f"{path}={value}"]
     assert main(["simulate", "hold.toml", *mended, "--check"]) == 0
-    # Nothing is said of a reference that is followed, between how it ended and the numbers.
-    assert capsys.readouterr().out.splitlines()[:2] == ["hold: completed", ""]
+    # How it follows its reference stands between how it ended and the numbers.
+    ended, verdict, blank = capsys.readouterr().out.splitlines()[:3]
+    assert (ended, blank) == ("hold: completed", "")
+    assert verdict.startswith("the torque follows its reference: RMS ")
 
 
 def test_every_command_is_shown_or_named() -> None:

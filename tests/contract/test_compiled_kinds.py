@@ -171,7 +171,7 @@ def meters(draw: random.Random) -> Iterator[Entry]:
     course = ReferenceSummary(2.0, 2.0, 1.0e-6, 20.0, 60.0)
     samples = []
     for number in range(60):
-        drawn = [draw.uniform(-2.0, 2.0) for _ in range(6)]
+        drawn = [draw.uniform(-2.0, 2.0) for _ in range(7)]
         temperatures = [draw.uniform(250.0, 350.0) for _ in range(2)]
         stride = StrideSample(
             supplied_mass=1.0e-4 * number,

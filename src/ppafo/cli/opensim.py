@@ -53,7 +53,21 @@ def export_opensim(
             other = "a walk, not a recording" if is_recording else "a recording; a walk knows its wearer"
             raise DataError(f"{option}: is for {other}")
     if is_recording:
-        return _recorded(path, side, body_mass, out)
+        from ppafo.exports.opensim import files_of_recording
+
+        # Known once the files are made, and said after that.
+        missing: list[str] = []
+
+        def make() -> dict[str, bytes]:
+            files, found = files_of_recording(path, side, body_mass)
+            missing.extend(found)
+            return files
+
+        def following(_: Sequence[str]) -> str:
+            left_out = f"\nleft out: {', '.join(missing)}, which are per body mass: give --body-mass" if missing else ""
+            return f"{_next(out, 'recording.sto')}{left_out}"
+
+        return output.export(out, COMMAND, make, following)
     from ppafo.exports.opensim import files_of_walk
 
     return output.export(
@@ -66,21 +80,3 @@ def export_opensim(
 
 def _next(out: Path, file: str) -> str:
     return f"load {shlex.quote(str(out / file))} in OpenSim; its header says units and signs"
-
-
-def _recorded(path: Path, side: Side, mass: float | None, out: Path) -> CommandOutput:
-    from ppafo.exports.opensim import files_of_recording
-
-    # Known once the files are made, and said after that.
-    missing: list[str] = []
-
-    def make() -> dict[str, bytes]:
-        files, found = files_of_recording(path, side, mass)
-        missing.extend(found)
-        return files
-
-    def following(_: Sequence[str]) -> str:
-        left_out = f"\nleft out: {', '.join(missing)}, which are per body mass: give --body-mass" if missing else ""
-        return f"{_next(out, 'recording.sto')}{left_out}"
-
-    return output.export(out, COMMAND, make, following)

@@ -60,8 +60,9 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> CommandOutput:
     error = None if checked is None else checked.error
     if checked is None and result.status.is_completed and chosen.motion.motion_kind.is_repeated_for_its_error:
         error = result.error()
+    follows = list(filter(None, [result.following if verdict is None else verdict.sentence]))
     # Gains that are in force are no news: they stand last.
-    follows, tuned = ([] if item is None else [item.sentence] for item in (verdict, in_force))
+    tuned = [] if in_force is None else [in_force.sentence]
     from ppafo.documents.json_text import plain
 
     metrics = {name: plain(metric) for name, metric in result.metrics.items()}

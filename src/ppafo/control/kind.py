@@ -90,9 +90,10 @@ class ControllerKind:
     ``needs_reference`` never looks at the reference, so that a scenario may be without one.
 
     ``controls`` names what it can follow a reference of, in ``model.controlled.CONTROLLED``. One that controls more
-    than a torque acts on ``seen_error`` or ``seen_value`` of there alone, and its settings in N m are in the unit of
-    what is controlled. Where the supplies are vacuums a command above 0 lowers the torque: these, and one of the angle
-    by ``steered``, then turn round, and laws of a torque alone are refused.
+    than a torque has ``*, parts: ErrorFunctions = OF_TORQUE`` of there as the last parameter of ``update``, acts on
+    ``seen_error`` or ``seen_value`` alone, to which it hands them, and its settings in N m are in the unit of what is
+    controlled. Where the supplies are vacuums a command above 0 lowers the torque: these, and one of the angle by
+    ``parts.steered``, then turn round, and laws of a torque alone are refused.
 
     A law with a ``plan`` has other numbers than its settings: ``plan(settings, period, torque_constant, reference)``
     makes them, by name, from settings in SI units, a period [s], the device's torque constant [N m/Pa] and the lowest
@@ -105,7 +106,7 @@ class ControllerKind:
     quantities: tuple[Quantity, ...]
     parameters: type
     initial: Any
-    update: Callable[[Any, Any, float, Any, float], tuple[Any, Any]]
+    update: Callable[..., tuple[Any, Any]]
     restart: Callable[[Any, float, float], Any] | None = None
     only_switches: bool = False
     needs_reference: bool = True

@@ -6,8 +6,9 @@ from ppafo.engine.rows import leaf_paths
 from ppafo.model.controlled import CONTROLLED
 from ppafo.signals.meter import Sample
 
+_OF_METERS = ("number", "value", "gas", "energy", "foot", "stride")
 TRACED: dict[str, str] = {
-    **{name: f"sample.{name}" for name in Sample._fields if name not in ("number", "gas", "energy", "foot", "stride")},
+    **{name: f"sample.{name}" for name in Sample._fields if name not in _OF_METERS},
     **{kind.reference: "sample.reference" for kind in CONTROLLED.values()},
     **{name: f"sample.gas.{name}" for name in ("mass_1", "mass_2", "supplied_mass", "vented_mass", "leaked_mass")},
 }
@@ -32,15 +33,12 @@ REQUEST = "controller_state.request.torque"
 """Path of the torque that a walking controller requests."""
 
 
-def walk_traces(states: Mapping[str, type]) -> dict[str, str]:
-    """Channels of ``TRACED_IN_WALKS`` that groups of states of a walk have, and the paths of their numbers."""
+def paths_of_traces(states: Mapping[str, type], walks: bool) -> dict[str, str]:
+    """Path of each traceable channel in a lane that is not a state variable of that name."""
+    if not walks:
+        return TRACED
     paths = [path for name, row in states.items() for path in leaf_paths(row, name)]
     found = {
         name: next((path for path in paths if path.endswith(ending)), "") for name, ending in TRACED_IN_WALKS.items()
     }
-    return {name: path for name, path in found.items() if path}
-
-
-def paths_of_traces(states: Mapping[str, type], walks: bool) -> dict[str, str]:
-    """Path of each traceable channel in a lane that is not a state variable of that name."""
-    return TRACED | (walk_traces(states) if walks else {})
+    return TRACED | {name: path for name, path in found.items() if path}

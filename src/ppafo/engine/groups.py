@@ -3,7 +3,7 @@
 The rows of parameters, of states and of what a step hands on are these groups in their order.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from enum import Enum
 from typing import Any, NamedTuple
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from ppafo.engine.rows import leaf_paths, leaves
 from ppafo.errors import ProgramError
+from ppafo.model.declaration import PlainFunction
 
 
 class Role(Enum):
@@ -22,19 +23,23 @@ class Role(Enum):
 
 
 class Group(NamedTuple):
-    """A group of numbers: the class of its row, a NamedTuple or float, and its role."""
+    """A group of numbers: the class of its row, a NamedTuple or float, and its role.
+
+    ``of_plant(plant)`` gives its row where that follows the plant; None where the run has it.
+    """
 
     row: Any
     role: Role
+    of_plant: PlainFunction | None = None
 
 
 Groups = Mapping[str, Group]
 """Groups by their names, in the order of their rows."""
 
 
-def given(row: Any) -> Group:
-    """A group that a run is given and that does not change."""
-    return Group(row, Role.PARAMETER)
+def given(row: Any, of_plant: PlainFunction | None = None) -> Group:
+    """A group that does not change in a run: the one that the run has, or ``of_plant(plant)``, in an export too."""
+    return Group(row, Role.PARAMETER, of_plant)
 
 
 def kept(row: Any) -> Group:
@@ -64,11 +69,16 @@ def rows_of(groups: Groups, role: Role) -> dict[str, Any]:
 
 
 def filled(
-    rows: Mapping[str, Any], values: Mapping[str, Any], runs: int, role: Role
+    rows: Mapping[str, Any],
+    values: Mapping[str, Any],
+    runs: int,
+    role: Role,
+    declared_at: Callable[[str], str] = str,
 ) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
     """Rows (numbers, runs) of groups by name, whose numbers are floats or arrays (runs,).
 
-    ProgramError for a group without value, for a value without group, and for one of another class.
+    ProgramError for a group without value, with the place where it is ``declared_at``, for a value without group, and
+    for one of another class.
     """
     for name, value in values.items():
         if name not in rows and leaves(value):
@@ -80,10 +90,12 @@ def filled(
         numbers = leaves(values[name]) if name in values else []
         paths = leaf_paths(row, name)
         if len(numbers) != len(paths) or (numbers and getattr(values[name], "_fields", ()) != row._fields):
+            fields = ", ".join(path.partition(".")[2] or path for path in paths)
             given = f"it is given {_described(values[name])}" if numbers else "nothing gives it"
+            is_open = role is Role.PARAMETER and not numbers
+            remedy = f"; '{name}': given({row.__name__}, FUNCTION) has it from FUNCTION(plant)" if is_open else ""
             raise ProgramError(
-                f"{role.value}: '{name}' is a {row.__name__}({', '.join(_own_names(paths))}), and {given}; "
-                "engine/run.py gives groups by their names"
+                f"{declared_at(name)}: '{name}' is a {row.__name__}({fields}) of the {role.value}, and {given}{remedy}"
             )
         found += numbers
     table = np.empty((len(found), runs))
@@ -104,10 +116,6 @@ def check_rows(count: int, rows: Mapping[str, Any], role: Role) -> None:
             f"{role.value}: a block has {count} rows, its program {sum(sizes.values())}: "
             + ", ".join(f"{name} {size}" for name, size in sizes.items() if size)
         )
-
-
-def _own_names(paths: list[str]) -> list[str]:
-    return [path.partition(".")[2] or path for path in paths]
 
 
 def _described(value: Any) -> str:

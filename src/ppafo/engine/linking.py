@@ -1,13 +1,12 @@
-"""Laws of effects at their ports, and what else stands for a function of the model in a program."""
+"""Laws of effects at their ports, and the chambers that an observer of a walk assumes of an actuator."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
+from ppafo.engine.definitions import place_of
 from ppafo.engine.program import Program
-from ppafo.engine.source_text import place_of
 from ppafo.errors import ProgramError
-from ppafo.model.controlled import CONTROLLED, TORQUE, controlled, steered, turned_round
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
 from ppafo.model.plant import PlantParameters, net_torque
 from ppafo.model.valves.kind import valve_problem
@@ -32,7 +31,7 @@ def link_program(program: Program, collector: LinkCollector) -> None:
     """
     problem = valve_problem(program.valve)
     if problem:
-        raise ProgramError(f"valve: {problem}")
+        raise ProgramError(f"{place_of(program.valve.connect)}: {problem}")
     # What friction or a stop may hold is decided elsewhere, where a spring in the sum alone would be missed.
     at_rest = [net_torque(0.0, 0.0, 0.0, angle, 0.0) for angle in (1.0, 1.5)]
     if any(at_rest):
@@ -42,15 +41,12 @@ def link_program(program: Program, collector: LinkCollector) -> None:
         )
     if program.actuator.plant is not PlantParameters:
         collector.links[PlantParameters, "_replace"] = program.actuator.plant
-    if program.leg is not None:
-        of_walk = program.leg.links(program)
-        collector.links.update(of_walk)
-        collector.effects.update(dict.fromkeys(of_walk.values(), program.leg.ASKED))
-    followed = CONTROLLED[program.controlled]
-    if program.controlled != TORQUE:
-        collector.links[controlled] = followed.value
-    if (followed.sign < 0.0) != program.has_vacuum:
-        collector.links[steered] = turned_round
+    if program.walks and not program.has_vane:
+        from ppafo.engine.scheme.believed import chambers_of_observer  # most devices walk on no leg
+
+        volumes = chambers_of_observer(program.functions)
+        collector.links.update(volumes)
+        collector.effects.update(dict.fromkeys(volumes.values(), ("plant",)))
     if not program.effects:
         return
     # Names of rows without any effect: two effects that share a name are refused by the catalogue.

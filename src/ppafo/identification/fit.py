@@ -9,7 +9,6 @@ import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -126,10 +125,8 @@ def fit(
                 "the upper and the start between them"
             )
     work = FitRuns(residuals, tuple(numbers), tuple(blocks), report, memory, is_motion)
-    samples, sought = (
-        sum(one.rows.stop - one.rows.start for one in blocks),
-        sum(math.isinf(one.deviation) for one in numbers),
-    )
+    samples = sum(one.rows.stop - one.rows.start for one in blocks)
+    sought = sum(math.isinf(one.deviation) for one in numbers)
     if samples <= sought:
         raise IdentificationError(f"{samples} samples for {sought} numbers that are sought; more samples are needed")
     found = _whitened(work, _search(work, work.start), confidence)
@@ -209,24 +206,12 @@ def _outliers(work: FitRuns, left: Floats) -> Indices:
     return np.sort(np.concatenate(found)[order])
 
 
-class _Settled(NamedTuple):
-    """End of a fit: scaled numbers, residuals of the samples, linearisation there, last step tried, and its gain.
-
-    ``gain`` is by how much the last step that was tried would lower the cost, at most 0 where it was not taken, and
-    -inf where no run succeeds there.
-    """
-
-    point: Floats
-    residuals: Floats
-    linear: Linear
-    step: Floats
-    gain: float
-
-
-def _settled(work: FitRuns, point: Floats) -> _Settled:
+def _settled(work: FitRuns, point: Floats) -> tuple[Floats, Floats, Linear, Floats, float]:
     """Return where Gauss-Newton steps on whitened samples end, from the least squares at a scaled ``point``.
 
-    Samples that stand alone are left out, and in a fit of motion once more those on which the rest hangs.
+    Scaled numbers, residuals of the samples, linearisation there, the last step tried, and its gain: by how much it
+    would lower the cost, at most 0 where it was not taken, and -inf where no run succeeds there. Samples that stand
+    alone are left out, and in a fit of motion once more those on which the rest hangs.
     """
     left = work.one(point)
     work.left_out, is_checked = work.outliers, False
@@ -254,7 +239,7 @@ def _settled(work: FitRuns, point: Floats) -> _Settled:
             work.left_out = np.union1d(work.outliers, highest[leverage[highest] > _LEVERAGE])
         if gain > 0.0:
             point, left = reached, after
-    return _Settled(point=point, residuals=left, linear=linear, step=step, gain=gain)
+    return point, left, linear, step, gain
 
 
 def _edge(work: FitRuns, point: Floats, step: Floats) -> dict[str, int]:
@@ -283,6 +268,12 @@ def _whitened(work: FitRuns, start: Floats, confidence: float) -> Fit:
     near = 1.0e-6 * np.maximum(1.0, np.abs(point))
     touching = ((point - work.low < near) & (gradient > 0.0)) | ((work.high - point < near) & (gradient < 0.0))
     names = [number.name for number in work.numbers]
+    # What is assumed of each number widens the interval of every one by its share of the variance [-].
+    fractions = np.square(covariance * work.prior) / np.diag(covariance)[:, None]
+    shares = {
+        name: tuple((names[other], float(row[other])) for other in np.argsort(-row).tolist() if row[other] >= _SHOWN)
+        for name, row in zip(names, fractions, strict=True)
+    }
     return Fit(
         numbers=work.numbers,
         values=point * work.scale,
@@ -295,7 +286,7 @@ def _whitened(work: FitRuns, start: Floats, confidence: float) -> Fit:
         outliers=tuple(work.outliers.tolist()),
         conflict=conflict_of(work, rows, point, ~touching, freedom) or too_smooth(known),
         unidentified=tuple(unidentified(covariance, names)),
-        shares=_shares(work, covariance, names),
+        shares=shares,
         evaluations=work.evaluations,
         # Where every step leaves the region in which runs succeed nothing says that this is the least.
         has_converged=-math.inf < gain < _CONVERGED,
@@ -304,15 +295,6 @@ def _whitened(work: FitRuns, start: Floats, confidence: float) -> Fit:
         confidence=confidence,
         edge={} if math.isfinite(gain) else _edge(work, point, step),
     )
-
-
-def _shares(work: FitRuns, covariance: Floats, names: Sequence[str]) -> dict[str, tuple[tuple[str, float], ...]]:
-    """Return the shares [-] of the variance of each number that come from what is assumed of others, largest first."""
-    fractions = np.square(covariance * work.prior) / np.diag(covariance)[:, None]
-    return {
-        name: tuple((names[other], float(row[other])) for other in np.argsort(-row).tolist() if row[other] >= _SHOWN)
-        for name, row in zip(names, fractions, strict=True)
-    }
 
 
 def _likelihood(work: FitRuns, found: Fit) -> float:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,19 +168,14 @@ def check_sources(
         for name in moving:
             check_moves(source, procedure, name)
         for name in absolute:
-            _check_absolute(source, procedure, name)
-
-
-def _check_absolute(source: RecordingSource, procedure: str, name: str) -> None:
-    # Gauge pressures, passed for absolute, are 0 or less where the other side is open.
-    values = source.recording[name]
-    low = int(np.argmin(values))
-    if values[low] <= 0.0:
-        raise IdentificationError(
-            f"{source.name}: {procedure}: '{name}' is {_shown(source, name, values[low])} at sample {low + 1}, "
-            "which is not an absolute pressure: use psi_g, bar_g or kPa_g for gauge"
-        )
-    check_not_alone(source, procedure, name)
+            # Gauge pressures, passed for absolute, are 0 or less where the other side is open.
+            low = int(np.argmin(recording[name]))
+            if recording[name][low] <= 0.0:
+                raise IdentificationError(
+                    f"{source.name}: {procedure}: '{name}' is {_shown(source, name, recording[name][low])} at sample "
+                    f"{low + 1}, which is not an absolute pressure: use psi_g, bar_g or kPa_g for gauge"
+                )
+            check_not_alone(source, procedure, name)
 
 
 def check_not_alone(source: RecordingSource, procedure: str, name: str) -> None:
@@ -315,20 +310,17 @@ def check_no_wrong_reading(
     wrong = np.flatnonzero(away > 3.0 * spread + least)
     if wrong.size:
         first = int(wrong[np.argmax(away[wrong])])
-        ends = np.cumsum([len(source.recording) for source in sources])
-        at = int(np.searchsorted(ends, places[first], side="right"))
-        begins = int(ends[at]) - len(sources[at].recording)
-        samples = [int(place) - begins for place in places[wrong] if begins <= place < ends[at]]
-        samples.sort(key=lambda sample: sample != places[first] - begins)
-        _refuse_outlier(sources[at], procedure, name, samples, float(values[first]), float(middle[first]))
+        source, before = _recording_with(sources, int(places[first]))
+        samples = [int(place) - before for place in places[wrong] if 0 <= place - before < len(source.recording)]
+        samples.sort(key=lambda sample: sample != places[first] - before)
+        _refuse_outlier(source, procedure, name, samples, float(values[first]), float(middle[first]))
 
 
-class MeterReadings(NamedTuple):
-    """Readings of a flow meter: flow with its direction [kg/s], which of them can be, and remarks on the others."""
-
-    flow: Floats
-    possible: NDArray[np.bool_]
-    remarks: tuple[str, ...]
+def _recording_with(sources: tuple[RecordingSource, ...], place: int) -> tuple[RecordingSource, int]:
+    """Return the recording that has a sample of all of them, and how many samples lie before that recording."""
+    ends = np.cumsum([len(source.recording) for source in sources])
+    at = int(np.searchsorted(ends, place, side="right"))
+    return sources[at], int(ends[at]) - len(sources[at].recording)
 
 
 def meter_readings(
@@ -337,8 +329,8 @@ def meter_readings(
     direction: Floats,
     zero: float,
     used: NDArray[np.bool_] | None = None,
-) -> MeterReadings:
-    """Readings of the flow meter, each beside the direction that pressures or command give the flow.
+) -> tuple[Floats, NDArray[np.bool_], tuple[str, ...]]:
+    """Readings of the flow meter with their direction [kg/s], which of them can be, and remarks on the others.
 
     Under every law gas flows from the higher to the lower pressure. A meter that never shows a flow below 0 has no
     sign: where the flow went the other way in many readings, it gets the sign of its direction. Any other reading
@@ -356,7 +348,7 @@ def meter_readings(
     many = _MOST_IMPOSSIBLE * np.count_nonzero(counted)
     if not has_sign and np.count_nonzero(against) > many:
         said = f"{procedure}: the flow meter has no sign; the flow has the direction that the other channels give it"
-        return MeterReadings(np.where(direction < 0.0, -flow, flow), counted, (said,))
+        return np.where(direction < 0.0, -flow, flow), counted, (said,)
     wrong = np.flatnonzero(against)
     if wrong.size > many:
         raise IdentificationError(
@@ -364,15 +356,14 @@ def meter_readings(
             f"in {wrong.size} of {np.count_nonzero(counted)} readings; reverse the sign of 'mass_flow'"
         )
     if not wrong.size:
-        return MeterReadings(flow, counted, ())
-    ends = np.cumsum([len(source.recording) for source in sources])
-    at = int(np.searchsorted(ends, wrong[0], side="right"))
-    sample = int(wrong[0]) - (int(ends[at]) - len(sources[at].recording)) + 1
+        return flow, counted, ()
+    source, before = _recording_with(sources, int(wrong[0]))
     said = (
         f"left out: {wrong.size} of {np.count_nonzero(counted)} readings with a flow against the direction that "
-        f"pressures and command give it, which no opening has; the first is sample {sample} of {sources[at].name}"
+        f"pressures and command give it, which no opening has; the first is sample {int(wrong[0]) - before + 1} of "
+        f"{source.name}"
     )
-    return MeterReadings(flow, counted & ~against, (said,))
+    return flow, counted & ~against, (said,)
 
 
 def usual_range(values: Floats) -> float:

@@ -10,6 +10,7 @@ from ppafo.metrics import command, gas, motion, strides, switching, tracking
 from ppafo.metrics.metric import Metric, MetricKind
 from ppafo.metrics.settled import SETTLED_METRICS
 from ppafo.signals import Recording
+from ppafo.signals.recording import OF_SECOND_CHAMBER
 
 if TYPE_CHECKING:
     from ppafo.engine.program import Program
@@ -55,8 +56,9 @@ def evaluate(recording: Recording) -> dict[str, Metric]:
 
 
 def missing_channels(program: "Program") -> frozenset[str]:
-    """Return the channels that runs of a program lack: an energy balance, if its gas has none."""
-    return frozenset() if program.is_thermal else gas.WITH_ENERGY_BALANCE
+    """Return the channels that runs of a program lack: of an energy balance, or of a second chamber."""
+    of_gas: frozenset[str] = frozenset() if program.is_thermal else gas.WITH_ENERGY_BALANCE
+    return of_gas | OF_SECOND_CHAMBER if program.has_one_chamber else of_gas
 
 
 def has_channels(program: "Program", kind: MetricKind) -> bool:

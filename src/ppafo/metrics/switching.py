@@ -27,7 +27,6 @@ from ppafo.metrics.metric import (
     spans,
 )
 from ppafo.model.columns import choose, larger, truncated
-from ppafo.model.controlled import value_in
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.signals import Recording
 from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
@@ -154,13 +153,13 @@ class Oscillations(NamedTuple):
 
 def start_oscillations(course: ReferenceSummary, sample: Sample) -> Oscillations:
     """No reversal at the first sample."""
-    value = value_in(sample)
+    value = sample.value
     return Oscillations(Swing(value, UNDECIDED, value), UNDECIDED)
 
 
 def update_oscillations(state: Oscillations, course: ReferenceSummary, sample: Sample) -> Oscillations:
     """Add one sample; the first sample of the hold is also the last one of the ramp."""
-    value = value_in(sample)
+    value = sample.value
     swing = next_swing(state.swing, value, OSCILLATION_THRESHOLD * course.largest)
     anew = course.hold_start == sample.number
     begun = Swing(value if anew else swing.play, UNDECIDED if anew else swing.turns, value if anew else swing.highest)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, followed, for_each_reference, hold, ramp, spans
 from ppafo.model.columns import root
-from ppafo.model.controlled import CONTROLLED, TORQUE, value_in
+from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.signals import Recording
 from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
 
@@ -67,13 +67,13 @@ class SquaredError(NamedTuple):
 
 def start_squared_error(course: ReferenceSummary, sample: Sample) -> SquaredError:
     """The squared error of the first sample."""
-    error = sample.reference - value_in(sample)
+    error = sample.reference - sample.value
     return SquaredError(error * error, 0.0, 0.0)
 
 
 def update_squared_error(state: SquaredError, course: ReferenceSummary, sample: Sample) -> SquaredError:
     """Add one interval."""
-    error = sample.reference - value_in(sample)
+    error = sample.reference - sample.value
     square = error * error
     # In intervals: all have one length, which cancels where the sum is read.
     piece = 0.5 * (state.last + square)
@@ -96,13 +96,13 @@ class AbsoluteError(NamedTuple):
 
 def start_absolute_error(course: ReferenceSummary, sample: Sample) -> AbsoluteError:
     """The error of the first sample."""
-    error = abs(sample.reference - value_in(sample))
+    error = abs(sample.reference - sample.value)
     return AbsoluteError(error, error)
 
 
 def update_absolute_error(state: AbsoluteError, course: ReferenceSummary, sample: Sample) -> AbsoluteError:
     """The larger one of that and the error of the next sample, and this one."""
-    error = abs(sample.reference - value_in(sample))
+    error = abs(sample.reference - sample.value)
     return AbsoluteError(max(state.largest, error), error)
 
 

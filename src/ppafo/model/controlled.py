@@ -1,7 +1,7 @@
 """Controlled quantity of a law: torque of the actuator, angle, pressure in a chamber, or pressure difference.
 
-``controlled`` and ``steered`` are ports: a program whose reference is no torque has the functions of its entry in the
-table in their place. To add one: a function and a line of ``CONTROLLED``.
+A law is given its functions as ``*, parts: ErrorFunctions``, and hands them to ``seen_error``. To add a quantity: a
+function and a line of ``CONTROLLED``.
 """
 
 from collections.abc import Callable
@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 from ppafo.model.columns import larger, smaller
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
-from ppafo.signals.meter import Sample
 
 TORQUE, ANGLE = "torque", "angle"
 """Names of two that other parts of the package must tell from the rest."""
@@ -52,19 +51,29 @@ def turned_round(error: float) -> float:
     return -error
 
 
-def seen_value(measurement: Measurement) -> float:
+class ErrorFunctions(NamedTuple):
+    """Functions of the error on which a law acts.
+
+    ``value(angle, pressure_1, pressure_2, torque)`` is the controlled quantity of a measurement; ``steered(error)`` the
+    error, in the unit of the reference, above 0 where a command above 0 is needed.
+    """
+
+    value: Callable[[float, float, float, float], float]
+    steered: Callable[[float], float]
+
+
+OF_TORQUE = ErrorFunctions(controlled, steered)
+"""Functions of a torque error, of supplies above the atmosphere: also in every walk."""
+
+
+def seen_value(measurement: Measurement, *, parts: ErrorFunctions) -> float:
     """Controlled quantity as measured, in the unit of the reference."""
-    return controlled(measurement.angle, measurement.pressure_1, measurement.pressure_2, measurement.torque)
+    return parts.value(measurement.angle, measurement.pressure_1, measurement.pressure_2, measurement.torque)
 
 
-def seen_error(reference: float, measurement: Measurement) -> float:
+def seen_error(reference: float, measurement: Measurement, *, parts: ErrorFunctions) -> float:
     """Reference less what the sensors show of it, above 0 where a command above 0 is needed."""
-    return steered(reference - seen_value(measurement))
-
-
-def value_in(sample: Sample) -> float:
-    """Controlled quantity at a sample, in the unit of the reference."""
-    return controlled(sample.angle, sample.pressure_1, sample.pressure_2, sample.torque)
+    return parts.steered(reference - seen_value(measurement, parts=parts))
 
 
 class Ends(NamedTuple):
@@ -211,6 +220,13 @@ CONTROLLED: dict[str, ControlledQuantity] = {
     )
 }
 """Controlled quantities, by the word that a file has in ``reference.of``."""
+
+
+def error_functions(name: str, has_vacuum: bool) -> ErrorFunctions:
+    """Functions of the error of a controlled quantity, of supplies above the atmosphere or below it."""
+    quantity = CONTROLLED[name]
+    return ErrorFunctions(quantity.value, turned_round if (quantity.sign < 0.0) != has_vacuum else steered)
+
 
 ANYTHING = tuple(CONTROLLED)
 """Controlled quantities of a law that acts on the error alone: all."""

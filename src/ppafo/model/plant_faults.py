@@ -5,7 +5,8 @@ one the numbers of ``SOUND`` change nothing, and a walk that has neither fault n
 ``fault_catalogue.py`` has what they are called in a file.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from ppafo.model.orifice import conductance_in_series
 from ppafo.model.plant import BlendedPort, PlantParameters, SinglePort
@@ -201,6 +202,13 @@ def swapped_blended(port: BlendedPort, other: BlendedPort, swapped: bool) -> Ble
         vent_pressure=other.vent_pressure if swapped else port.vent_pressure,
         is_relieving=other.is_relieving if swapped else port.is_relieving,
     )
+
+
+FAILED_PORTS: dict[type, Callable[..., tuple[Any, Any]]] = {
+    SinglePort: failed_single_ports,
+    BlendedPort: failed_blended_ports,
+}
+"""Function of both ports as faults leave them, by the class of the ports."""
 
 
 def failed_plant(plant: PlantParameters, faults: PlantFaults, time: float) -> PlantParameters:

@@ -13,6 +13,8 @@ regulator's linear part is solved in closed form, so that a small droop asks for
 
 from typing import NamedTuple
 
+from ppafo.model.plant import PlantParameters, chamber_mass
+
 
 class SupplyLines(NamedTuple):
     """Droop [Pa s/kg] and largest flow [kg/s] of both regulators, volumes [m^3] of both lines.
@@ -36,6 +38,15 @@ class LineState(NamedTuple):
     mass_1: float
     mass_2: float
     regulated_mass: float
+
+
+def lines_at_start(plant: PlantParameters, lines: SupplyLines) -> LineState:
+    """Both lines at the pressures that their regulators are set to, and nothing let through yet."""
+    return LineState(
+        mass_1=chamber_mass(plant.supply_pressure, lines.volume_1, plant.gas_product),
+        mass_2=chamber_mass(plant.dorsiflexion_pressure, lines.volume_2, plant.gas_product),
+        regulated_mass=0.0,
+    )
 
 
 class LineStep(NamedTuple):

@@ -1,6 +1,7 @@
 """Construction of a device in SI units from a parameter set, which must be complete and consistent by then."""
 
 import math
+import operator
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
@@ -40,6 +41,7 @@ from ppafo.parameters.parameter_set import (
     with_followers,
 )
 from ppafo.parameters.plant import shape_and_growth
+from ppafo.units.shown import shown_text
 from ppafo.wording import nearest_name, one_line
 
 _SAME = 1.0e-9
@@ -98,9 +100,13 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
         raise ParameterError(f"{parameter_set.file}: actuator: {line(0)}")
     for path, relation, other, holds in consistency(device):
         if not holds:
-            number, limit = number_text(parameter_set.numbers[path]), number_text(parameter_set.numbers[other])
+            entry, limit = parameter_set.numbers[path], operator.attrgetter(other)(device)
+            # In the unit of the number at fault: a gauge pressure beside an absolute one would have to be converted.
+            si_unit, room = declaration.quantities({})[path].unit, device.supply.atmospheric_pressure
+            unit = entry.unit if declaration.fits(entry.unit, si_unit) else ""
+            allowed = f"{relation} {other} = {shown_text(limit, si_unit, atmosphere=room, unit=unit)}"
             why = _BESIDE_ANOTHER if path in SUPPLIES else ""
-            raise ParameterError(f"{parameter_set.file}: {path} = {number} must be {relation} {other} = {limit}{why}")
+            raise ParameterError(f"{parameter_set.file}: {path} = {number_text(entry)} must be {allowed}{why}")
     if device.supply.is_vacuum and relieving is not None and not relieving.value:
         raise ParameterError(
             f"{parameter_set.file}: {declaration.RELIEVING_PATH} = false: gas goes from the chambers into a supply "

@@ -108,6 +108,11 @@ class Actuator:
         """Return a setting by its name."""
         return held(self, name)
 
+    @property
+    def has_one_chamber(self) -> bool:
+        """True where chamber 2 is nothing but the dead volume behind the second port of the valve."""
+        return ACTUATORS[self.kind].has_one_chamber(self.table)
+
 
 @dataclass(frozen=True, slots=True)
 class Friction:

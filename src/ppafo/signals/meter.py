@@ -70,9 +70,9 @@ NO_ENERGY = EnergySample(**dict.fromkeys(EnergySample._fields, 0.0))
 class Sample(NamedTuple):
     """Sample of a recording: its number from 0, channels in SI units, and those of gas, foot and stride.
 
-    ``reference`` is in the unit of what is controlled. What a run does not have is 0: reference, temperatures and
-    ``energy`` of gas without an energy balance, ``foot`` but on the shank of a gait, ``stride`` but in a walk. There
-    ``reference`` is the torque that the controller requests.
+    ``value`` is the controlled quantity, and ``reference`` in its unit. What a run does not have is 0: reference,
+    temperatures and ``energy`` of gas without an energy balance, ``foot`` but on the shank of a gait, ``stride`` but in
+    a walk. There ``reference`` is the torque that the controller requests.
     """
 
     number: float
@@ -82,6 +82,7 @@ class Sample(NamedTuple):
     pressure_2: float
     torque: float
     command: float
+    value: float
     reference: float
     temperature_1: float
     temperature_2: float

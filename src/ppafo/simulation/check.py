@@ -242,7 +242,7 @@ def finer(run: Run) -> Run:
 
 def estimated_error(result: FinishedRun, fine: FinishedRun) -> ErrorEstimate:
     """The estimated error of a result, from the same run with finer steps; inf where that diverged."""
-    courses = [_COURSES[name] for name in _courses_of(result)]
+    courses = list(_courses_of(result).values())
     if not fine.status.is_completed:
         errors_at_end, errors = [math.inf for _ in courses], dict.fromkeys(result.metrics, math.inf)
     else:
@@ -273,9 +273,12 @@ def estimated_error(result: FinishedRun, fine: FinishedRun) -> ErrorEstimate:
     )
 
 
-def _courses_of(result: FinishedRun) -> list[str]:
-    """Channels of a run that are compared over time: temperatures if recorded."""
-    return [name for name, channels in _COURSES.items() if all(channel in result.recording for channel in channels)]
+def _courses_of(result: FinishedRun) -> dict[str, tuple[str, ...]]:
+    """Recorded channels of a run that are compared over time, by the words for them."""
+    recorded = {
+        words: tuple(name for name in channels if name in result.recording) for words, channels in _COURSES.items()
+    }
+    return {words: channels for words, channels in recorded.items() if channels}
 
 
 def _shares(result: FinishedRun, errors: Mapping[str, float]) -> dict[str, float]:
@@ -293,7 +296,8 @@ def _pressure_range(result: FinishedRun) -> float:
     """Highest less lowest pressure [Pa] that the chambers had or are connected to; the atmosphere's if there is one."""
     supply = result.scenario.device.supply
     outside = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
-    values = np.concatenate([result.recording["pressure_1"], result.recording["pressure_2"], outside])
+    chambers = [result.recording[name] for name in _COURSES["pressures over time"] if name in result.recording]
+    values = np.concatenate([*chambers, outside])
     return float(np.ptp(values)) or supply.atmospheric_pressure
 
 
@@ -318,11 +322,12 @@ def checked(result: FinishedRun, run: Run, again: Again) -> Check:
         repeats += [(MOVED_MEASUREMENT, moved) for moved in _measurements_moved(run, pressures)]
     results = again([repeat for _, repeat in repeats])
     checked = [(name, repeated) for (name, _), repeated in zip(repeats, results, strict=True)]
-    courses = tuple(_course(name, checked, result, pressures) for name in _courses_of(result))
+    compared = _courses_of(result)
+    courses = tuple(_course(words, channels, checked, result, pressures) for words, channels in compared.items())
     partings = [repeated.status.time for repeated in results if repeated.status.time is not None]
     for course in courses:
         for repeated in results:
-            beyond = _largest_differences(repeated.recording, recording, _COURSES[course.name]) > course.allowed
+            beyond = _largest_differences(repeated.recording, recording, compared[course.name]) > course.allowed
             partings += [float(recording.time[np.argmax(beyond)])] if beyond.any() else []
     return Check(
         scenario=scenario.name,
@@ -443,7 +448,13 @@ def _largest_differences(one: Recording, other: Recording, channels: Iterable[st
     return np.asarray(np.max([np.abs(one[name][:count] - other[name][:count]) for name in channels], axis=0))
 
 
-def _course(name: str, repeats: list[tuple[str, FinishedRun]], result: FinishedRun, pressures: float) -> NumberCheck:
+def _course(
+    name: str,
+    channels: tuple[str, ...],
+    repeats: list[tuple[str, FinishedRun]],
+    result: FinishedRun,
+    pressures: float,
+) -> NumberCheck:
     device = result.scenario.device
     span, unit, promised = {
         "angle over time": (device.actuator.angle_max - device.actuator.angle_min, "rad", LARGEST_OF_ANGLE),
@@ -451,7 +462,7 @@ def _course(name: str, repeats: list[tuple[str, FinishedRun]], result: FinishedR
         _TEMPERATURES: (device.gas.temperature, "K", LARGEST_OF_TEMPERATURE),
     }[name]
     changes = _largest(
-        (repeat, float(np.max(_largest_differences(repeated.recording, result.recording, _COURSES[name]))))
+        (repeat, float(np.max(_largest_differences(repeated.recording, result.recording, channels))))
         for repeat, repeated in repeats
     )
     return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes, promised * span / MARGIN)

@@ -89,7 +89,7 @@ class MotionKind(Protocol[ScenarioType_contra]):
         """True where a run is so short that a second one tells the error of the first without being asked for."""
 
     def plan(self, scenario: ScenarioType_contra, /) -> "tuple[Run, tuple[Problem, ...]]":
-        """Return the run and what may be wrong with it, as ``plan_runs`` does."""
+        """Return the run and what may be wrong with it, as ``plan_vane`` does."""
 
     def rules(self, scenario: ScenarioType_contra, /) -> "tuple[Problem, ...]":
         """Return which numbers contradict each other."""

@@ -5,14 +5,15 @@ library has them in C.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
-from ppafo.engine.program import FeedPhases, FootPhases, GasPhases, Program
+from ppafo.engine.program import GasPhases, Program
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
@@ -20,6 +21,7 @@ from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
 from ppafo.engine.step import isothermal
 from ppafo.engine.step.lane import NoParameters
 from ppafo.errors import ScenarioError
+from ppafo.model.binding import made_of
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import (
     Numeric,
@@ -34,7 +36,7 @@ from ppafo.model.columns import (
     truncated,
     whole,
 )
-from ppafo.model.controlled import TORQUE
+from ppafo.model.controlled import OF_TORQUE, TORQUE, error_functions
 from ppafo.model.effects.kind import Effect
 from ppafo.model.gas import wall_exchange
 from ppafo.model.orifice import ExactOrifice
@@ -69,7 +71,7 @@ def plan_run(scenario: Scenario) -> Run:
 
     ScenarioError where it takes too many steps.
     """
-    run, problems = plan_runs(scenario)
+    run, problems = scenario.motion.motion_kind.plan(scenario)
     for is_bad, line in problems:
         if is_bad:
             raise ScenarioError(f"{scenario.name}: {line(0)}")
@@ -152,8 +154,7 @@ def compose_run(
     plant, leg = (plant, None) if components.leg is None else components.leg.put_on(plant)
     lines = None
     if components.supply_lines is not None:
-        # Most scenarios have constant supply pressures and load none of this.
-        from ppafo.simulation.supply_lines import lines_at_start
+        from ppafo.model.regulator import lines_at_start  # most scenarios have constant supply pressures
 
         lines = Lines(components.supply_lines, lines_at_start(plant, components.supply_lines))
     controller: Any = ()
@@ -218,64 +219,62 @@ def _gas(components: Components, effects: Sequence[Effect]) -> GasPhases:
     return not_ideal
 
 
-def _feed(components: Components) -> FeedPhases | None:
-    """Return what feeds the valve."""
-    if components.supply_lines is None:
-        return None
-    from ppafo.engine.step import lines  # most runs have none
-
-    return lines
-
-
-def _foot(components: Components) -> FootPhases | None:
-    """Return how a foot on a prescribed shank goes through a step."""
-    if components.leg is None:
-        return None
-    from ppafo.engine.step import foot  # few vanes carry a leg
-
-    return foot
+def _of_error(law: ControllerKind | None, components: Components) -> ControllerKind | None:
+    """Return a law that is given the functions of the error it acts on; one of a torque alone as it is."""
+    parts = error_functions(components.controlled, components.device.supply.is_vacuum)
+    if law is None or law.controls == (TORQUE,) or parts == OF_TORQUE:
+        return law
+    return replace(law, update=made_of(law.update, law.update.__name__, parts))
 
 
 def _program(components: Components, steps: TimeGrid, walk: Walk | None, has_delay: bool) -> Program:
     """Return what the lanes are composed of."""
+    feed: ModuleType | None = None
+    foot: ModuleType | None = None
+    leg: ModuleType | None = None
+    faults: ModuleType | None = None
+    # Most runs have neither lines nor a leg, and most walks no fault.
+    if components.supply_lines is not None:
+        from ppafo.engine.step import lines as feed
+    if components.leg is not None:
+        from ppafo.engine.step import foot
+    if walk is not None:
+        from ppafo.engine.step import walk as leg
+    if walk is not None and walk.failing is not None:
+        from ppafo.engine.step import failing as faults
     is_late, effects = first(components.signal_delay) > 0.0, effects_of(components.device, components.sections)
-    worn = None if walk is None else walk.groups()
     return Program(
         actuator=ACTUATORS[components.device.actuator.kind].model,
         valve=components.valve,
         reference=PROFILES[components.reference.kind],
-        controller=components.controller,
+        controller=_of_error(components.controller, components),
         angle=None if components.path is None else PROFILES[components.path.kind],
         ideal_sensors=components.has_ideal_sensors,
         late_commands=has_delay,
         late_signals=walk is None and is_late,
         late_readings=walk is not None and is_late,
         gas=_gas(components, effects),
-        leg=None if worn is None else worn.leg,
-        takes_task_sequence=worn is not None and worn.takes_task_sequence,
-        faults=None if worn is None else worn.faults,
-        feed=_feed(components),
+        leg=leg,
+        takes_task_sequence=walk is not None and walk.task_sequence is not None,
+        faults=faults,
+        feed=feed,
         is_adaptive=bool(first(steps.needs_parts)),
         # A broken number of steps to a sample puts samples inside steps.
         samples_inside=bool(first(steps.record_every % 1.0)),
         effects=effects,
         shank=None if components.leg is None else components.leg.shank,
-        foot=_foot(components),
+        foot=foot,
         controlled=components.controlled,
-        has_vacuum=components.device.supply.is_vacuum,
+        has_one_chamber=components.device.actuator.has_one_chamber,
     )
 
 
-def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
-    """The run of a scenario, and what may be wrong with it; any number in both may be an array (runs,).
-
-    All runs of an ensemble must ask for one program: of a valve's and the sensors' settings, each is 0 for all or none.
-    """
-    return scenario.motion.motion_kind.plan(scenario)
-
-
 def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, tuple[Problem, ...]]:
-    """The run of a scenario of a vane alone, with a leg or without, and what may be wrong with it."""
+    """The run of a scenario of a vane alone, with a leg or without, and what may be wrong with it.
+
+    Numbers in both may be arrays (runs,) of an ensemble, which must ask for one program: of a valve's and the sensors'
+    settings, each is 0 for all or none.
+    """
     device, motion, control = scenario.device, vane_motion(scenario), scenario.controller
     plant = plant_parameters(device, motion.outside_torque)
     # The command of a Python object comes from outside the lanes.
@@ -359,14 +358,7 @@ def too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
 
 def sensor_parameters(scenario: Scenario) -> SensorParameters:
     """Noise and quantisation as the engine takes them."""
-    sensors = scenario.sensors
-    return SensorParameters(
-        angle_noise=sensors.angle_noise,
-        pressure_noise=sensors.pressure_noise,
-        angle_resolution=sensors.angle_resolution,
-        pressure_resolution=sensors.pressure_resolution,
-        seed=sensors.seed,
-    )
+    return SensorParameters(**{name: getattr(scenario.sensors, name) for name in SensorParameters._fields})
 
 
 def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:

@@ -12,7 +12,9 @@ from ppafo.model.columns import at, over_runs
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, ControlledQuantity, Ends
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
-from ppafo.simulation.declaration import DocumentReader, kind_at, profile_settings
+from ppafo.signals.recording import OF_SECOND_CHAMBER
+from ppafo.simulation.declaration import profile_settings
+from ppafo.simulation.document import DocumentReader, kind_at
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
 from ppafo.units.shown import in_units, shown_text
 
@@ -142,6 +144,11 @@ def reference_problem(scenario: Scenario) -> str:
         return (
             f"reference.of = 'angle': a valve of kind '{valve}' vents both chambers at a command of 0 and holds no "
             "angle; take one that is closed there, such as device.valve = 'proportional'"
+        )
+    if scenario.device.actuator.has_one_chamber and scenario.controlled in OF_SECOND_CHAMBER:
+        return (
+            f"reference.of = '{scenario.controlled}': {scenario.device.name} has one chamber; take reference.of = "
+            "'pressure_1'"
         )
     limits, run = limits_of(scenario.device, CONTROLLED[scenario.controlled]), scenario.run
     return profile_problem(limits, scenario.reference, run.duration, run.step, "reference")

@@ -116,6 +116,13 @@ class Result:
         return tracking_in(self) if self.status.is_completed else None
 
     @property
+    def following(self) -> str:
+        """Sentence on a run whose controlled quantity follows its reference; "" where it does not, or has none."""
+        from ppafo.simulation.tracking import following_text
+
+        return following_text(self) if self.status.is_completed else ""
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Reasons why the run is of little use, a sentence each: a loop that misses its reference, coarse valves."""
         from ppafo.simulation.tracking.pair_step import coarse_pair
@@ -135,11 +142,11 @@ class Result:
 
     @in_units(_units_of)
     def __str__(self) -> str:
-        """Return what ``ppafo simulate`` prints: status, warnings and metrics in the units that people are shown."""
+        """Return what ``ppafo simulate`` prints: status, verdict, warnings and metrics in the units of the device."""
         from ppafo.report.display_units import metrics_lines
 
-        lines = metrics_lines(self.metrics)
-        return "\n".join([f"{self.scenario.name}: {self.status.kind}", *self.warnings, "", *lines])
+        said = filter(None, (self.following, *self.warnings))
+        return "\n".join([f"{self.scenario.name}: {self.status.kind}", *said, "", *metrics_lines(self.metrics)])
 
     @in_units(_units_of)
     def plot(self) -> "Figure":

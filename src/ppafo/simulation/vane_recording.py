@@ -19,7 +19,7 @@ from ppafo.model.plant import gravity_torque, loaded, net_torque, sliding_fricti
 from ppafo.model.ports import friction_in_motion
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.parameters.device import Gas
-from ppafo.signals.recording import Channel, Recording
+from ppafo.signals.recording import OF_SECOND_CHAMBER, Channel, Recording
 from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import Scenario, vane_motion
@@ -87,7 +87,10 @@ def measured(
             channels[followed.channel] = (np.asarray(value), followed.unit)
     channels |= gas_channels(scenario.device.gas, run, rows)
     channels |= of_leg or {}
-    values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
+    absent = OF_SECOND_CHAMBER if run.program.has_one_chamber else frozenset()
+    values = {
+        name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items() if name not in absent
+    }
     recording = Recording(scenario.name, times, values, kind="simulated")
     return recording, evaluate(recording), "completed"
 

@@ -16,6 +16,7 @@ from ppafo.metrics import METRICS, Metric, evaluate
 from ppafo.metrics.metric import MetricKind, Metrics
 from ppafo.signals import Channel, Recording
 from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY
+from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation import at_hand
 from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.scenario import Scenario
@@ -120,7 +121,10 @@ def recording_of_walk(
         channels["gait_fraction"], channels["gait_event"] = (fraction, "-"), (event, "-")
     if led.task_sequence is not None:
         channels |= _task_sequence_channels(configuration, run, path, time, record)
-    values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
+    absent = OF_SECOND_CHAMBER if run.program.has_one_chamber else frozenset()
+    values = {
+        name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items() if name not in absent
+    }
     return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
 
 

@@ -17,7 +17,7 @@ from ppafo.analyses.reproduce.answer import (
     reproduction_page,
     result_on_u,
 )
-from ppafo.analyses.reproduce.bench import NoEvidence, SyntheticEvidence
+from ppafo.analyses.reproduce.bench import SyntheticEvidence
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.analyses.reproduce.step_response import SupplyLevels
 from ppafo.identification.bench.result import figure_3
@@ -33,7 +33,7 @@ DRAWN = {DEVICE_FIGURE: b"<svg>device</svg>", STEP_FIGURE: b"<svg>seven</svg>", 
 
 @pytest.fixture(scope="module")
 def page(reproduction: Reproduction) -> str:
-    return reproduction_page(reproduction, DRAWN)
+    return reproduction_page(reproduction, DRAWN).decode()
 
 
 def words(page: str) -> str:
@@ -151,21 +151,21 @@ def test_every_tag_of_the_page_is_closed(page: str) -> None:
 
 def test_a_run_with_overrides_says_so_and_gives_the_command(reproduction: Reproduction, page: str) -> None:
     changed = dataclasses.replace(reproduction, overrides=("reference.level=5 N m",))
-    told = words(reproduction_page(changed, DRAWN))
+    told = words(reproduction_page(changed, DRAWN).decode())
     assert "departs from the paper" in told
     assert "--set 'reference.level=5 N m'" in told
     assert "departs from the paper" not in words(page)
 
 
 def test_without_the_rig_the_page_says_why_and_shows_nothing_synthetic(reproduction: Reproduction) -> None:
-    bare = dataclasses.replace(reproduction, synthetic=NoEvidence("the solver is missing"))
-    told = reproduction_page(bare, DRAWN)
+    bare = dataclasses.replace(reproduction, synthetic="the solver is missing")
+    told = reproduction_page(bare, DRAWN).decode()
     assert "There are no synthetic measurements in this report: the solver is missing." in words(told)
     assert 'id="identification"' not in told
 
 
 def test_figure_3_on_the_page_says_that_its_slope_is_not_the_reported_one(reproduction: Reproduction) -> None:
-    told = words(reproduction_page(reproduction, {**DRAWN, IDENTIFICATION_FIGURE: b"<svg>three</svg>"}))
+    told = words(reproduction_page(reproduction, {**DRAWN, IDENTIFICATION_FIGURE: b"<svg>three</svg>"}).decode())
     assert re.search(r"Its slope is .3\.\d 1/s where the paper reports .0\.4", told)
 
 

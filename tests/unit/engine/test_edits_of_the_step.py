@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from ppafo.engine import run as runs
 from ppafo.engine.groups import Groups, given, handed
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.program import Program
@@ -15,8 +14,11 @@ from ppafo.engine.run import Run, batch_of
 from ppafo.engine.step import isothermal, phases
 from ppafo.engine.step.lane import Lane
 from ppafo.errors import ProgramError
-from ppafo.model.plant import BlendedPort, single_ports
+from ppafo.exports.c_library import c_library
+from ppafo.model.declaration import PlainFunction
+from ppafo.model.plant import BlendedPort, PlantParameters, single_ports
 from ppafo.model.valves.vent_valve import connect_ideal
+from ppafo.simulation import plan
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 
@@ -30,9 +32,14 @@ class Mine(NamedTuple):
     share: float
 
 
-def groups(parts: Program) -> Groups:
-    """Groups of the gas, with the parameter and one that a phase hands on."""
-    return {**isothermal.groups(parts), "mine": given(Mine), "halved": handed(float)}
+def all_of_it(plant: PlantParameters) -> Mine:
+    """The parameter of a gas as usual."""
+    return Mine(1.0)
+
+
+def half_of_it(plant: PlantParameters) -> Mine:
+    """The parameter of a gas of which half flows."""
+    return Mine(0.5 * plant.supply_pressure / plant.supply_pressure)
 
 
 def change(parts: Program, lane: Any, length: float) -> None:
@@ -43,22 +50,34 @@ def change(parts: Program, lane: Any, length: float) -> None:
     lane.change = lane.change._replace(mass_1=share * lane.change.mass_1, supplied=share * lane.change.supplied)
 
 
-def gas_of_mine() -> Any:
+def gas_of_mine(of_plant: PlainFunction | None) -> Any:
     """The module of a gas that is isothermal but for its change of mass."""
+
+    def groups(parts: Program) -> Groups:
+        """Groups of the gas, with the parameter and one that a phase hands on."""
+        return {**isothermal.groups(parts), "mine": given(Mine, of_plant), "halved": handed(float)}
+
     made = ModuleType("gas_of_mine")
     vars(made).update({name: value for name, value in vars(isothermal).items() if not name.startswith("__")})
     made.groups, made.change = groups, change  # type: ignore[attr-defined]
     return made
 
 
-def with_gas_of_mine() -> Run:
+def with_gas_of_mine(of_plant: PlainFunction | None = None) -> Run:
     run = plan_run(load_scenario("step-response", ("run.duration=20 ms",)))
-    return replace(run, program=replace(run.program, gas=gas_of_mine()))
+    return replace(run, program=replace(run.program, gas=gas_of_mine(of_plant)))
 
 
-def test_a_parameter_of_a_gas_that_nothing_gives_is_refused_by_component_and_field() -> None:
-    with pytest.raises(ProgramError, match=r"parameters: 'mine' is a Mine\(share\), and nothing gives it; engine/run"):
+def test_a_parameter_of_a_gas_that_nothing_gives_is_refused_with_the_line_that_declares_it() -> None:
+    said = r"test_edits_of_the_step\.py:\d+: 'mine' is a Mine\(share\) of the parameters, and nothing gives it"
+    with pytest.raises(ProgramError, match=said):
         batch_of(with_gas_of_mine())
+
+
+def test_an_export_prepares_a_parameter_of_a_gas_that_follows_the_plant(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plan, "_gas", lambda *_: gas_of_mine(half_of_it))
+    source = c_library(load_scenario("step-response", ("run.duration=20 ms",)))["step_response.c"].decode()
+    assert "mine = half_of_it(plant)" in source
 
 
 @BACKENDS
@@ -67,12 +86,7 @@ def test_a_gas_with_a_parameter_and_a_group_that_is_set_and_read_does_what_it_sa
 ) -> None:
     monkeypatch.setenv("PPAFO_BACKEND", backend)
     usual = run_batch(batch_of(plan_run(load_scenario("step-response", ("run.duration=20 ms",))))).record
-    parameters_of = runs._parameters_of
-    records = []
-    for share in (1.0, 0.5):
-        mine = {"mine": Mine(share)}
-        monkeypatch.setattr(runs, "_parameters_of", lambda *given, more=mine: {**parameters_of(*given), **more})
-        records.append(run_batch(batch_of(with_gas_of_mine())).record)
+    records = [run_batch(batch_of(with_gas_of_mine(of_plant))).record for of_plant in (all_of_it, half_of_it)]
     assert np.array_equal(records[0], usual)
     assert not np.array_equal(records[1], usual)
 
@@ -86,9 +100,15 @@ def unannotated(plant, shown):  # type: ignore[no-untyped-def]
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"port": BlendedPort}, r"valve: single_ports makes tuple.*, and the valve has ports BlendedPort"),
-        ({"connect": unannotated}, r"valve: unannotated\(plant, shown\) must be annotated with float and tuple\[Sing"),
-        ({"shown": Mine, "connect": connect_ideal}, r"valve: connect_ideal takes a VentedOpening, and .* shows a Mine"),
+        ({"port": BlendedPort}, r"plant\.py:\d+: single_ports makes tuple.*, and the valve has ports BlendedPort"),
+        (
+            {"connect": unannotated},
+            r"test_edits_of_the_step\.py:\d+: unannotated\(plant, shown\) must be annotated with float and tuple\[Sing",
+        ),
+        (
+            {"shown": Mine, "connect": connect_ideal},
+            r"vent_valve\.py:\d+: connect_ideal takes a VentedOpening, and .* shows a Mine",
+        ),
     ],
 )
 def test_a_valve_whose_function_says_another_thing_than_the_valve_is_refused(

@@ -43,8 +43,8 @@ def test_a_group_is_declared_by_one_component_and_is_known_to_a_lane() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({}, r"parameters: 'mine' is a Mine\(exponent\), and nothing gives it"),
-        ({"mine": Other(1.0)}, r"'mine' is a Mine\(exponent\), and it is given a Other\(factor\)"),
+        ({}, r"'mine' is a Mine\(exponent\) of the parameters, and nothing gives it; 'mine': given\(Mine, F"),
+        ({"mine": Other(1.0)}, r"'mine' is a Mine\(exponent\) of the parameters, and it is given a Other\(factor\)$"),
         ({"mine": Mine(1.0), "yours": Other(1.0)}, r"'yours' is given \(a Other\(factor\)\), and no part"),
     ],
 )

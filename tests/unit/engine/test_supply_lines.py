@@ -33,12 +33,11 @@ from ppafo.model.plant import (
     single_port_flow,
     single_port_flow_slopes,
 )
-from ppafo.model.regulator import LineState, SupplyLines, line_pressures
+from ppafo.model.regulator import LineState, SupplyLines, line_pressures, lines_at_start
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import state_with_volumes
 from ppafo.simulation.scenario import RegulatedLine, SupplyLine
-from ppafo.simulation.supply_lines import lines_at_start
 from ppafo.walking import load_walk
 from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk

@@ -36,7 +36,7 @@ from ppafo.signals.meter import (
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import with_numbers
-from ppafo.simulation.plan import plan_run, plan_runs
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result
 from ppafo.translation.c99 import program_source
@@ -90,7 +90,15 @@ def metrics_of(result: Result) -> dict[str, float]:
     for number in range(len(recording)):
         given = {name: float(recording[name][number]) for name in Sample._fields if name in recording.names}
         gas = GasSample(*(float(recording[name][number]) for name in GasSample._fields))
-        sample = Sample(number=float(number), **given, temperature_1=0.0, temperature_2=0.0, gas=gas, **NOTHING)
+        sample = Sample(
+            number=float(number),
+            **given,
+            value=given["torque"],
+            temperature_1=0.0,
+            temperature_2=0.0,
+            gas=gas,
+            **NOTHING,
+        )
         course = advance_course(course, sample)
         for name, meter in meters.items():
             states[name] = meter.update(states[name], course, sample) if number else meter.start(course, sample)
@@ -479,7 +487,7 @@ def test_c_makes_the_numbers_of_a_run_that_python_makes(name: str, overrides: tu
     scenario = load_scenario(name, overrides)
     library = built(scenario, tmp_path)
     columns, varied = drawn(scenario)
-    run, _ = plan_runs(varied)
+    run, _ = varied.motion.motion_kind.plan(varied)
     compared = 0
     for members, batch in batches_of(run, RUNS):
         clock = batch.clock

@@ -13,7 +13,6 @@ from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.preparation import VANE_PREPARATION, Preparation, PreparedLane, start
 from ppafo.loading import load_scenario
-from ppafo.simulation.plan import plan_runs
 
 WARM = (
     "gas_model.kind=thermal",
@@ -42,7 +41,7 @@ def test_a_library_prepares_a_run_with_the_numbers_that_python_plans(name: str, 
     for function in preparing:
         function(Preparation(scenario, program), lane, settings)
 
-    planned = batch_of(plan_runs(scenario)[0])
+    planned = batch_of(scenario.motion.motion_kind.plan(scenario)[0])
     for role, rows, numbers in (
         (Role.PARAMETER, planned.program.parameter_rows(), planned.parameters),
         (Role.STATE, planned.program.state_rows(), planned.states),

@@ -32,7 +32,7 @@ INTERVAL = 0.01
 
 
 def samples_of(recording: Recording) -> list[Sample]:
-    names = ("angle", "angular_velocity", "pressure_1", "pressure_2", "torque", "command", "reference")
+    names = ("angle", "angular_velocity", "pressure_1", "pressure_2", "torque", "command", "torque", "reference")
     names += ("temperature_1", "temperature_2", "foot_angle", "measured_foot_angle", "toe_difference")
     names += (*GasSample._fields, *EnergySample._fields)
     columns = zip(*(recording[name].tolist() for name in names), strict=True)
@@ -40,10 +40,10 @@ def samples_of(recording: Recording) -> list[Sample]:
     return [
         Sample(
             float(number),
-            *values[:9],
-            gas=GasSample(*values[12:17]),
-            energy=EnergySample(*values[17:]),
-            foot=FootSample(*values[9:12]),
+            *values[:10],
+            gas=GasSample(*values[13:18]),
+            energy=EnergySample(*values[18:]),
+            foot=FootSample(*values[10:13]),
             stride=stride,
         )
         for number, values in enumerate(columns)

@@ -38,7 +38,7 @@ def metered(columns: dict[str, np.ndarray], first: int = 0) -> StrideMeter:
         for at in range(first, SAMPLES)
     ]
     nothing = GasSample(*[0.0] * 5), EnergySample(*[0.0] * 5), FootSample(0.0, 0.0, 0.0)
-    rows = [Sample(*[0.0] * 10, *nothing, stride=stride) for stride in strides]
+    rows = [Sample(*[0.0] * 11, *nothing, stride=stride) for stride in strides]
     state: StrideMeter = METER.start(NO_COURSE, rows[0])
     for row in rows[1:]:
         state = METER.update(state, NO_COURSE, row)

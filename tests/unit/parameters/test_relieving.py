@@ -74,7 +74,7 @@ def test_a_leaking_step_with_an_empty_bottle_agrees_with_the_reference_solver() 
 
 
 def test_one_supply_below_the_atmosphere_beside_one_above_it_is_refused_in_one_line() -> None:
-    said = r"supply\.dorsiflexion_pressure = -1 psi_g must be at least supply\.atmospheric_pressure"
+    said = r"supply\.dorsiflexion_pressure = -1 psi_g must be at least supply\.atmospheric_pressure = 0 psi_g;"
     with pytest.raises(PpafoError, match=said):
         ppafo.load_scenario("step-response", ["supply.dorsiflexion_pressure=-1 psi_g"])
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -125,10 +126,20 @@ def test_a_metric_that_is_not_there_is_answered_with_the_nearest(name: str, near
 def test_a_run_that_is_useless_says_so_where_it_is_printed() -> None:
     good = ppafo.simulate("torque-task-proportional", {"run.duration": 0.5})
     assert good.warnings == ()
+    assert str(good).splitlines()[:2] == ["torque-task-proportional: completed", ""]
     wild = ppafo.simulate("torque-task-proportional", {"run.duration": 0.5, "controller.proportional_gain": 40.0})
     (warning,) = wild.warnings
     assert "the torque loop oscillates" in warning
     assert str(wild).splitlines()[:3] == ["torque-task-proportional: completed", warning, ""]
+
+
+def test_a_run_that_follows_its_reference_says_so_in_its_second_line() -> None:
+    result = ppafo.simulate("torque-task-proportional", {"reference.level": 4.0})
+    verdict, blank = str(result).splitlines()[1:3]
+    assert (verdict, blank) == (result.following, "")
+    assert re.fullmatch(r"the torque follows its reference: RMS [\d.]+ N m of 4 N m wanted from [\d.]+ s on", verdict)
+    assert result.tracking is None
+    assert ppafo.simulate("step-response").following == ""
 
 
 def test_times_and_units_are_at_hand(result: Result) -> None:

@@ -164,7 +164,7 @@ def test_a_condition_of_find_counts_from_the_atmosphere_of_the_scenario(monkeypa
 
     limits: list[float] = []
     monkeypatch.setattr(
-        find_module, "FindProgress", lambda _base, _path, condition, *_: limits.append(condition.limit) or stopped()
+        find_module, "FindResult", lambda _base, _path, condition, *_: limits.append(condition.limit) or stopped()
     )
     with pytest.raises(KeyboardInterrupt):
         ppafo.find(TASK, vary="supply.pressure=200..300 kPa_a", such_that=f"{METRIC} <= 50 kPa_g", overrides=HIGH_UP)

@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 from ppafo.analyses.compare.answer import ComparisonResult, ConfigurationResult, OnTask, front_of, remarks_of
 from ppafo.analyses.compare.pairs import COMPARED, Paired, best_probabilities, compare_pairs, compared_metrics
 from ppafo.errors import StudyError
 from ppafo.progress import Report
 from ppafo.report.kind import ConfidenceInterval
+from ppafo.running import tried
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
 from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
@@ -87,12 +87,8 @@ Scenarios = Mapping[tuple[str, str], Scenario]
 """Scenarios by task and configuration."""
 
 
-class DrawnRuns(NamedTuple):
-    """Runs of a case over the draws, the first of them again with other noise if any is noisy, why the first failed."""
-
-    rows: Rows
-    renoised: Rows | None
-    reason: str
+_DrawnRuns = Mapping[tuple[str, str], tuple[Rows, Rows | None, str]]
+"""Runs of each case over the draws, the first of them again with other noise if any is noisy, why the first failed."""
 
 
 def compared(
@@ -144,7 +140,7 @@ def _drawn_runs(
     uncertainty: Uncertainty,
     draws: Draws,
     seed: int,
-) -> dict[tuple[str, str], DrawnRuns]:
+) -> _DrawnRuns:
     """Return the runs of every case, all over the same draws; nothing where nothing is drawn.
 
     StudyError for draws that were requested where nothing is.
@@ -173,7 +169,7 @@ def _drawn_runs(
     columns = uncertainty.replicated_columns(0, draws.count, seed)
     renoised = with_new_noise(columns) if uncertainty.has_noise else {}
     tally = RunCounter((draws.count + len(renoised.get(NOISE, ()))) * len(scenarios), draws.progress)
-    drawn: dict[tuple[str, str], DrawnRuns] = {}
+    drawn: dict[tuple[str, str], tuple[Rows, Rows | None, str]] = {}
     for (task, name), scenario in scenarios.items():
         runs = Runs(scenario, metrics, tally, uncertainty.gauge, draws.threads)
         # The noise is in all configurations, whatever a study says of its paths.
@@ -183,30 +179,28 @@ def _drawn_runs(
         # The reason of the draws themselves: the runs with other noise may overwrite it.
         reason = runs.reason
         again = runs.run({path: renoised[path] for path in paths}) if renoised else None
-        drawn[task, name] = DrawnRuns(rows, again, reason)
+        drawn[task, name] = rows, again, reason
     return drawn
 
 
-def _cases(
-    scenarios: Scenarios, drawn: Mapping[tuple[str, str], DrawnRuns], threads: int | None
-) -> dict[str, list[ConfigurationResult]]:
+def _cases(scenarios: Scenarios, drawn: _DrawnRuns, threads: int | None) -> dict[str, list[ConfigurationResult]]:
     """Return the cases of each task: the nominal run of every configuration, beside its runs over the draws."""
     # With the seed of each scenario: what the tables call nominal is one realisation of its noise.
     results = simulate_many(list(scenarios.values()), threads)
     cases: dict[str, list[ConfigurationResult]] = {}
     for ((task, name), scenario), result in zip(scenarios.items(), results, strict=True):
-        runs = drawn.get((task, name))
+        rows, renoised, reason = drawn.get((task, name), (None, None, ""))
         cases.setdefault(task, []).append(
             ConfigurationResult(
                 configuration=name,
                 status=result.status,
                 metrics={metric: value for metric, value in result.metrics.items() if metric in COMPARED},
-                tracking=result.tracking,
-                failed_draws=0 if runs is None else failures_of(runs.rows),
-                reason="" if runs is None else runs.reason,
+                tracking=tried(scenario, result.tracking),
+                failed_draws=0 if rows is None else failures_of(rows),
+                reason=reason,
                 scenario=scenario,
-                rows=None if runs is None else runs.rows,
-                renoised=None if runs is None else runs.renoised,
+                rows=rows,
+                renoised=renoised,
             )
         )
     return cases
@@ -220,50 +214,27 @@ def _on_task(
     metrics: Sequence[str],
     confidence: float,
 ) -> OnTask:
-    """Return the cases of a task with their statistics: each against the baseline, and which is the best of all."""
+    """Return the cases of a task with their statistics, without draws none: each against the baseline, and the best."""
     first = next(case for case in cases if case.configuration == baseline)
-    others = [case for case in cases if case is not first]
-    return OnTask(
-        task,
-        list(overrides),
-        cases,
-        front_of(cases),
-        {other.configuration: _pairs(first, other, metrics, confidence) for other in others},
-        _best(cases, metrics, confidence),
-    )
-
-
-def _pairs(
-    baseline: ConfigurationResult, other: ConfigurationResult, metrics: Sequence[str], confidence: float
-) -> list[Paired]:
-    """Return each metric of a case against the baseline's, draw by draw; none without draws."""
-    if baseline.rows is None or other.rows is None:
-        return []
-    pairs = []
-    for name in metrics:
-        renoised = None
-        if baseline.renoised is not None and other.renoised is not None:
-            renoised = (baseline.renoised[name], other.renoised[name])
-        pair = compare_pairs(name, baseline.rows[name], other.rows[name], COMPARED[name], confidence, renoised)
-        pairs += [] if pair is None else [pair]
-    return pairs
-
-
-def _best(
-    cases: Sequence[ConfigurationResult], metrics: Sequence[str], confidence: float
-) -> dict[str, dict[str, ConfidenceInterval]]:
-    """Return the probability of each case to be the best, by metric and configuration; nothing without draws.
-
-    One that does not follow its reference is not among the best, and a metric may have no end that is better.
-    """
+    pairs: dict[str, list[Paired]] = {}
+    for case in cases:
+        if case is first:
+            continue
+        pairs[case.configuration] = []
+        if first.rows is None or case.rows is None:
+            continue
+        for name in metrics:
+            renoised = None
+            if first.renoised is not None and case.renoised is not None:
+                renoised = (first.renoised[name], case.renoised[name])
+            pair = compare_pairs(name, first.rows[name], case.rows[name], COMPARED[name], confidence, renoised)
+            pairs[case.configuration] += [] if pair is None else [pair]
+    # A case that does not follow its reference is not among the best, and a metric may have no end that is better.
     judged = [case for case in cases if case.follows]
     rows = [case.rows for case in judged if case.rows is not None]
-    if not rows:
-        return {}
     best: dict[str, dict[str, ConfidenceInterval]] = {}
-    for metric in metrics:
-        if COMPARED[metric]:
-            # All at once: no pair says which of three is the best. No shares where no draw has a value of all.
-            shares = best_probabilities([row[metric] for row in rows], COMPARED[metric], confidence)
-            best[metric] = dict(zip([case.configuration for case in judged], shares, strict=False))
-    return best
+    for name in (name for name in metrics if rows and COMPARED[name]):
+        # All at once: no pair says which of three is the best. No shares where no draw has a value of all.
+        shares = best_probabilities([row[name] for row in rows], COMPARED[name], confidence)
+        best[name] = dict(zip([case.configuration for case in judged], shares, strict=False))
+    return OnTask(task, list(overrides), cases, front_of(cases), pairs, best)

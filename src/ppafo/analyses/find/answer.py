@@ -61,108 +61,97 @@ class Threshold:
 def finding_of(outcome: FindResult) -> Finding[Threshold]:
     """Return the search in words, a table of where the condition is met, and the metric over the value."""
     wanted = "highest" if outcome.highest else "lowest"
-    kind = _varied(outcome)
-    met = outcome.stretches
+    path, condition, tried = outcome.path, outcome.condition, outcome.tried
+    # In the unit of the range that was given.
+    kind = of_path(path.path, path.quantity.unit, given=path.given)
+    met, (place, beyond) = outcome.stretches, outcome.found
     columns = [Column(title, [kind.text(ends[end]) for ends in met]) for end, title in enumerate(("from", "to"))]
-    remarks = list(_remarks(outcome))
-    rows = (outcome.values, outcome.metrics, outcome.judged, outcome.is_of_grid)
+    remarks = list(_remarks(outcome, kind))
     return Finding(
         name="find",
         kicker="Search",
-        title=f"The {wanted} {outcome.path.path} such that {outcome.condition.text}",
-        said=(_verdict(outcome), *remarks),
+        title=f"The {wanted} {path.path} such that {condition.text}",
+        said=(_verdict(outcome, kind), *remarks),
         parts=(
             Section("Met in the range that was tried", columns),
             Section(
                 "Metric over the value",
-                panels=(_panel(outcome),),
+                panels=(_panel(outcome, kind),),
                 name="find",
                 caption="The metric over the value; dashed: the limit; shaded: where the condition is met.",
             ),
         ),
         found=Threshold(
             scenario=outcome.scenario,
-            path=outcome.path.path,
-            unit=outcome.path.quantity.unit,
-            condition=outcome.condition.text,
-            metric=outcome.condition.metric,
-            limit=outcome.condition.limit,
+            path=path.path,
+            unit=path.quantity.unit,
+            condition=condition.text,
+            metric=condition.metric,
+            limit=condition.limit,
             wanted=wanted,
-            value=outcome.value,
-            metric_at_value=_metric_at_value(outcome),
-            not_met_at=outcome.beyond,
-            changes=outcome.changes,
+            value=None if place is None else float(tried["value"][place]),
+            metric_at_value=None if place is None else float(tried["metric"][place]),
+            not_met_at=beyond,
+            changes=_changes(outcome),
             met=met,
             remarks=remarks,
             noise_streams=outcome.noise_streams,
-            runs=outcome.runs,
-            failed=outcome.failed,
-            unsettled=outcome.unsettled,
-            tried=list(map(FindSample, *(row.tolist() for row in rows))),
+            runs=outcome.runs.count,
+            failed=outcome.runs.failures,
+            unsettled=int(tried["unsettled"].sum()),
+            tried=[FindSample(*row) for row in tried[["value", "metric", "judged", "is_of_grid"]].tolist()],
         ),
-        passed=outcome.value is not None,
+        passed=place is not None,
     )
 
 
-def _varied(outcome: FindResult) -> Kind:
-    """Return what is varied, in the unit of the range that was given."""
-    return of_path(outcome.path.path, outcome.path.quantity.unit, given=outcome.path.given)
-
-
-def _range(outcome: FindResult) -> str:
-    kind = _varied(outcome)
-    return f"{kind.text(outcome.values[0])} to {kind.text(outcome.values[-1])}"
-
-
-def _metric_at_value(outcome: FindResult) -> float | None:
-    if outcome.value is None:
-        return None
-    return float(outcome.metrics[np.searchsorted(outcome.values, outcome.value)])
-
-
-def _verdict(outcome: FindResult) -> str:
-    """Return the value, or where none meets the condition the one that comes nearest."""
-    path, condition = outcome.path.path, outcome.condition
-    kind, of_condition = _varied(outcome), of_metric(condition.metric)
-    wanted, further = ("highest", "higher") if outcome.highest else ("lowest", "lower")
-    metric = _metric_at_value(outcome)
-    if outcome.value is None or metric is None:
-        # The nearest one says whether a wider range could.
-        row = int((np.nanargmin if condition.is_most else np.nanargmax)(outcome.judged))
-        return (
-            f"no {path} from {_range(outcome)} meets {condition.text}; the nearest is "
-            f"{of_condition.text(outcome.judged[row])} at {kind.text(outcome.values[row])}"
-        )
-    # Beyond it the condition may be met by a loop that does not follow its reference.
-    follows = " and follows its reference" if _not_followed(outcome) else ""
-    lead = f"{path} = {kind.text(outcome.value)} is the {wanted} value that meets {condition.text}{follows}"
-    there = f"{condition.metric} is {of_condition.text(metric)} there"
-    if outcome.beyond is None:
-        return f"{lead}, and the end of the range: {there}; a wider range may have a {further} one"
-    return f"{lead}: {there} (bracketed to {kind.change(abs(outcome.value - outcome.beyond), '.1g')})"
+def _changes(outcome: FindResult) -> int:
+    """Return how often the condition begins or ceases to be met along the values."""
+    return int(np.count_nonzero(np.diff(outcome.is_met)))
 
 
 def _not_followed(outcome: FindResult) -> int:
-    """Number of values at which the condition is met, but the reference is not followed."""
-    return int(np.count_nonzero(~outcome.follows & outcome.condition.is_kept(outcome.judged)))
+    """Return at how many values the condition is met, but the reference is not followed."""
+    return int(np.count_nonzero(~outcome.tried["follows"] & outcome.condition.is_kept(outcome.tried["judged"])))
 
 
-def _remarks(outcome: FindResult) -> Iterator[str]:
+def _verdict(outcome: FindResult, kind: Kind) -> str:
+    """Return the value, or where none meets the condition the one that comes nearest."""
+    path, condition, tried = outcome.path.path, outcome.condition, outcome.tried
+    of_condition, (place, beyond) = of_metric(condition.metric), outcome.found
+    wanted, further = ("highest", "higher") if outcome.highest else ("lowest", "lower")
+    if place is None:
+        # The nearest one says whether a wider range could.
+        row = int((np.nanargmin if condition.is_most else np.nanargmax)(tried["judged"]))
+        return (
+            f"no {path} from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])} meets {condition.text}; "
+            f"the nearest is {of_condition.text(tried['judged'][row])} at {kind.text(tried['value'][row])}"
+        )
+    value = float(tried["value"][place])
+    # Beyond it the condition may be met by a loop that does not follow its reference.
+    follows = " and follows its reference" if _not_followed(outcome) else ""
+    lead = f"{path} = {kind.text(value)} is the {wanted} value that meets {condition.text}{follows}"
+    there = f"{condition.metric} is {of_condition.text(float(tried['metric'][place]))} there"
+    if beyond is None:
+        return f"{lead}, and the end of the range: {there}; a wider range may have a {further} one"
+    return f"{lead}: {there} (bracketed to {kind.change(abs(value - beyond), '.1g')})"
+
+
+def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
     """Yield what else is to be known: runs, other stretches, noise, oscillation and failures."""
-    condition, is_met = outcome.condition, outcome.is_met
-    evenly, closer = np.count_nonzero(outcome.is_of_grid), np.count_nonzero(~outcome.is_of_grid)
-    if is_met.all():
-        where = "everywhere"
-    else:
-        where = "nowhere" if outcome.value is None else f"at {np.count_nonzero(is_met)} of them"
+    condition, is_met, tried, runs = outcome.condition, outcome.is_met, outcome.tried, outcome.runs
+    place, _ = outcome.found
+    evenly = np.count_nonzero(tried["is_of_grid"])
+    met = np.count_nonzero(is_met)
+    where = "everywhere" if is_met.all() else f"at {met} of them" if met else "nowhere"
     yield (
-        f"{evenly} values from {_range(outcome)}, evenly, then {closer} more in the bracket; the condition is met "
-        f"{where}"
+        f"{evenly} values from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])}, evenly, then "
+        f"{tried.size - evenly} more in the bracket; the condition is met {where}"
     )
-    if outcome.changes > 1:
+    if (changes := _changes(outcome)) > 1:
         side = "below" if outcome.highest else "above"
         yield (
-            f"the condition changes {outcome.changes} times over the range, so it is not met everywhere {side} this "
+            f"the condition changes {changes} times over the range, so it is not met everywhere {side} this "
             "value; see the table and the figure"
         )
     if outcome.noise_streams:
@@ -170,63 +159,47 @@ def _remarks(outcome: FindResult) -> Iterator[str]:
             f"sensors are noisy: the metric is the mean over {outcome.noise_streams} noise streams, the same for all "
             "values"
         )
-        if outcome.value is not None:
-            spread = float(outcome.spread[np.searchsorted(outcome.values, outcome.value)])
+        if place is not None:
             noise += (
-                f"; at the value that was found it varies by {of_metric(condition.metric).change(spread)} (standard "
-                "deviation) from stream to stream, so a single run may miss the condition there"
+                f"; at the value that was found it varies by "
+                f"{of_metric(condition.metric).change(float(tried['spread'][place]))} (standard deviation) from stream "
+                "to stream, so a single run may miss the condition there"
             )
         yield noise
-    if outcome.unsettled:
+    if unsettled := int(tried["unsettled"].sum()):
         yield (
-            f"in {outcome.unsettled} runs the loop oscillates on the hold, and {condition.metric} is one sample of "
-            f"it: in these runs the condition must also hold for {ONE_INSTANT[condition.metric][0]}"
+            f"in {unsettled} runs the loop oscillates on the hold, and {condition.metric} is one sample of it: in "
+            f"these runs the condition must also hold for {ONE_INSTANT[condition.metric][0]}"
         )
-    if outcome.oscillating:
-        yield f"in {outcome.oscillating} of {outcome.runs} runs the loop oscillates: they count as not met"
-    missed = _not_followed(outcome)
-    if missed:
+    if oscillating := int(tried["oscillating"].sum()):
+        yield f"in {oscillating} of {runs.count} runs the loop oscillates: they count as not met"
+    if missed := _not_followed(outcome):
         yield f"at {missed} values the condition is met, but the reference is not followed: they count as not met"
-    if outcome.failed:
-        yield (
-            f"{outcome.failed} of {outcome.runs} runs failed and count as not met; the first: {outcome.first_failure}"
-        )
+    if runs.failures:
+        yield f"{runs.failures} of {runs.count} runs failed and count as not met; the first: {runs.reason}"
 
 
-def _larger(outcome: FindResult) -> list[Mark]:
-    """Return the RMS error on the hold where that is larger, and what the condition is asked of."""
-    larger = np.where(outcome.judged > outcome.metrics, outcome.judged, np.nan)
-    if not np.isfinite(larger).any():
-        return []
-    crosses = {"linestyle": "", "marker": "x", "markersize": 4}
-    label = metric_words(ONE_INSTANT[outcome.condition.metric][0])
-    return [
-        Mark("line", outcome.values, larger, label=f"{label}, of a loop that oscillates", colour=GREY, style=crosses)
-    ]
-
-
-def _panel(outcome: FindResult) -> Panel:
+def _panel(outcome: FindResult, kind: Kind) -> Panel:
     """Return the metric over the value, with the limit, where it is met, and the value that was found."""
-    values, metrics, is_of_grid = outcome.values, outcome.metrics, outcome.is_of_grid
-    kind = _varied(outcome)
+    tried, condition = outcome.tried, outcome.condition
+    values, metrics, judged = tried["value"], tried["metric"], tried["judged"]
     dots, dashes = {"linestyle": "", "marker": "o", "markersize": 3}, {"linestyle": "--", "linewidth": 1.0}
-    marks = [
-        Mark("line", values, metrics),
-        Mark("line", values[is_of_grid], metrics[is_of_grid], style=dots),
-        *_larger(outcome),
-        Mark("level", (), outcome.condition.limit, label="limit", colour=BLACK, style=dashes),
-    ]
+    of_grid = tried[tried["is_of_grid"]]
+    marks = [Mark("line", values, metrics), Mark("line", of_grid["value"], of_grid["metric"], style=dots)]
+    # The RMS error on the hold where that is larger, and what the condition is asked of.
+    larger = np.where(judged > metrics, judged, np.nan)
+    if np.isfinite(larger).any():
+        crosses = {"linestyle": "", "marker": "x", "markersize": 4}
+        label = f"{metric_words(ONE_INSTANT[condition.metric][0])}, of a loop that oscillates"
+        marks.append(Mark("line", values, larger, label=label, colour=GREY, style=crosses))
+    marks.append(Mark("level", (), condition.limit, label="limit", colour=BLACK, style=dashes))
     marks += [
         Mark("span", ends, label="" if row else "condition met", colour=GREEN)
         for row, ends in enumerate(outcome.stretches)
     ]
-    if outcome.value is not None:
-        marks.append(
-            Mark(
-                "at",
-                outcome.value,
-                label=f"found: {kind.number(outcome.value, '.4g')} {kind.axis_unit}".rstrip(),
-                colour=VERMILION,
-            )
-        )
-    return Panel(kind, of_metric(outcome.condition.metric), tuple(marks))
+    place, _ = outcome.found
+    if place is not None:
+        found = float(values[place])
+        text = f"found: {kind.number(found, '.4g')} {kind.axis_unit}".rstrip()
+        marks.append(Mark("at", found, label=text, colour=VERMILION))
+    return Panel(kind, of_metric(condition.metric), tuple(marks))

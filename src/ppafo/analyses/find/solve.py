@@ -1,8 +1,7 @@
 """The lowest or highest value that meets a condition on a metric: a grid, then ever smaller brackets."""
 
 import re
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,68 +31,8 @@ _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
-class FindProgress:
-    """Values tried so far; of each the metric, its judged value, and its standard deviation over the noise."""
-
-    def __init__(self, base: Scenario, path: str, condition: MetricLimit, runs: Runs, seeds: Floats) -> None:
-        self._base, self._path, self.condition, self.runs, self.seeds = base, path, condition, runs, seeds
-        self.values: Floats = np.empty(0)
-        self.metrics: Floats = np.empty(0)
-        self.judged: Floats = np.empty(0)
-        self.spread: Floats = np.empty(0)
-        self.follows: NDArray[np.bool_] = np.empty(0, dtype=np.bool_)
-        self.unsettled = 0
-        self.oscillating = 0
-
-    def run(self, values: Floats) -> None:
-        """Try values, each over all streams of noise."""
-        streams = max(1, self.seeds.size)
-        columns = {self._path: np.tile(values, streams)}
-        if self.seeds.size:
-            columns[NOISE] = np.repeat(self.seeds, values.size)
-        rows = self.runs.run(columns)
-        # One instant of a loop that oscillates may meet the condition by chance.
-        judged = settled(rows, self.condition.metric)
-        self.unsettled += int(np.count_nonzero(judged > rows[self.condition.metric]))
-        # A loop whose command turns all the time meets no condition that anybody would build on.
-        turns = oscillating(rows, self._base)
-        self.oscillating += int(np.count_nonzero(turns))
-        judged = np.where(turns, np.nan, judged)
-        by_stream, judged_by_stream = (
-            each.reshape(streams, values.size) for each in (rows[self.condition.metric], judged)
-        )
-        self.values = np.concatenate([self.values, values])
-        self.metrics = np.concatenate([self.metrics, by_stream.mean(axis=0)])
-        self.judged = np.concatenate([self.judged, judged_by_stream.mean(axis=0)])
-        self.spread = np.concatenate([self.spread, by_stream.std(axis=0, ddof=min(1, streams - 1))])
-        fails = tracking_violation(rows, self._base, columns) > 0.0
-        self.follows = np.concatenate([self.follows, ~fails.reshape(streams, values.size).any(axis=0)])
-
-    @property
-    def is_met(self) -> NDArray[np.bool_]:
-        """True for each value that meets the condition with a reference that is followed."""
-        return np.asarray(self.condition.is_kept(self.judged) & self.follows)
-
-    def ends(self, highest: bool) -> tuple[float | None, float | None]:
-        """Return the outermost value that meets the condition, and its neighbour on the outer side."""
-        order = np.argsort(-self.values if highest else self.values)
-        met = np.flatnonzero(self.is_met[order])
-        if met.size == 0:
-            return None, None
-        values = self.values[order]
-        return float(values[met[0]]), float(values[met[0] - 1]) if met[0] else None
-
-
-class _SearchedRange(NamedTuple):
-    """The path that is varied, and the low and the high end [SI] between which it is."""
-
-    path: VariedPath
-    low: float
-    high: float
-
-
-def range_of(text: str, base: Scenario) -> _SearchedRange:
-    """Return the range of a text ``PATH=LOW..HIGH`` for a scenario; StudyError for any other text."""
+def range_of(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
+    """Return path, low and high end [SI] of a text ``PATH=LOW..HIGH``; StudyError for any other text."""
     parts = _RANGE.fullmatch(text)
     if parts is None:
         raise StudyError(
@@ -107,7 +46,7 @@ def range_of(text: str, base: Scenario) -> _SearchedRange:
         low, high, path = path.level(lower), path.level(parts[3]), given_in(path, [parts[3]])
     if not low < high:
         raise StudyError(f"'{one_line(text)}': the low end must be below the high end")
-    return _SearchedRange(path, low, high)
+    return path, low, high
 
 
 def condition_of(text: str, base: Scenario, path: str) -> MetricLimit:
@@ -127,42 +66,47 @@ def condition_of(text: str, base: Scenario, path: str) -> MetricLimit:
     return MetricLimit(metric, level, sign == "<=", f"{metric} {sign} {limit}")
 
 
+TRIED = np.dtype(
+    [
+        *((name, np.float64) for name in ("value", "metric", "judged", "spread")),
+        *((name, np.bool_) for name in ("follows", "is_of_grid")),
+        *((name, np.intp) for name in ("unsettled", "oscillating")),
+    ]
+)
+"""Value that was tried [SI], and its metric [SI], nan where the run failed, with its ``spread`` over the noise streams.
+
+``judged`` is what the condition is asked of: the metric, where the loop oscillates on the hold the larger one of it and
+of the RMS error there (``unsettled`` runs), and nan where it turns all the time (``oscillating`` runs). ``follows``:
+the reference is followed in all streams. ``is_of_grid``: of the first values, not of a bracket.
+"""
+
+
 @dataclass(frozen=True, slots=True)
 class FindResult:
-    """A finished search; numbers in SI.
-
-    ``values`` (values,) ascend, ``metrics`` are the metric at each, nan where the run failed, and ``spread`` its
-    standard deviation over ``noise_streams``. ``judged`` is what the condition is asked of: the metric, where the loop
-    oscillates on the hold the larger one of it and of the RMS error there, and nan where it turns all the time.
-    ``is_met`` is true where the condition is met and the run follows its reference, which ``follows`` holds for
-    each value. ``value`` is the outermost that meets the condition, None where none does,
-    and ``beyond`` its neighbour on the outer side, None at the end of the range.
-    """
+    """Values that were tried, ascending, as a structured array of ``TRIED``, and the ``runs`` that this took."""
 
     scenario: str
     path: VariedPath
     condition: MetricLimit
     highest: bool
-    values: Floats
-    metrics: Floats
-    judged: Floats
-    spread: Floats
-    is_of_grid: NDArray[np.bool_]
-    is_met: NDArray[np.bool_]
-    follows: NDArray[np.bool_]
-    value: float | None
-    beyond: float | None
     noise_streams: int
-    runs: int
-    failed: int
-    first_failure: str
-    unsettled: int
-    oscillating: int
+    runs: Runs
+    tried: NDArray[np.void]
 
     @property
-    def changes(self) -> int:
-        """Number of times that the condition starts or ceases to be met along the values."""
-        return int(np.count_nonzero(np.diff(self.is_met)))
+    def is_met(self) -> NDArray[np.bool_]:
+        """True for each value that meets the condition with a reference that is followed."""
+        return np.asarray(self.condition.is_kept(self.tried["judged"]) & self.tried["follows"])
+
+    @property
+    def found(self) -> tuple[int | None, float | None]:
+        """Place of the outermost value that meets the condition, and its neighbour on the outer side; None for none."""
+        met = np.flatnonzero(self.is_met)
+        if met.size == 0:
+            return None, None
+        place = int(met[-1] if self.highest else met[0])
+        beyond = place + (1 if self.highest else -1)
+        return place, float(self.tried["value"][beyond]) if 0 <= beyond < self.tried.size else None
 
     @property
     def stretches(self) -> list[list[float]]:
@@ -170,7 +114,34 @@ class FindResult:
         # Not met beyond both ends: a stretch that reaches the end of the range ends there.
         padded = np.concatenate([[False], self.is_met, [False]]).astype(int)
         first, after = np.flatnonzero(np.diff(padded) > 0), np.flatnonzero(np.diff(padded) < 0)
-        return [[float(self.values[low]), float(self.values[high - 1])] for low, high in zip(first, after, strict=True)]
+        values = self.tried["value"].tolist()
+        return [[values[low], values[high - 1]] for low, high in zip(first, after, strict=True)]
+
+    def with_values(self, base: Scenario, values: Floats, seeds: Floats, is_of_grid: bool) -> "FindResult":
+        """Try values, each over all streams of noise, and return them with those tried before."""
+        metric, streams = self.condition.metric, max(1, seeds.size)
+        columns = {self.path.path: np.tile(values, streams)}
+        if seeds.size:
+            columns[NOISE] = np.repeat(seeds, values.size)
+        rows = self.runs.run(columns)
+        # One instant of a loop that oscillates may meet the condition by chance.
+        judged = settled(rows, metric)
+        # A loop whose command turns all the time meets no condition that anybody would build on.
+        turns = oscillating(rows, base)
+        fails = tracking_violation(rows, base, columns) > 0.0
+        by_stream = (
+            each.reshape(streams, values.size)
+            for each in (rows[metric], np.where(turns, np.nan, judged), judged > rows[metric], turns, fails)
+        )
+        metrics, usable, unsettled, turning, failing = by_stream
+        tried = np.empty(values.size, TRIED)
+        tried["value"], tried["is_of_grid"] = values, is_of_grid
+        tried["metric"], tried["judged"] = metrics.mean(axis=0), usable.mean(axis=0)
+        tried["spread"] = metrics.std(axis=0, ddof=min(1, streams - 1))
+        tried["unsettled"], tried["oscillating"] = unsettled.sum(axis=0), turning.sum(axis=0)
+        tried["follows"] = ~failing.any(axis=0)
+        both = np.concatenate([self.tried, tried])
+        return replace(self, tried=both[np.argsort(both["value"], kind="stable")])
 
 
 def outermost(
@@ -188,57 +159,32 @@ def outermost(
     are tried first, the highest that meets the condition is sought, or else the lowest.
     """
     with at_fault("vary"):
-        searched = range_of(vary, base)
+        path, low, high = range_of(vary, base)
     with at_fault("such_that"):
-        condition = condition_of(such_that, base, searched.path.path)
+        condition = condition_of(such_that, base, path.path)
     if not FEWEST <= grid <= MOST:
         raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
     # The same streams for all values, so that neighbours differ by the value alone.
-    seeds = seeds_of_noise([base], [searched.path.path], 0, _STREAMS, _SEED)
+    seeds = seeds_of_noise([base], [path.path], 0, _STREAMS, _SEED)
     tally = RunCounter(grid * max(1, seeds.size), progress)
     runs = Runs(base, with_companions([condition.metric], base), tally, (), threads)
-    search = FindProgress(base, searched.path.path, condition, runs, seeds)
-    search.run(np.linspace(searched.low, searched.high, grid))
-    _check_has_metric(search, base, searched)
+    search = FindResult(base.name, path, condition, highest, seeds.size, runs, np.empty(0, TRIED))
+    search = search.with_values(base, np.linspace(low, high, grid), seeds, True)
+    if not np.isfinite(search.tried["judged"]).any():
+        ends = f"from {path.quote(low)} to {path.quote(high)}"
+        if search.tried["oscillating"].any():
+            raise StudyError(
+                f"scenario '{base.name}': in every run {ends} the loop oscillates: leave its gains out, so that they "
+                "follow the device"
+            )
+        reason = f"; the first: {runs.reason}" if runs.reason else ""
+        raise StudyError(f"scenario '{base.name}': no run {ends} has a '{condition.metric}'{reason}")
     # All parts of a bracket side by side: a bisection would wait for every one of its runs.
-    value, beyond = search.ends(highest)
-    width = ACCURACY * (searched.high - searched.low)
-    while value is not None and beyond is not None and abs(value - beyond) > width:
-        search.run(np.linspace(value, beyond, _PARTS + 1)[1:-1])
-        value, beyond = search.ends(highest)
-    order = np.argsort(search.values)
-    return FindResult(
-        scenario=base.name,
-        path=searched.path,
-        condition=condition,
-        highest=highest,
-        values=search.values[order],
-        metrics=search.metrics[order],
-        judged=search.judged[order],
-        spread=search.spread[order],
-        is_of_grid=order < grid,
-        is_met=search.is_met[order],
-        follows=search.follows[order],
-        value=value,
-        beyond=beyond,
-        noise_streams=seeds.size,
-        runs=runs.count,
-        failed=runs.failures,
-        first_failure=runs.reason,
-        unsettled=search.unsettled,
-        oscillating=search.oscillating,
-    )
-
-
-def _check_has_metric(search: FindProgress, base: Scenario, searched: _SearchedRange) -> None:
-    """Refuse a search in which no run has the metric of the condition."""
-    if np.isfinite(search.judged).any():
-        return
-    ends = f"from {searched.path.quote(searched.low)} to {searched.path.quote(searched.high)}"
-    if search.oscillating:
-        raise StudyError(
-            f"scenario '{base.name}': in every run {ends} the loop oscillates: leave its gains out, so that they "
-            "follow the device"
-        )
-    reason = f"; the first: {search.runs.reason}" if search.runs.reason else ""
-    raise StudyError(f"scenario '{base.name}': no run {ends} has a '{search.condition.metric}'{reason}")
+    place, beyond = search.found
+    while place is not None and beyond is not None:
+        value = float(search.tried["value"][place])
+        if abs(value - beyond) <= ACCURACY * (high - low):
+            break
+        search = search.with_values(base, np.linspace(value, beyond, _PARTS + 1)[1:-1], seeds, False)
+        place, beyond = search.found
+    return search

@@ -11,7 +11,6 @@ from ppafo.analyses.reproduce.bench import (
     RIG_SEED,
     TASK_PRESET,
     AssumedValue,
-    NoEvidence,
     SyntheticEvidence,
 )
 from ppafo.analyses.reproduce.claim import (
@@ -28,7 +27,7 @@ from ppafo.analyses.reproduce.claim import (
 from ppafo.analyses.reproduce.drawing import device_figure
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.analyses.reproduce.meaning_of_u import WITHIN_REACH, InterpretationOfU
-from ppafo.analyses.reproduce.publication import ALL, SEED, PublicationClaims
+from ppafo.analyses.reproduce.publication import ALL, SEED, JudgedClaim, Publication
 from ppafo.analyses.reproduce.step_response import StepEvents, SupplyLevels
 from ppafo.identification.bench.result import figure_3
 from ppafo.metrics import Metric
@@ -53,7 +52,10 @@ PROPORTIONAL = "torque-task-proportional"
 
 @dataclass(frozen=True, slots=True)
 class Reproduction:
-    """Result of a reproduction: claims in the paper's order, observations, runs, assumptions and audit findings."""
+    """Result of a reproduction: claims in the paper's order, observations, runs, assumptions and audit findings.
+
+    ``synthetic`` is a sentence where there is no synthetic measurement.
+    """
 
     claims: tuple[Claim, ...]
     step_observations: tuple[Observation, ...]
@@ -63,7 +65,7 @@ class Reproduction:
     step_events: StepEvents | None
     solenoid: Result
     proportional: Result
-    synthetic: SyntheticEvidence | NoEvidence
+    synthetic: SyntheticEvidence | str
     assumed: tuple[AssumedValue, ...]
     printed_set: str
     printed_findings: tuple[AuditFinding, ...]
@@ -91,24 +93,24 @@ class Reproduction:
 class Studies:
     """Some publications with their judged claims, and the reproduction of the paper where it is among them."""
 
-    studies: tuple[PublicationClaims, ...]
+    studies: tuple[tuple[Publication, tuple[JudgedClaim, ...]], ...]
     reproduction: Reproduction | None = None
 
     @property
     def verdicts(self) -> list[Verdict]:
         """The verdicts of all claims, the paper's first."""
         own = [] if self.reproduction is None else [claim.verdict for claim in self.reproduction.claims]
-        return own + [claim.verdict for study in self.studies for claim in study.claims]
+        return own + [claim.verdict for _, claims in self.studies for claim in claims]
 
     def json_document(self) -> dict[str, Any]:
         """Return claims with their verdicts, and how many there are of each, as plain data in SI."""
         own = () if self.reproduction is None else self.reproduction.claims
         return {
-            "study": self.studies[0].publication.name if self.reproduction is None else ALL,
+            "study": self.studies[0][0].name if self.reproduction is None else ALL,
             "counts": {verdict: self.verdicts.count(verdict) for verdict in VERDICTS},
             "claims": [
                 *({"study": SEED, **claim.document()} for claim in own),
-                *(claim.document(study.publication.name) for study in self.studies for claim in study.claims),
+                *(claim.document(publication.name) for publication, claims in self.studies for claim in claims),
             ],
             "versions": {"ppafo": __version__},
         }
@@ -139,34 +141,17 @@ _TASK_METRICS = (
 )
 
 
-def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> str:
+def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> bytes:
     """Return the page as HTML; ``drawn`` has SVG files by the names of the figures, which become part of the page."""
     changed = [word for override in reproduction.overrides for word in ("--set", override)]
-    runs = (reproduction.solenoid, reproduction.proportional, reproduction.step)
+    solenoid, proportional = reproduction.solenoid, reproduction.proportional
+    runs = (solenoid, proportional, reproduction.step)
     steps = sorted({1e3 * float(run.engine["step"]) for run in runs})
+    counts, readings = verdict_counts(reproduction.claims).items(), reproduction.readings_of_u
     values = {
         "paper": load_parameter_set(reproduction.printed_set).citation,
         "nothing_confirmed": NOTHING_CONFIRMED,
         "overrides": reproduction.overrides,
-        **_claim_values(reproduction),
-        **_set_values(reproduction),
-        **_synthetic(reproduction.synthetic, drawn.get(IDENTIFICATION_FIGURE)),
-        **_task_values(reproduction),
-        "versions": ", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
-        "steps": f"{steps[0]:g} ms" if len(steps) == 1 else f"{steps[0]:g} to {steps[-1]:g} ms",
-        "device_figure": inline_figure(drawn[DEVICE_FIGURE]),
-        "step_figure": inline_figure(drawn[STEP_FIGURE]),
-        "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
-        "live": live_part([run.scenario for run in runs]),
-        "command": shlex.join(["ppafo", "reproduce", "--out", "out/reproduce", *changed]),
-    }
-    return render_page(TEMPLATE, values, "ppafo.analyses.reproduce")
-
-
-def _claim_values(reproduction: Reproduction) -> dict[str, Any]:
-    """Return what the page says of the claims: each with its verdict, how many have each, and what cannot be tested."""
-    counts = verdict_counts(reproduction.claims).items()
-    return {
         "count_sentence": count_sentence([claim.verdict for claim in reproduction.claims]),
         "counts": [(name, VERDICTS[name], _SYMBOLS[name], MEANINGS[name], count) for name, count in counts],
         "claims": reproduction.claims,
@@ -176,7 +161,26 @@ def _claim_values(reproduction: Reproduction) -> dict[str, Any]:
         "not_read": NOT_READ,
         "step_observations": reproduction.step_observations,
         "torque_observations": reproduction.torque_observations,
+        **_set_values(reproduction),
+        **_synthetic(reproduction.synthetic, drawn.get(IDENTIFICATION_FIGURE)),
+        "readings_of_u": _reading_rows(readings),
+        "result_on_u": result_on_u(readings) if readings else (),
+        "within_reach": f"{WITHIN_REACH:g}",
+        "task_rows": [
+            (solenoid.metrics[name].summary, *(_metric_text(run.metrics[name]) for run in (solenoid, proportional)))
+            for name in _TASK_METRICS
+            if name in solenoid.metrics and name in proportional.metrics
+        ],
+        "ceiling": f"{holding_torque(solenoid):.1f}",
+        "versions": ", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
+        "steps": f"{steps[0]:g} ms" if len(steps) == 1 else f"{steps[0]:g} to {steps[-1]:g} ms",
+        "device_figure": inline_figure(drawn[DEVICE_FIGURE]),
+        "step_figure": inline_figure(drawn[STEP_FIGURE]),
+        "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
+        "live": live_part([run.scenario for run in runs]),
+        "command": shlex.join(["ppafo", "reproduce", "--out", "out/reproduce", *changed]),
     }
+    return render_page(TEMPLATE, values, "ppafo.analyses.reproduce").encode()
 
 
 def _set_values(reproduction: Reproduction) -> dict[str, Any]:
@@ -185,6 +189,9 @@ def _set_values(reproduction: Reproduction) -> dict[str, Any]:
     groups: dict[tuple[str, ...], list[AssumedValue]] = {}
     for value in reproduction.assumed:
         groups.setdefault(value.used_by, []).append(value)
+    headings = {
+        users: sentence(" and ".join(_EXPERIMENTS.get(name, name) for name in users)).rstrip(".") for users in groups
+    } | {tuple(_EXPERIMENTS): "All experiments", (SOLENOID, PROPORTIONAL): "Torque task, both valves"}
     ordered = sorted(groups.items(), key=lambda group: -len(group[0]))
     return {
         "printed_set": reproduction.printed_set,
@@ -194,24 +201,7 @@ def _set_values(reproduction: Reproduction) -> dict[str, Any]:
             for severity, name in severities.items()
         },
         "kept": [finding for finding in reproduction.completed_findings if finding.severity != "note"],
-        "assumed_groups": [(_users(users), values) for users, values in ordered],
-    }
-
-
-def _task_values(reproduction: Reproduction) -> dict[str, Any]:
-    """Return what the page says of the torque task: metrics of both valves, the torque ceiling, what U may mean."""
-    solenoid, proportional = reproduction.solenoid.metrics, reproduction.proportional.metrics
-    readings = reproduction.readings_of_u
-    return {
-        "readings_of_u": _reading_rows(readings),
-        "result_on_u": result_on_u(readings) if readings else (),
-        "within_reach": f"{WITHIN_REACH:g}",
-        "task_rows": [
-            (solenoid[name].summary, _metric_text(solenoid[name]), _metric_text(proportional[name]))
-            for name in _TASK_METRICS
-            if name in solenoid and name in proportional
-        ],
-        "ceiling": f"{holding_torque(reproduction.solenoid):.1f}",
+        "assumed_groups": [(headings[users], values) for users, values in ordered],
     }
 
 
@@ -229,19 +219,10 @@ def _metric_text(metric: Metric) -> str:
     return quantity(*metric_level(metric.value, metric.unit), 3)
 
 
-def _users(names: tuple[str, ...]) -> str:
-    """Return whose assumptions a group is, as its heading says it."""
-    if set(names) == set(_EXPERIMENTS):
-        return "All experiments"
-    if set(names) == {SOLENOID, PROPORTIONAL}:
-        return "Torque task, both valves"
-    return sentence(" and ".join(_EXPERIMENTS.get(name, name) for name in names)).rstrip(".")
-
-
-def _synthetic(evidence: SyntheticEvidence | NoEvidence, figure: bytes | None) -> dict[str, Any]:
+def _synthetic(evidence: SyntheticEvidence | str, figure: bytes | None) -> dict[str, Any]:
     """Return what the template needs of the synthetic measurements; without them only why there are none."""
-    if isinstance(evidence, NoEvidence):
-        return {"synthetic": None, "no_synthetic": evidence.reason}
+    if isinstance(evidence, str):
+        return {"synthetic": None, "no_synthetic": evidence}
     reported = load_reported()
     slope = -evidence.decay["friction.viscous_damping"].value / reported.in_si("foot_plate.inertia")
     return {
@@ -282,20 +263,20 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
     reproduction = solved.reproduction
     rows: list[Sequence[Cell]] = [] if reproduction is None else [(SEED, *row) for row in _paper_rows(reproduction)]
     details = [] if reproduction is None else [Section(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]
-    for study in solved.studies:
+    for publication, claims in solved.studies:
         stated_claims: list[Sequence[Cell]] = []
-        for claim in study.claims:
+        for claim in claims:
             entry = claim.claim.entry
             # A number that only own arithmetic on published ones gives.
             published = claim.published or (f"{entry.own} (own sum)" if entry.own else None)
-            rows.append((study.publication.name, entry.id, published, claim.ours, VERDICTS[claim.verdict]))
+            rows.append((publication.name, entry.id, published, claim.ours, VERDICTS[claim.verdict]))
             stated = f"{entry.statement} ({claim.claim.source})"
             agrees = _agrees(entry.at_least, entry.at_most, entry.unit)
             stated_claims.append((entry.id, stated, agrees, "; ".join(entry.assumed) or None, claim.note or None))
-        heading, said = f"{study.publication.name}: {study.publication.title}", (study.publication.citation,)
+        heading, said = f"{publication.name}: {publication.title}", (publication.citation,)
         columns = columns_of(_DETAILS_HEAD, stated_claims)
         details.append(Section(heading, columns, said, left=len(_DETAILS_HEAD), is_detail=True))
-    name = solved.studies[0].publication.name
+    name = solved.studies[0][0].name
     return Finding(
         name="claims",
         kicker="Reproduction",
@@ -376,12 +357,8 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
         passed=not missed or bool(reproduction.overrides),
         files={f"{run.scenario.name}.csv": partial(marked_csv_bytes, run.recording) for run in runs},
         command="reproduce",
-        page=partial(_page_bytes, reproduction),
+        page=partial(reproduction_page, reproduction),
     )
-
-
-def _page_bytes(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> bytes:
-    return reproduction_page(reproduction, drawn).encode()
 
 
 def _figures(reproduction: Reproduction) -> list[Section]:
@@ -391,7 +368,7 @@ def _figures(reproduction: Reproduction) -> list[Section]:
     stated = {claim.id: claim.paper or 0.0 for claim in reproduction.claims}
     # Without the bench figures 7 and 8 have the simulation alone.
     step, tasks, synthetic = None, None, reproduction.synthetic
-    if not isinstance(synthetic, NoEvidence):
+    if isinstance(synthetic, SyntheticEvidence):
         step, tasks = synthetic.step, (synthetic.solenoid, synthetic.proportional)
     drawn: dict[str, Callable[[], Drawing]] = {
         DEVICE_FIGURE: device_figure,
@@ -405,6 +382,6 @@ def _figures(reproduction: Reproduction) -> list[Section]:
             tasks,
         ),
     }
-    if not isinstance(synthetic, NoEvidence):
+    if isinstance(synthetic, SyntheticEvidence):
         drawn[IDENTIFICATION_FIGURE] = partial(figure_3, synthetic.torque, synthetic.decay)
     return [Section(name=name, draw=draw, is_detail=True) for name, draw in drawn.items()]

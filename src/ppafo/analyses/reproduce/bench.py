@@ -109,17 +109,8 @@ class SyntheticEvidence:
     proportional: Recording
 
 
-@dataclass(frozen=True, slots=True)
-class NoEvidence:
-    """Why there is no synthetic measurement, in one sentence."""
-
-    reason: str
-
-
-def synthetic_evidence(
-    tasks: Mapping[str, tuple[str, ...]], step_overrides: Sequence[str]
-) -> SyntheticEvidence | NoEvidence:
-    """Return what the rig records, or why it cannot: its solver gives up, or it cannot follow the overrides.
+def synthetic_evidence(tasks: Mapping[str, tuple[str, ...]], step_overrides: Sequence[str]) -> SyntheticEvidence | str:
+    """Return what the rig records, or one sentence: its solver gives up, or it cannot follow the overrides.
 
     ``tasks`` has the overrides of the torque task by valve, ``solenoid`` and ``proportional``. The bench keeps the
     paper's values whatever is overridden.
@@ -138,7 +129,7 @@ def synthetic_evidence(
         )
     # No claim rests on a recording: without them the figures show less, and the report says why.
     except (SimulationError, DataError) as error:
-        return NoEvidence(str(error))
+        return str(error)
 
 
 @cache

@@ -390,15 +390,14 @@ NOT_PUBLISHED = (
 """Statements that only recordings or masses could test, neither of which is published."""
 
 
-def not_published_claim() -> Claim:
-    """Return the one claim on all that nothing published can test."""
-    return Claim(
-        id="not_published",
-        statement="Torque constant, static friction, leak, the four RMS errors of the step response with what explains "
-        "them (dynamics beyond the model, temperature), and size and weight of the proportional valve.",
-        verdict="not_testable",
-        source="sections 'Identification', 'PPAFO Model Validation' and 'Discussion'",
-        note="The recordings are not published, nor masses or sizes. That the procedures return known values is tested "
-        "in tests/, on synthetic recordings; it says nothing about the paper's device.",
-        words=f"{len(NOT_PUBLISHED)} statements",
-    )
+NOT_PUBLISHED_CLAIM = Claim(
+    id="not_published",
+    statement="Torque constant, static friction, leak, the four RMS errors of the step response with what explains "
+    "them (dynamics beyond the model, temperature), and size and weight of the proportional valve.",
+    verdict="not_testable",
+    source="sections 'Identification', 'PPAFO Model Validation' and 'Discussion'",
+    note="The recordings are not published, nor masses or sizes. That the procedures return known values is tested "
+    "in tests/, on synthetic recordings; it says nothing about the paper's device.",
+    words=f"{len(NOT_PUBLISHED)} statements",
+)
+"""The claim on everything that nothing published can test."""

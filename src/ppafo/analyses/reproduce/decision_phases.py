@@ -6,7 +6,6 @@ each phase, with either valve first.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -34,13 +33,6 @@ class PhasedRuns:
     gas: Floats
 
 
-class _Run(NamedTuple):
-    """RMS torque error [N m] and gas from the supply [g] of one run."""
-
-    error: float
-    gas: float
-
-
 def phased_runs(solenoid: Result) -> PhasedRuns:
     """Return the pair's task with its decisions at each phase; its own run alone where the task has no such phase."""
     scenario = solenoid.scenario
@@ -63,14 +55,15 @@ def phased_runs(solenoid: Result) -> PhasedRuns:
         runs = [run for tie in (_TIE, -_TIE) for run in _runs_with_first_valve(fine, tie)]
     else:
         gas = GRAMS_PER_KILOGRAM * solenoid.metrics["gas_supplied"].value
-        runs = [_Run(solenoid.metrics["rms_error"].value, gas)]
-    return PhasedRuns(np.array([run.error for run in runs]), np.array([run.gas for run in runs]))
+        runs = [(solenoid.metrics["rms_error"].value, gas)]
+    return PhasedRuns(*np.array(runs).T)
 
 
-def _runs_with_first_valve(scenario: Scenario, tie: float) -> Iterator[_Run]:
-    """Yield the run for each phase, in which the valve that a reference ``tie`` [N m] calls is held on until then.
+def _runs_with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[float, float]]:
+    """Yield RMS torque error [N m] and gas [g] of the run for each phase of the decisions.
 
-    What follows the first decision is the task from that time on, from the pressures of that time.
+    The valve that a reference ``tie`` [N m] calls is held on until then. What follows the first decision is the task
+    from that time on, from the pressures of that time.
     """
     period, duration = scenario.controller.period, scenario.run.duration
     ramp = scenario.reference.settings
@@ -93,7 +86,7 @@ def _runs_with_first_valve(scenario: Scenario, tie: float) -> Iterator[_Run]:
         # Mean squares of both parts, each with its time.
         square = phase * float(np.mean(error_before**2)) + (duration - phase) * rest.metrics["rms_error"].value ** 2
         gas = float(held["supplied_mass"][last]) + rest.metrics["gas_supplied"].value
-        yield _Run(float(np.sqrt(square / duration)), GRAMS_PER_KILOGRAM * gas)
+        yield float(np.sqrt(square / duration)), GRAMS_PER_KILOGRAM * gas
 
 
 def with_reference(scenario: Scenario, **settings: float) -> Scenario:

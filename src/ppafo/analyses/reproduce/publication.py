@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.analyses.reproduce.claim import Verdict
-from ppafo.analyses.reproduce.event_times import WEARERS, rms_of, timed_events, uneven_task_sequence
+from ppafo.analyses.reproduce.event_times import WEARERS, event_error, uneven_task_sequence
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.toml_text import label
 from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
@@ -109,8 +109,7 @@ def event_reduction(wearer: str, _values: Values) -> float:
     errors = []
     for timing in ("thresholds", "estimated"):
         walked = load_walk(PAIR, (*WEARERS[wearer], f"timing.kind={timing}"))
-        walked = replace(walked, motion=replace(walk_of(walked), task_sequence=sequence))
-        errors.append(rms_of([event.errors for event in timed_events(walked, 1.0).values()]))
+        errors.append(event_error(replace(walked, motion=replace(walk_of(walked), task_sequence=sequence))))
     return 1.0 - errors[1] / errors[0]
 
 
@@ -258,14 +257,6 @@ class JudgedClaim:
         }
 
 
-@dataclass(frozen=True, slots=True)
-class PublicationClaims:
-    """A publication with the judged claims of it."""
-
-    publication: Publication
-    claims: tuple[JudgedClaim, ...]
-
-
 def study_names() -> tuple[str, ...]:
     """Return every name that ``--study`` takes."""
     return (SEED, *(name for name in FILE.names() if name != SEED), ALL)
@@ -287,15 +278,15 @@ def check_study(study: str, overrides: Sequence[str]) -> None:
         raise ScenarioError(f"--set {overrides[0]}: goes with the study '{SEED}' only; leave --set or --study out")
 
 
-def run_studies(study: str, report: Report) -> tuple[PublicationClaims, ...]:
-    """Return one study, or all but the paper's, with every claim judged; ScenarioError, SimulationError."""
+def run_studies(study: str, report: Report) -> tuple[tuple[Publication, tuple[JudgedClaim, ...]], ...]:
+    """Return one study, or all but the paper's, each with its claims judged; ScenarioError, SimulationError."""
     studies = []
     for name in study_names()[1:-1] if study == ALL else (study,):
         publication, claims = load_publication(name), []
         for claim in publication.claims:
             report(Progress(f"{publication.name}: {claim.entry.id}"))
             claims.append(judge(claim))
-        studies.append(PublicationClaims(publication, tuple(claims)))
+        studies.append((publication, tuple(claims)))
     return tuple(studies)
 
 

@@ -1,6 +1,6 @@
 """Runs the paper's experiments and judges what the paper claims of them."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -9,12 +9,12 @@ import numpy as np
 from ppafo.analyses.reproduce.answer import PROPORTIONAL, SOLENOID, STEP, Reproduction
 from ppafo.analyses.reproduce.bench import AssumedValue, assumed_values, synthetic_evidence
 from ppafo.analyses.reproduce.claim import (
+    NOT_PUBLISHED_CLAIM,
     Claim,
     Observation,
     Verdict,
     arithmetic_claims,
     load_reported,
-    not_published_claim,
     observation,
     stated_claim,
     told_claim,
@@ -25,12 +25,13 @@ from ppafo.analyses.reproduce.step_response import SupplyLevels, step_events, st
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.parameters import load_parameter_set
-from ppafo.parameters.audit import audit
+from ppafo.parameters.audit import findings_of
 from ppafo.parameters.overrides import Override, override_set, read_overrides
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.recording import Floats
-from ppafo.simulation.declaration import OF_A_VANE, value_at
+from ppafo.simulation.declaration import OF_A_VANE
+from ppafo.simulation.document import value_at
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.overrides import apply_overrides, chosen_by, is_of_device, unknown_value
 from ppafo.simulation.scenario import Scenario
@@ -232,8 +233,13 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     ``overrides`` are texts such as ``supply.pressure=60 psi_g``, each for the experiments that have its value;
     ``report`` hears what is being done. ScenarioError for a value that none has, SimulationError for a run that fails.
     """
-    scenarios = _scenarios(overrides)
-    step, solenoid, proportional = _runs(scenarios, report)
+    scenarios, runs = _scenarios(overrides), []
+    for name, scenario in scenarios.items():
+        report(Progress(f"simulating {name}"))
+        runs.append(simulate(scenario))
+        if not runs[-1].status.is_completed:
+            raise SimulationError(f"{name}: {runs[-1].status.message}")
+    step, solenoid, proportional = runs
     report(Progress("measuring on the simulated test bench (synthetic)"))
     # The rig records with the overrides of the simulations.
     own = {name: scenario.origin.overrides for name, scenario in scenarios.items()}
@@ -247,6 +253,7 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     step_observed = tuple(step_observations(step.recording, levels, events))
     torque_observed = tuple(torque_task_observations(solenoid, proportional))
     report(Progress(f"simulating {SOLENOID} over the phase of its decisions"))
+    phased, of_tasks = phased_runs(solenoid), _used_by(assumed, SOLENOID, PROPORTIONAL)
     claims = (
         *arithmetic_claims(reported),
         told_claim(
@@ -255,8 +262,15 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
             step_observed,
             _used_by(assumed, STEP),
         ),
-        *_task_claims(solenoid, proportional, torque_observed, _used_by(assumed, SOLENOID, PROPORTIONAL)),
-        not_published_claim(),
+        *torque_task_claims(phased, proportional, of_tasks),
+        told_claim(
+            "oscillation_words",
+            "What the text tells of the oscillation with both valves.",
+            torque_observed,
+            of_tasks,
+        ),
+        *control_claims(solenoid, proportional, phased),
+        NOT_PUBLISHED_CLAIM,
     )
     return Reproduction(
         claims=tuple(sorted(claims, key=lambda claim: ORDER.index(claim.id))),
@@ -270,45 +284,16 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
         synthetic=synthetic,
         assumed=assumed,
         printed_set=reported.parameter_set.name,
-        printed_findings=tuple(audit(reported.parameter_set)),
+        printed_findings=tuple(findings_of(reported.parameter_set)),
         completed_set=completed.name,
-        completed_findings=tuple(audit(completed)),
+        completed_findings=tuple(findings_of(completed)),
         overrides=tuple(overrides),
     )
-
-
-def _runs(scenarios: Mapping[str, Scenario], report: Report) -> list[Result]:
-    """Return the run of each experiment, in the order of ``EXPERIMENTS``; SimulationError for one that fails."""
-    runs = []
-    for name in EXPERIMENTS:
-        report(Progress(f"simulating {name}"))
-        run = simulate(scenarios[name])
-        if not run.status.is_completed:
-            raise SimulationError(f"{name}: {run.status.message}")
-        runs.append(run)
-    return runs
 
 
 def _used_by(assumed: Iterable[AssumedValue], *experiments: str) -> tuple[str, ...]:
     """Return what any of some experiments rests on beside the paper, a sentence each."""
     return tuple(value.sentence() for value in assumed if not set(experiments).isdisjoint(value.used_by))
-
-
-def _task_claims(
-    solenoid: Result, proportional: Result, observed: Sequence[Observation], rests_on: tuple[str, ...]
-) -> list[Claim]:
-    """Return the claims on the torque task, over the unknown phase of the solenoid pair's decisions."""
-    phased = phased_runs(solenoid)
-    return [
-        *torque_task_claims(phased, proportional, rests_on),
-        told_claim(
-            "oscillation_words",
-            "What the text tells of the oscillation with both valves.",
-            observed,
-            rests_on,
-        ),
-        *control_claims(solenoid, proportional, phased),
-    ]
 
 
 def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:

@@ -146,7 +146,7 @@ def _shapley_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
 
     count = len(uncertainty.drawn)
     lower = np.eye(count) if uncertainty.scores is None else np.asarray(uncertainty.scores)
-    random = np.random.default_rng([seed, 1])
+    covariance, random = lower @ lower.T, np.random.default_rng([seed, 1])
     scores = random.standard_normal((blocks, count - 1, 1, count)) @ lower.T
     scores = np.repeat(scores, _INNER, axis=2)
     fresh = random.standard_normal((blocks, count - 1, _INNER, count))
@@ -155,7 +155,10 @@ def _shapley_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
     free = places[:, None, :] <= np.arange(count - 1)[None, :, None]
     for pattern in np.unique(free.reshape(-1, count), axis=0):
         rows = np.all(free == pattern, axis=2)
-        mean, factor = _conditional(lower @ lower.T, pattern)
+        # What gives scores of free values from fixed ones: a matrix for the mean, a factor for the rest.
+        across = covariance[np.ix_(pattern, ~pattern)]
+        mean = np.linalg.solve(covariance[np.ix_(~pattern, ~pattern)], across.T).T
+        factor = np.linalg.cholesky(covariance[np.ix_(pattern, pattern)] - mean @ across.T)
         drawn = scores[rows][..., ~pattern] @ mean.T + fresh[rows][..., pattern] @ factor.T
         part = scores[rows]
         part[..., pattern] = drawn
@@ -187,14 +190,6 @@ def _orders(count: int, blocks: int, seed: int) -> NDArray[np.intp]:
     """Return the order of the values in each block (blocks, count); the first ones are the same for more blocks."""
     ranks = np.random.default_rng([seed, 2]).random((blocks, count))
     return np.argsort(ranks, axis=1)
-
-
-def _conditional(covariance: Floats, free: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Return what gives scores of free values from fixed ones: a matrix for the mean, a factor for the rest."""
-    across = covariance[np.ix_(free, ~free)]
-    mean = np.asarray(np.linalg.solve(covariance[np.ix_(~free, ~free)], across.T).T, dtype=np.float64)
-    rest = covariance[np.ix_(free, free)] - mean @ across.T
-    return mean, np.asarray(np.linalg.cholesky(rest), dtype=np.float64)
 
 
 SHAPLEY = Method(

@@ -5,7 +5,7 @@ would be the survivors'. Otherwise every block (base point or order) with such a
 since the formulas need whole blocks, and counted; the indices then hold for values with which the model runs.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -172,7 +172,14 @@ def _of_metric(
         raise StudyError(f"sensitivity: '{name}' is {values[known][0]:g} in every run, so no value influences it")
     # The formulas need whole blocks: one run without a value takes its block with it.
     is_whole = np.all(known.reshape(settings.samples, -1), axis=1)
-    sizes = _sizes(values.reshape(settings.samples, -1), is_whole, method)
+    # All blocks, and halves, and halves of halves, as far as they say something: many of the first may be left out, and
+    # a metric that counts may be the same in all.
+    halved = {settings.samples >> halvings for halvings in range(_SIZES)}
+    sizes = []
+    for size in sorted({size for size in halved if size >= method.fewest} | {settings.samples}):
+        kept = values.reshape(settings.samples, -1)[:size][is_whole[:size]]
+        if len(kept) >= _FEWEST_WHOLE and float(np.ptp(kept)) > 0.0:
+            sizes.append(size)
     if settings.samples not in sizes:
         raise StudyError(
             f"sensitivity: {int(np.count_nonzero(is_whole)):,} of {is_whole.size:,} {method.sizes_label} have '{name}' "
@@ -180,10 +187,13 @@ def _of_metric(
         )
     settling = []
     for size in sizes:
-        kept = np.flatnonzero(is_whole[:size])
-        estimated = method.indices(_part_of(design, values, kept), settings.confidence)
-        indices, bands = _as_lists(estimated.values), _as_lists(estimated.bands)
-        settling.append(IndexConvergence(blocks=size, used=kept.size, indices=indices, bands=bands))
+        whole = np.flatnonzero(is_whole[:size])
+        estimated = method.indices(_part_of(design, values, whole), settings.confidence)
+        indices, bands = (
+            {name: numbers.tolist() for name, numbers in by_name.items()}
+            for by_name in (estimated.values, estimated.bands)
+        )
+        settling.append(IndexConvergence(blocks=size, used=whole.size, indices=indices, bands=bands))
     change, band = changes(_part_of(design, values, np.flatnonzero(is_whole)), settings.confidence)
     return OfMetric(
         metric=name,
@@ -196,27 +206,9 @@ def _of_metric(
     )
 
 
-def _sizes(values: Floats, is_whole: NDArray[np.bool_], method: Method) -> list[int]:
-    """Return the numbers of first blocks that say something, growing to all: halves, and halves of halves.
-
-    ``values`` are (blocks, runs). Many of the first may be left out, and a metric that counts may be the same in all.
-    """
-    halved = {is_whole.size >> halvings for halvings in range(_SIZES)}
-    sizes = []
-    for size in sorted({size for size in halved if size >= method.fewest} | {is_whole.size}):
-        kept = values[:size][is_whole[:size]]
-        if len(kept) >= _FEWEST_WHOLE and float(np.ptp(kept)) > 0.0:
-            sizes.append(size)
-    return sizes
-
-
 def _part_of(design: EvaluatedBlocks, values: Floats, kept: NDArray[np.intp]) -> EvaluatedBlocks:
     """Return the part of a design that is made of some blocks, with the values of a metric in their runs."""
     rows = np.flatnonzero(np.isin(design.blocks, kept))
     return replace(
         design, fractions=design.fractions[rows], inputs=design.inputs[rows], values=values[rows], blocks=kept
     )
-
-
-def _as_lists(arrays: Mapping[str, Floats]) -> dict[str, list[float]]:
-    return {name: values.tolist() for name, values in arrays.items()}

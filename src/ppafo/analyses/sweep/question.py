@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ppafo.arguments import Address, Count, Fraction, Name, Overrides, Seed, Threads, Word, checked
+from ppafo.arguments import Count, Fraction, Name, Overrides, Seed, Threads, Word, checked
 from ppafo.progress import Report
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ def sweep_into_folder(
     draws: Count | None = None,
     seed: Seed | None = None,
     threads: Threads | None = None,
-    scheduler: Address | None = None,
     agreed: Agreed = False,
     statistic: StatisticWords | None = None,
     metric: MetricName | None = None,
@@ -47,9 +46,8 @@ def sweep_into_folder(
     """Run a study: many runs, one row each, resumable; or a statistic to a wanted precision.
 
     study: name of a study, or a .toml file
-    out: folder or address for the results; default out/NAME with the name of the study
+    out: folder for the results; default out/NAME with the name of the study
     draws: number of draws, instead of the number in the file; of a statistic the maximum, default 1,048,576
-    scheduler: address of a Dask scheduler whose workers compute the chunks
     agreed: start even if the results will fill much of the disk
     statistic: draw until the interval of a statistic is narrow enough, and keep no rows: mean, 'quantile 0.95',
         'probability above 1.2 N m', 'probability below 0.5 g'
@@ -65,6 +63,8 @@ def sweep_into_folder(
     >>> print(sweep_into_folder("torque-task-uncertainty", draws=4, out=Path("four")).said[0])
     torque-task-uncertainty: 8 runs: 8 completed
     """
+    from dataclasses import replace
+
     from ppafo.errors import StudyError
     from ppafo.report.drawing import load_drawing
     from ppafo.studies.draws import study_of
@@ -85,58 +85,29 @@ def sweep_into_folder(
         unused = [*(["metric"] if metric is not None else []), *of_statistic]
         if unused:
             raise StudyError(f"{unused[0]}: needs a statistic, for example --statistic mean --metric rms_error")
+        from ppafo.analyses.sweep.answer import write_report
+        from ppafo.analyses.sweep.solve import INTERRUPTED, INTERRUPTED_AT_ONCE, is_begun, sweep
+
         chosen = study_of(study, overrides, draws, seed)
-        folder = out or Path("out") / chosen.name
-        return _rows_into_folder(chosen, folder, threads=threads, scheduler=scheduler, agreed=agreed, progress=progress)
+        place = out or Path("out") / chosen.name
+        try:
+            swept = sweep(chosen, threads=threads, out=place, agreed=agreed, progress=progress)
+            write_report(swept.found)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(INTERRUPTED if is_begun(chosen, place) else INTERRUPTED_AT_ONCE) from None
+        return swept
     if metric is None:
         raise StudyError(f"statistic '{statistic}': needs a metric, for example --metric rms_error")
-    if scheduler is not None:
-        raise StudyError(f"--scheduler {scheduler}: a statistic is computed on this machine; omit --scheduler")
-    chosen = study_of(study, overrides)
-    if draws is not None:
-        of_statistic["draws"] = draws
-    return _statistic_into_folder(
-        chosen,
-        Path(out or Path("out") / f"{chosen.name}-{metric}"),
-        metric=metric,
-        statistic=statistic,
-        seed=seed,
-        threads=threads,
-        progress=progress,
-        **of_statistic,
-    )
-
-
-def _rows_into_folder(
-    study: Study,
-    folder: str | Path,
-    *,
-    threads: int | None,
-    scheduler: str | None,
-    agreed: bool,
-    progress: Report | None,
-) -> Finding[StudyResults]:
-    """Run every row of a study and write it with its report; an interrupt says how to go on."""
-    from ppafo.analyses.sweep.answer import write_report
-    from ppafo.analyses.sweep.solve import INTERRUPTED, INTERRUPTED_AT_ONCE, is_begun, sweep
-
-    try:
-        swept = sweep(study, threads=threads, out=folder, scheduler=scheduler, agreed=agreed, progress=progress)
-        write_report(swept.found)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(INTERRUPTED if is_begun(study, folder) else INTERRUPTED_AT_ONCE) from None
-    return swept
-
-
-def _statistic_into_folder(study: Study, folder: Path, **asked: Any) -> Finding[StatisticEstimate]:
-    """Estimate a statistic and write it into a folder that is absent, empty or of another study; see ``estimate``."""
-    from dataclasses import replace
-
     from ppafo.analyses.sweep.statistic import estimate
     from ppafo.storage.result_folder import check_owned_folder, marked_folder
 
+    chosen = study_of(study, overrides)
+    folder = Path(out or Path("out") / f"{chosen.name}-{metric}")
     # Before anything is drawn: a folder of something else must cost no time.
     check_owned_folder(folder, marked_folder("sweep"))
-    estimated = estimate(study, **asked)
+    if draws is not None:
+        of_statistic["draws"] = draws
+    of_statistic |= {"seed": seed, "threads": threads, "progress": progress}
+    estimated = estimate(chosen, metric=metric, statistic=statistic, **of_statistic)
     estimated.save(folder)
     return replace(estimated, found=replace(estimated.found, folder=str(folder)))

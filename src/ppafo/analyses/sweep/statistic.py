@@ -20,7 +20,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding
 from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
-from ppafo.studies.distributions import Floats, floored_interval, noise_interval
+from ppafo.studies.distributions import floored_interval, noise_interval
 from ppafo.studies.draws import REPLICATES, Columns, Uncertainty, atmosphere_of, check_metrics, drawn_in
 from ppafo.studies.sampling import with_new_noise
 from ppafo.studies.study import Study
@@ -135,7 +135,14 @@ def draw_until(
         runs.run(columns)
         rows = runs.table
         runs.check(rows, rule.maximum_failed, "sweep --statistic", [metric])
-        look = _look(rows[metric], statistic, rule)
+        values = rows[metric]
+        look = InterimEstimate(
+            draws=values.size,
+            missing=int(np.count_nonzero(~np.isfinite(values))),
+            interval=statistic.estimate(values, rule.confidence_of_look),
+            effective_size=statistic.effective_size(values),
+            unseen=statistic.unseen(values, rule.confidence),
+        )
         looks.append(look)
         # A mean is moved by what happens seldom; quantiles and probabilities are not.
         has_shown = not statistic.is_of_replicates or look.draws >= FEWEST_SEEN
@@ -147,6 +154,10 @@ def draw_until(
     if uncertainty.has_noise:
         noise = noise_interval(rows[metric], runs.run(with_new_noise(first_drawn))[metric], rule.confidence)
     values = rows[metric][np.isfinite(rows[metric])]
+    further = {}
+    for name in also:
+        mean = floored_interval(rows[name], REPLICATES, rule.confidence_of_look)
+        further[name] = OfMean(int(np.count_nonzero(np.isfinite(rows[name]))), mean.value, mean.low, mean.high)
     estimated = StatisticEstimate(
         metric=metric,
         statistic=statistic.label,
@@ -156,7 +167,7 @@ def draw_until(
         failed=failures,
         interval=last.interval,
         remarks=remarks_on(last, values, statistic, kind_of(metric, statistic), noise),
-        also={name: _mean_of_further(rows[name], rule) for name in also},
+        also=further,
         share_of_noise=noise,
         seed=seed,
         rule={**plain(rule), "looks": len(rule.sizes), "correction": "Bonferroni"},
@@ -164,17 +175,3 @@ def draw_until(
         values=values,
     )
     return finding_of(estimated, statistic, rule)
-
-
-def _look(values: Floats, statistic: Statistic, rule: StoppingRule) -> InterimEstimate:
-    """Return what is seen of the values (draws,) of a metric [SI], nan where there is none."""
-    missing = int(np.count_nonzero(~np.isfinite(values)))
-    interval = statistic.estimate(values, rule.confidence_of_look)
-    unseen = statistic.unseen(values, rule.confidence)
-    return InterimEstimate(values.size, missing, interval, statistic.effective_size(values), unseen)
-
-
-def _mean_of_further(values: Floats, rule: StoppingRule) -> OfMean:
-    """Return the mean of the values (draws,) of a further metric [SI], nan where there is none."""
-    mean = floored_interval(values, REPLICATES, rule.confidence_of_look)
-    return OfMean(int(np.count_nonzero(np.isfinite(values))), mean.value, mean.low, mean.high)

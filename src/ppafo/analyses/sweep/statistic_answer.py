@@ -64,7 +64,7 @@ def remarks_on(
 
 def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: StoppingRule) -> Finding[StatisticEstimate]:
     """Return an estimate in words, its looks as a table, the trace and the histogram of the values."""
-    kind, of_values, looks = kind_of(estimated.metric, statistic), of_metric(estimated.metric), estimated.looks
+    kind, looks = kind_of(estimated.metric, statistic), estimated.looks
     unit = kind.shown_unit if kind.quantity else ""
     ending = ""
     if not rule.is_narrow(looks[-1]):
@@ -81,7 +81,15 @@ def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: Stoppin
         f"{100.0 * rule.confidence_of_look:.4g} % confidence (Bonferroni), so that all of them hold simultaneously; "
         f"{looks[-1].missing:,} draws have no value and are left out"
     )
-    rows = [_row_of(look, kind, rule) for look in looks]
+    rows = []
+    for look in looks:
+        interval = look.interval
+        met = ["narrow enough"] if rule.is_narrow(look) else []
+        if not look.is_carried:
+            met.append("its effective sample size is small")
+        ends = (kind.number(value) for value in (interval.value, interval.low, interval.high))
+        wide = kind.change(interval.width) if math.isfinite(interval.width) else f"{interval.width:.3g}"
+        rows.append((f"{look.draws:,}", f"{look.missing:,}", *ends, wide, ", but ".join(met)))
     further = [
         (of_metric(name).title, f"{mean.draws:,}", *map(of_metric(name).number, (mean.value, mean.low, mean.high)))
         for name, mean in estimated.also.items()
@@ -104,7 +112,7 @@ def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: Stoppin
                 "Trace",
                 columns_of(("draws", "without value", *_ENDS, "width", ""), rows),
                 said=[policy],
-                panels=partial(_panels, estimated, kind, rule, statistic, of_values),
+                panels=partial(_panels, estimated, kind, rule, statistic.threshold),
                 name="trace",
                 caption=_CAPTION,
                 across=2,
@@ -116,43 +124,26 @@ def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: Stoppin
     )
 
 
-def _row_of(look: InterimEstimate, kind: Kind, rule: StoppingRule) -> tuple[str, ...]:
-    """Return a look as texts: draws, those without a value, estimate and interval, its width, and what it lacks."""
-    interval = look.interval
-    met = ["narrow enough"] if rule.is_narrow(look) else []
-    if not look.is_carried:
-        met.append("its effective sample size is small")
-    ends = (kind.number(value) for value in (interval.value, interval.low, interval.high))
-    width = kind.change(interval.width) if math.isfinite(interval.width) else f"{interval.width:.3g}"
-    return (f"{look.draws:,}", f"{look.missing:,}", *ends, width, ", but ".join(met))
+def _panels(estimated: StatisticEstimate, kind: Kind, rule: StoppingRule, threshold: float | None) -> list[Panel]:
+    """Return estimate, interval and target width at each look, and the values of all draws.
 
-
-def _panels(
-    estimated: StatisticEstimate, kind: Kind, rule: StoppingRule, statistic: Statistic, of_values: Kind
-) -> list[Panel]:
-    """Return the looks one after the other, and the values of all draws."""
-    return [_trace(estimated, kind, rule), _histogram(estimated, statistic, of_values)]
-
-
-def _trace(estimated: StatisticEstimate, kind: Kind, rule: StoppingRule) -> Panel:
-    """Return estimate and interval at each look, and the target width."""
+    Beside the values stands the estimate, or the ``threshold`` [SI] that a probability is about.
+    """
     draws = np.array([look.draws for look in estimated.looks])
     values = np.array([(look.interval.value, look.interval.low, look.interval.high) for look in estimated.looks]).T
     known, last = np.isfinite(values).all(axis=0), float(values[0, -1])
     reach = 0.5 * rule.width * (abs(last) if rule.is_relative else 1.0)
     label = f"{estimated.statistic[:1].upper()}{estimated.statistic[1:]}"
-    marks = (
+    trace = (
         Mark("upright", draws[known], values[1:, known], style={"linewidth": 3, "alpha": 0.45}),
         Mark("line", draws, values[0], style={"marker": "o", "markersize": 5, "linewidth": 1.0}),
         Mark("strip", (), (last - reach, last + reach), colour=GREY, style={"alpha": 0.18}),
     )
-    return Panel(Kind("Draws"), kind, marks, label, then=lambda axes: axes.set_xscale("log", base=2))
-
-
-def _histogram(estimated: StatisticEstimate, statistic: Statistic, kind: Kind) -> Panel:
-    """Return the values of all draws, and the estimate or the value that a probability is about."""
     bins = min(_MAXIMUM_BINS, max(10, int(np.sqrt(estimated.values.size))))
     counts, edges = np.histogram(estimated.values, bins)
-    at = estimated.interval.value if statistic.threshold is None else statistic.threshold
-    marks = (Mark("bars", edges, counts), Mark("at", at, colour=VERMILION, style={"linewidth": 1.4}))
-    return Panel(kind, Kind("Draws"), marks, f"{estimated.values.size:,} values")
+    at = last if threshold is None else threshold
+    histogram = (Mark("bars", edges, counts), Mark("at", at, colour=VERMILION, style={"linewidth": 1.4}))
+    return [
+        Panel(Kind("Draws"), kind, trace, label, then=lambda axes: axes.set_xscale("log", base=2)),
+        Panel(of_metric(estimated.metric), Kind("Draws"), histogram, f"{estimated.values.size:,} values"),
+    ]

@@ -9,7 +9,6 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
@@ -80,36 +79,29 @@ class Statistic:
 
 def mean_of(unit: str) -> Statistic:
     """Return the statistic of a sweep that is the mean of a metric, in the unit of the metric."""
-    return Statistic("mean", unit, _mean_interval, True)
+    return Statistic("mean", unit, lambda values, level: floored_interval(values, REPLICATES, level), True)
 
 
 def quantile_of(unit: str, fraction: float) -> Statistic:
     """Return the value of a metric below which a fraction of the runs lies."""
-    return Statistic(f"quantile {fraction:g}", unit, partial(_quantile, fraction))
 
+    def interval(values: Floats, level: float) -> ConfidenceInterval:
+        return quantile_interval(values[np.isfinite(values)], fraction, level)
 
-def _mean_interval(values: Floats, level: float) -> ConfidenceInterval:
-    """Return the mean of replicates and its interval at a level of confidence."""
-    return floored_interval(values, REPLICATES, level)
-
-
-def _quantile(fraction: float, values: Floats, level: float) -> ConfidenceInterval:
-    """Return the value below which a fraction lies, and its interval at a level of confidence."""
-    return quantile_interval(values[np.isfinite(values)], fraction, level)
-
-
-def _probability(threshold: float, is_above: bool, values: Floats, level: float) -> ConfidenceInterval:
-    """Return the fraction of values that are beyond a threshold, and its interval at a level of confidence."""
-    # Strictly beyond: a metric that counts may be exactly at the threshold in many runs.
-    known = values[np.isfinite(values)]
-    hits = known > threshold if is_above else known < threshold
-    return fraction_interval(int(np.count_nonzero(hits)), known.size, level)
+    return Statistic(f"quantile {fraction:g}", unit, interval)
 
 
 def probability_of(threshold: float, is_above: bool, text: str) -> Statistic:
     """Return the probability that a metric is above (or else below) a value [SI], written as ``text``."""
+
+    def interval(values: Floats, level: float) -> ConfidenceInterval:
+        # Strictly beyond: a metric that counts may be exactly at the threshold in many runs.
+        known = values[np.isfinite(values)]
+        hits = known > threshold if is_above else known < threshold
+        return fraction_interval(int(np.count_nonzero(hits)), known.size, level)
+
     words = f"probability {'above' if is_above else 'below'} {text}"
-    return Statistic(words, "-", partial(_probability, threshold, is_above), threshold=threshold)
+    return Statistic(words, "-", interval, threshold=threshold)
 
 
 def parse_statistic(text: str, metric: str, atmosphere: float | None) -> Statistic:

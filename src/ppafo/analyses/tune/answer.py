@@ -21,7 +21,6 @@ from ppafo.report.kind import TIME, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLACK, BLUE, COLOURS, GREY, VERMILION
-from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.studies.distributions import fraction_text
 from ppafo.units import percentage, without_exponent
@@ -71,29 +70,20 @@ def search_panels(
     problem: Problem, before: GainResult, after: GainResult, starts: Sequence[SearchStart]
 ) -> list[Panel]:
     """Return the best cost of each start over its generations, and where the gains lie between their bounds."""
-    return [_cost_panel(before, starts), _bounds_panel(problem, after, starts)]
-
-
-def _cost_panel(before: GainResult, starts: Sequence[SearchStart]) -> Panel:
-    marks = []
+    costs_of_starts = []
     for number, start in enumerate(starts):
         costs = np.array(start.generations)
         costs[costs >= INFEASIBLE] = np.nan  # no candidate keeps the constraints yet
         colour = COLOURS[number % len(COLOURS)]
-        marks.append(Mark("line", np.arange(costs.size), costs, colour=colour, style={"linewidth": 1.3}))
+        costs_of_starts.append(Mark("line", np.arange(costs.size), costs, colour=colour, style={"linewidth": 1.3}))
     dashed = {"linestyle": "--", "linewidth": 1.0}
-    marks.append(Mark("level", y=before.objective, colour=GREY, style=dashed))
+    costs_of_starts.append(Mark("level", y=before.objective, colour=GREY, style=dashed))
 
     def scale(axes: "Axes") -> None:
         # Below a decade a logarithmic axis has no tick that reads as a number.
         if axes.dataLim.ymax > _DECADE * axes.dataLim.ymin > 0.0:
             axes.set_yscale("log")
 
-    return Panel(Kind("Generation"), Kind(), marks, "Objective, best so far; dashed: before", then=scale)
-
-
-def _bounds_panel(problem: Problem, after: GainResult, starts: Sequence[SearchStart]) -> Panel:
-    """Return where the gains lie between their bounds: before, after, and where each start ended."""
     searched = problem.searched
     rows = np.arange(len(searched))[::-1]
     ends = [
@@ -101,14 +91,14 @@ def _bounds_panel(problem: Problem, after: GainResult, starts: Sequence[SearchSt
         for start in starts
         for row, gain in enumerate(searched)
     ]
-    before = [float(np.clip(gain.fraction(gain.before), -_BEYOND, 1.0 + _BEYOND)) for gain in searched]
+    first = [float(np.clip(gain.fraction(gain.before), -_BEYOND, 1.0 + _BEYOND)) for gain in searched]
     found = [gain.fraction(after.gains[gain.path]) for gain in searched]
     dots: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 7}
     ticks: dict[str, Any] = {"linestyle": "", "marker": "|", "markersize": 11}
     marks = (
         *(Mark("line", [0.0, 1.0], [row, row], colour=GREY, style={"linewidth": 1.0}) for row in rows),
         Mark("line", ends, np.tile(rows, len(starts)), colour=GREY, style=ticks),
-        Mark("line", before, rows, label="before", colour=VERMILION, style={**dots, "marker": "s"}),
+        Mark("line", first, rows, label="before", colour=VERMILION, style={**dots, "marker": "s"}),
         Mark("line", found, rows, label="after", colour=BLUE, style=dots),
     )
 
@@ -117,7 +107,11 @@ def _bounds_panel(problem: Problem, after: GainResult, starts: Sequence[SearchSt
         axes.set_ylim(-0.6, len(searched) - 0.4)
         axes.set_xticks([0.0, 1.0], ["minimum", "maximum"])
 
-    return Panel(Kind(), Kind(), marks, "Between bounds", then=name_gains)
+    title = "Objective, best so far; dashed: before"
+    return [
+        Panel(Kind("Generation"), Kind(), costs_of_starts, title, then=scale),
+        Panel(Kind(), Kind(), marks, "Between bounds", then=name_gains),
+    ]
 
 
 _DIFFERENT = 0.1
@@ -138,12 +132,42 @@ def finding_of(
 
     ``scales`` are those of the goals [SI], ``starts`` best first, ``runs`` all that were simulated.
     """
-    tuned = _tuned(problem, scales, before, after, starts, runs)
+    scenario, spread = problem.scenario, problem.spread
+    bounds = {gain.path: gain.bound_reached(after.gains[gain.path]) for gain in problem.searched}
+    reached = {path: bound for path, bound in bounds.items() if bound is not None}
+    tuned = Tuned(
+        tuning=problem.name,
+        scenario=scenario.name,
+        verdict=verdict(problem, before, after),
+        is_feasible=after.is_feasible,
+        overrides=list(over(problem.overrides, problem.lines(after.gains), valve=scenario.device.valve_name)),
+        bounds_reached=reached,
+        scales=scales,
+        goals=list(problem.goals),
+        constraints=list(problem.constraints),
+        robust=None if spread is None else {"study": spread.study or None, "measure": spread.measure},
+        effort=problem.effort.model_dump(),
+        before=before,
+        after=after,
+        starts=starts,
+        runs=runs,
+        remarks=_remarks(problem, after, starts, runs, reached),
+        problem=problem,
+    )
     rows = []
-    for gain in tuned.problem.searched:
-        numbers = (gain.before, tuned.after.gains[gain.path], gain.minimum, gain.maximum)
-        end = f"at its {tuned.bounds_reached[gain.path]}" if gain.path in tuned.bounds_reached else ""
+    for gain in problem.searched:
+        numbers = (gain.before, after.gains[gain.path], gain.minimum, gain.maximum)
+        end = f"at its {reached[gain.path]}" if gain.path in reached else ""
         rows.append((gain.path, *map(gain.place.quote, numbers), end))
+    # The scenario's file, or the name of one that comes with the package, finds it again.
+    name, motion_kind = scenario.origin.file or scenario.name, scenario.motion.motion_kind
+    options = " ".join(f"--set {shlex.quote(line)}" for line in tuned.overrides)
+    # Texts of TOML and of Python alike.
+    listed = ", ".join(json.dumps(line, ensure_ascii=False) for line in tuned.overrides)
+    pasted = (
+        f"# {tuned.verdict}\n\n# on the command line\n{options}\n\n# in a study file\noverrides = [{listed}]\n\n"
+        f"# in Python\n{motion_kind.python_call(name, listed)}\n"
+    )
     return Finding(
         name="tune",
         kicker="Tuning",
@@ -167,70 +191,11 @@ def finding_of(
                 caption=_SEARCH_CAPTION,
                 size=(5.4, max(2.2, 0.9 + 0.3 * len(problem.searched))),
             ),
-            Section("To use the gains", code=_command(tuned)),
+            Section("To use the gains", code=f"ppafo {motion_kind.command} {shlex.quote(name)} {options}"),
         ),
         found=tuned,
         passed=after.is_feasible and not after.useless,
-        files={"overrides.txt": _pasted(tuned).encode},
-    )
-
-
-def _tuned(
-    problem: Problem,
-    scales: dict[str, float],
-    before: GainResult,
-    after: GainResult,
-    starts: list[SearchStart],
-    runs: int,
-) -> Tuned:
-    """Return what a search came to as data, with the verdict and the remarks in words."""
-    bounds = {gain.path: gain.bound_reached(after.gains[gain.path]) for gain in problem.searched}
-    reached = {path: bound for path, bound in bounds.items() if bound is not None}
-    spread = problem.spread
-    return Tuned(
-        tuning=problem.name,
-        scenario=problem.scenario.name,
-        verdict=verdict(problem, before, after),
-        is_feasible=after.is_feasible,
-        overrides=list(over(problem.overrides, problem.lines(after.gains), valve=problem.scenario.device.valve_name)),
-        bounds_reached=reached,
-        scales=scales,
-        goals=list(problem.goals),
-        constraints=list(problem.constraints),
-        robust=None if spread is None else {"study": spread.study or None, "measure": spread.measure},
-        effort=problem.effort.model_dump(),
-        before=before,
-        after=after,
-        starts=starts,
-        runs=runs,
-        remarks=_remarks(problem, after, starts, runs, reached),
-        problem=problem,
-    )
-
-
-def _options(tuned: Tuned) -> str:
-    return " ".join(f"--set {shlex.quote(line)}" for line in tuned.overrides)
-
-
-def _command(tuned: Tuned) -> str:
-    """Return the line that runs the scenario with the gains found."""
-    scenario = tuned.problem.scenario
-    return f"ppafo {scenario.motion.motion_kind.command} {shlex.quote(_named(scenario))} {_options(tuned)}"
-
-
-def _named(scenario: Scenario) -> str:
-    """Return what finds a scenario again: its file, or the name of one that comes with the package."""
-    return scenario.origin.file or scenario.name
-
-
-def _pasted(tuned: Tuned) -> str:
-    """Return the gains found to paste on a command line, into a study file and into Python."""
-    # Texts of TOML and of Python alike.
-    listed = ", ".join(json.dumps(line, ensure_ascii=False) for line in tuned.overrides)
-    call = tuned.problem.scenario.motion.motion_kind.python_call(_named(tuned.problem.scenario), listed)
-    return (
-        f"# {tuned.verdict}\n\n# on the command line\n{_options(tuned)}\n\n# in a study file\n"
-        f"overrides = [{listed}]\n\n# in Python\n{call}\n"
+        files={"overrides.txt": pasted.encode},
     )
 
 

@@ -135,7 +135,13 @@ def _start(costs: Costs, before: Sequence[float], effort: SearchEffort, random: 
 
     def stop(intermediate_result: Any) -> bool:
         nonlocal is_settled
-        is_settled = have_come_together(intermediate_result.population_energies)
+        energies = intermediate_result.population_energies
+        least, most = np.min(energies), np.max(energies)
+        if most >= UNUSABLE or least < INFEASIBLE <= most:
+            return False
+        # Where all break a constraint, what counts is by how much they break it.
+        beyond = energies - INFEASIBLE if least >= INFEASIBLE else energies
+        is_settled = float(np.std(beyond)) <= _TOLERANCE * abs(float(np.mean(beyond)))
         return is_settled
 
     # SciPy refuses a first candidate beyond the bounds.
@@ -176,14 +182,6 @@ def _start(costs: Costs, before: Sequence[float], effort: SearchEffort, random: 
     # The course has the generations, and where the simplex ended.
     course[generations:] = course[-1:]
     return SearchStart(tuple(map(float, refined.x)), float(refined.fun), tried, tuple(course), is_settled)
-
-
-def have_come_together(costs: Floats) -> bool:
-    """Tell whether candidates cost the same; where all break a constraint, by how much they break it."""
-    if np.max(costs) >= UNUSABLE or np.min(costs) < INFEASIBLE <= np.max(costs):
-        return False
-    beyond = costs - INFEASIBLE if np.min(costs) >= INFEASIBLE else costs
-    return float(np.std(beyond)) <= _TOLERANCE * abs(float(np.mean(beyond)))
 
 
 MINIMUM_ERRORS = ("peak_error", "rms_error_hold")

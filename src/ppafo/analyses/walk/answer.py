@@ -28,7 +28,7 @@ from ppafo.report.kind import Kind
 from ppafo.report.live_parts import live_part
 from ppafo.running import tried
 from ppafo.simulation.gains import gains_of
-from ppafo.simulation.tracking import Tracking
+from ppafo.simulation.tracking import Tracking, following_text
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
@@ -124,22 +124,28 @@ class WalkPair:
 SCHEMA_VERSION = 1
 REVERSALS_PER_STRIDE, LARGEST_TORQUE = "reversals_per_stride", "largest_torque"
 _NUMBERS = (
-    ShownNumber("body_mass", "Body mass of the wearer", "mass", 1),
-    ShownNumber("gas", "Gas per stride", "gas mass", 3),
-    ShownNumber("total_gas", "Gas of the whole walk", "gas mass", 2),
-    ShownNumber("positive_push_off_work", "Positive work on the wearer in push-off", "energy", 2),
-    ShownNumber("push_off_share", "... of the healthy ankle's positive work", "fraction", 1),
-    ShownNumber("net_push_off_work", "Net work on the wearer in push-off", "energy", 2),
-    ShownNumber("torque_error", "Torque error where one is requested, RMS", "torque", 2),
-    ShownNumber("requested_torque", "... requested torque, RMS", "torque", 2),
-    ShownNumber("peak_torque", "Peak torque", "torque", 1),
-    ShownNumber(LARGEST_TORQUE, "... limit of the controller", "torque", 1),
-    ShownNumber(REVERSALS_PER_STRIDE, "Command reversals per stride", "", 1),
-    ShownNumber("lowest_toes", "Lowest toes over the ground in mid-swing", "body length", 1),
-    ShownNumber("toe_landing", "Strides that begin on the toes", "fraction", 0),
-    ShownNumber("dorsiflexor_moment", "Moment of the wearer's dorsiflexors, mean", "torque", 2),
-    ShownNumber("angle_difference", "Ankle against healthy, RMS over the stride", "angle", 1),
-    ShownNumber("counted_strides", "Strides with these means", "", 0),
+    ShownNumber(name="body_mass", title="Body mass of the wearer", quantity="mass", digits=1),
+    ShownNumber(name="gas", title="Gas per stride", quantity="gas mass", digits=3),
+    ShownNumber(name="total_gas", title="Gas of the whole walk", quantity="gas mass", digits=2),
+    ShownNumber(
+        name="positive_push_off_work", title="Positive work on the wearer in push-off", quantity="energy", digits=2
+    ),
+    ShownNumber(name="push_off_share", title="... of the healthy ankle's positive work", quantity="fraction", digits=1),
+    ShownNumber(name="net_push_off_work", title="Net work on the wearer in push-off", quantity="energy", digits=2),
+    ShownNumber(name="torque_error", title="Torque error where one is requested, RMS", quantity="torque", digits=2),
+    ShownNumber(name="requested_torque", title="... requested torque, RMS", quantity="torque", digits=2),
+    ShownNumber(name="peak_torque", title="Peak torque", quantity="torque", digits=1),
+    ShownNumber(name=LARGEST_TORQUE, title="... limit of the controller", quantity="torque", digits=1),
+    ShownNumber(name=REVERSALS_PER_STRIDE, title="Command reversals per stride", quantity="", digits=1),
+    ShownNumber(name="lowest_toes", title="Lowest toes over the ground in mid-swing", quantity="body length", digits=1),
+    ShownNumber(name="toe_landing", title="Strides that begin on the toes", quantity="fraction", digits=0),
+    ShownNumber(
+        name="dorsiflexor_moment", title="Moment of the wearer's dorsiflexors, mean", quantity="torque", digits=2
+    ),
+    ShownNumber(
+        name="angle_difference", title="Ankle against healthy, RMS over the stride", quantity="angle", digits=1
+    ),
+    ShownNumber(name="counted_strides", title="Strides with these means", quantity="", digits=0),
 )
 """Metrics as the table of a walk shows them."""
 _EXPLAINED = (
@@ -174,8 +180,10 @@ def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
     along = "" if motion.task_sequence is None else f", task sequence {motion.task_sequence.name}"
     assumed = [(assumption.path, assumption.note) for assumption in configuration.assumptions]
     verdict = tried(configuration, worn.tracking)
-    # What the torque does not follow, and the gains in force with where they come from.
-    first_lines = [line.sentence for line in (verdict, gains_of(configuration, law_of(configuration))) if line]
+    # How the torque follows what is requested, and the gains in force with their origin.
+    in_force = gains_of(configuration, law_of(configuration))
+    follows = following_text(worn) if verdict is None and "strides" in worn.metrics else ""
+    first_lines = [follows if verdict is None else verdict.sentence, "" if in_force is None else in_force.sentence]
     gait, overrides = motion.gait, configuration.origin.overrides
     title = f" ({gait.title})" if gait.title else ""
     set_up = (
@@ -189,7 +197,7 @@ def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
         title=f"Walking with {configuration.name}",
-        said=(ended, *first_lines),
+        said=(ended, *filter(None, first_lines)),
         parts=(
             Section(said=[sentence for sentence in set_up if sentence], is_detail=True),
             *task_sequence_parts(comparison),

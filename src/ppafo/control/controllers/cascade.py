@@ -25,7 +25,7 @@ from ppafo.control.angle_loop import (
 )
 from ppafo.control.kind import BelievedBand, ControllerKind
 from ppafo.control.torque_loop import beyond_dead_band
-from ppafo.model.controlled import ANGLE, steered
+from ppafo.model.controlled import ANGLE, OF_TORQUE, ErrorFunctions
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.plant import gravity_torque
 from ppafo.model.sensors import Measurement
@@ -122,7 +122,13 @@ FASTEST_CREEP = 10.0
 
 
 def cascade_update(
-    parameters: CascadeParameters, state: CascadeState, reference: float, measurement: Measurement, period: float
+    parameters: CascadeParameters,
+    state: CascadeState,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+    *,
+    parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, CascadeState]:
     """Command u from -1 to 1 for an angle error e [rad], and the torque T [N m] that the sensors show:
 
@@ -180,7 +186,7 @@ def cascade_update(
     own = parameters.angle_stiffness * acting + parameters.angle_damping * (asked - rate)
     needed = load + breakaway + own + gravity + parameters.inertia * quickening + friction
     wanted = before if rests_within else needed
-    unlimited = parameters.torque_gain * steered(wanted - measurement.torque)
+    unlimited = parameters.torque_gain * parts.steered(wanted - measurement.torque)
     command = beyond_dead_band(max(-1.0, min(1.0, unlimited)), parameters.dead_band)
     return command, CascadeState(
         reference=reference,

@@ -13,7 +13,7 @@ from ppafo.control.torque_loop import (
     PROPORTIONAL_GAIN,
     beyond_dead_band,
 )
-from ppafo.model.controlled import ANYTHING, seen_error, seen_value, steered
+from ppafo.model.controlled import ANYTHING, OF_TORQUE, ErrorFunctions, seen_error, seen_value
 from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.sensors import Measurement
 
@@ -78,10 +78,16 @@ def pid_command(gains: PidGains, state: PidState, error: float, ahead: float, pe
 
 
 def pid_update(
-    parameters: PidParameters, state: PidState, reference: float, measurement: Measurement, period: float
+    parameters: PidParameters,
+    state: PidState,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+    *,
+    parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, PidState]:
     """Command from -1 to 1 from the torque error [N m], equation (13), beyond the dead band of the valve."""
-    opening, after = pid_command(parameters.gains, state, seen_error(reference, measurement), 0.0, period)
+    opening, after = pid_command(parameters.gains, state, seen_error(reference, measurement, parts=parts), 0.0, period)
     return beyond_dead_band(opening, parameters.dead_band), after
 
 
@@ -131,6 +137,8 @@ def sliding_update(
     reference: float,
     measurement: Measurement,
     period: float,
+    *,
+    parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, SlidingModeState]:
     """Command [-] for the torque error e [N m], with the boundary layer phi [N m] and the slope lambda [1/s]:
 
@@ -139,7 +147,7 @@ def sliding_update(
     The opening u is made a command beyond the dead band. The integral stands still outside the layer, where a longer
     error could not open the valve further.
     """
-    error = seen_error(reference, measurement)
+    error = seen_error(reference, measurement, parts=parts)
     integral = state.integral + period * error
     surface = error + parameters.surface_slope * integral
     is_inside = abs(surface) < parameters.boundary_layer
@@ -241,11 +249,13 @@ def damped_update(
     reference: float,
     measurement: Measurement,
     period: float,
+    *,
+    parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, DampedProportionalState]:
     """Command from -1 to 1 by ``damped_command``, on top of the table's learnt command, beyond the dead band."""
     gains = DampedGains(parameters.proportional_gain, parameters.damping, parameters.damping_filter)
     ahead = learnt_command(parameters, state.elapsed)
-    wanted, value = steered(reference), steered(seen_value(measurement))
+    wanted, value = parts.steered(reference), parts.steered(seen_value(measurement, parts=parts))
     opening, course = damped_command(gains, state.course, wanted, value, ahead, period)
     return beyond_dead_band(opening, parameters.dead_band), DampedProportionalState(state.elapsed + period, course)
 

@@ -4,7 +4,7 @@ from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ControllerKind
 from ppafo.control.torque_loop import DEAD_ZONE, OPENING, RELEASE
-from ppafo.model.controlled import ANYTHING, seen_error
+from ppafo.model.controlled import ANYTHING, OF_TORQUE, ErrorFunctions, seen_error
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.sensors import Measurement
 
@@ -89,10 +89,16 @@ class OnOffState(NamedTuple):
 
 
 def on_off_update(
-    parameters: OnOffParameters, state: OnOffState, reference: float, measurement: Measurement, period: float
+    parameters: OnOffParameters,
+    state: OnOffState,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+    *,
+    parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, OnOffState]:
     """Command: 1 (valve A) where the error [N m] is 0 or more, else -1 (valve B). Equation (14)."""
-    error = seen_error(reference, measurement)
+    error = seen_error(reference, measurement, parts=parts)
     return (1.0 if error >= -ROUNDING else -1.0), state
 
 
@@ -132,13 +138,15 @@ def dead_zone_update(
     reference: float,
     measurement: Measurement,
     period: float,
+    *,
+    parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, OnOffDeadZoneState]:
     """Command: the opening, towards the reference, beyond the dead zone of the error [N m]; 0 inside.
 
     Once open, the valve stays so until the error is below ``release``. 0 closes a proportional valve and vents both
     chambers of a solenoid pair.
     """
-    error = seen_error(reference, measurement)
+    error = seen_error(reference, measurement, parts=parts)
     # A release beyond the dead zone would open and close the valve in turn, sample by sample.
     release = min(parameters.release, parameters.dead_zone)
     limit_up = release if state.direction > 0.0 else parameters.dead_zone

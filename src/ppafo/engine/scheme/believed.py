@@ -6,10 +6,8 @@ Its settings say how far they are from the device's: by the dead volumes, and by
 from typing import Any
 
 from ppafo.control.walking.observer import NominalDevice, believed_volumes, mean_volumes
-from ppafo.engine.scheme.actuators import functions_of_actuator
 from ppafo.engine.scheme.motion import clamp_angle
-from ppafo.model.actuators.kind import ActuatorModel, Chambers
-from ppafo.model.actuators.vane import MODEL as VANE
+from ppafo.model.actuators.kind import Chambers
 from ppafo.model.binding import made_of
 from ppafo.model.plant import ActuatorFunctions, PlantParameters
 
@@ -47,16 +45,9 @@ def kind_mean_volumes(
     return volume_1 + pressure_1 * middle.compliance_1, volume_2 + pressure_2 * middle.compliance_2
 
 
-def links_of_observer(actuator: ActuatorModel) -> dict[Any, Any]:
-    """Replacements of an observer's functions; empty for the vane."""
-    if actuator == VANE:
-        return {}
-    own = functions_of_actuator(actuator)
+def chambers_of_observer(functions: ActuatorFunctions) -> dict[Any, Any]:
+    """Functions of an actuator's chambers for the ports of an observer; each takes the row ``plant`` first."""
     return {
-        believed_volumes: made_of(kind_volumes, "kind_volumes", own),
-        mean_volumes: made_of(kind_mean_volumes, "kind_mean_volumes", own),
+        believed_volumes: made_of(kind_volumes, "kind_volumes", functions),
+        mean_volumes: made_of(kind_mean_volumes, "kind_mean_volumes", functions),
     }
-
-
-ASKED = ("plant",)
-"""Rows of a program that these ask for beside the arguments of what they stand for."""

@@ -3,6 +3,7 @@
 from typing import Any
 
 from ppafo.engine.groups import Groups, given, kept
+from ppafo.engine.plain_python import refusal
 from ppafo.engine.program import Program
 from ppafo.engine.step.lane import Lane, Now
 from ppafo.model import plant_faults, shut_off
@@ -15,6 +16,11 @@ from ppafo.model.valves.kind import VENT
 
 def groups(parts: Program) -> Groups:
     """Groups of a lane: faults and shut-off valve, and whether that has shut."""
+    port = parts.valve.port
+    if port not in plant_faults.FAILED_PORTS:
+        known = " or ".join(row.__name__ for row in plant_faults.FAILED_PORTS)
+        code = parts.valve.connect.__code__
+        raise refusal(code.co_filename, code.co_firstlineno, f"faults of the plant need {known}, not {port.__name__}")
     return {"plant_faults": given(PlantFaults), "shut_off": given(ShutOff), "unpowered": kept(Unpowered)}
 
 
@@ -26,12 +32,8 @@ def failed_plant(parts: Program, lane: Lane, time: float) -> PlantParameters:
 def failed_ports(
     parts: Program, lane: Lane, source: PlantParameters, port_1: Any, port_2: Any, time: float
 ) -> tuple[Any, Any]:
-    """The ports of both chambers as faults leave them at a time [s]: one open path for each chamber, or a blend."""
-    if parts.has_single_ports:
-        return plant_faults.failed_single_ports(
-            source, lane.plant_faults, lane.shut_off, lane.unpowered, port_1, port_2, time
-        )
-    return plant_faults.failed_blended_ports(
+    """The ports of both chambers as faults leave them at a time [s], by the class of port that the valve declares."""
+    return plant_faults.FAILED_PORTS[parts.valve.port](
         source, lane.plant_faults, lane.shut_off, lane.unpowered, port_1, port_2, time
     )
 

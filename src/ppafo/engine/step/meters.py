@@ -4,7 +4,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.step.lane import Lane
 from ppafo.engine.step.phases import present_pressures
 from ppafo.engine.step.sample import reference_at
-from ppafo.model.controlled import TORQUE, controlled
+from ppafo.model.controlled import TORQUE
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import ThermalParameters
 from ppafo.signals.meter import (
@@ -28,18 +28,21 @@ NO_STRIDE = StrideSample(**dict.fromkeys(StrideSample._fields, 0.0))
 def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
     """Set the sample ``number``, at a ``moment`` counted in steps."""
     pressure_1, pressure_2 = present_pressures(parts, lane)
+    torque = parts.actuator.torque(lane.plant, lane.state.angle, pressure_1, pressure_2)
     time = moment * lane.timing.step
+    # Extremes over the chambers are of chamber 1 where it is the only one.
     lane.sample = Sample(
         number=float(number),
         angle=lane.state.angle,
         angular_velocity=lane.state.angular_velocity,
         pressure_1=pressure_1,
-        pressure_2=pressure_2,
-        torque=parts.actuator.torque(lane.plant, lane.state.angle, pressure_1, pressure_2),
+        pressure_2=pressure_1 if parts.has_one_chamber else pressure_2,
+        torque=torque,
         command=lane.result.command,
+        value=parts.controlled_value(lane.state.angle, pressure_1, pressure_2, torque),
         reference=wanted_at(parts, lane, time),
         temperature_1=temperature(lane.thermal, lane.state.mass_1, lane.masses.mass_1) if parts.is_thermal else 0.0,
-        temperature_2=temperature(lane.thermal, lane.state.mass_2, lane.masses.mass_2) if parts.is_thermal else 0.0,
+        temperature_2=second_temperature(parts, lane) if parts.is_thermal else 0.0,
         gas=gas_of(parts, lane),
         energy=energy_of(parts, lane),
         foot=foot_of(parts, lane, time),
@@ -50,6 +53,13 @@ def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval
 def temperature(thermal: ThermalParameters, content: float, mass: float) -> float:
     """Temperature of the gas in a chamber [K], of its energy content and its true mass [kg]."""
     return thermal.temperature * (content / mass)
+
+
+def second_temperature(parts: Program, lane: Lane) -> float:
+    """Temperature of the gas in chamber 2, or in the only chamber [K]."""
+    if parts.has_one_chamber:
+        return temperature(lane.thermal, lane.state.mass_1, lane.masses.mass_1)
+    return temperature(lane.thermal, lane.state.mass_2, lane.masses.mass_2)
 
 
 def gas_of(parts: Program, lane: Lane) -> GasSample:
@@ -87,7 +97,8 @@ def wanted_at(parts: Program, lane: Lane, time: float) -> float:
 def foot_of(parts: Program, lane: Lane, time: float) -> FootSample:
     """The foot on the shank of a gait at a time [s]; zeros where there is none."""
     if parts.foot is not None and parts.is_on_gait:
-        return parts.foot.sample(parts, lane, time)
+        sample: FootSample = parts.foot.sample(parts, lane, time)
+        return sample
     return NO_FOOT
 
 
@@ -117,7 +128,7 @@ def origin_of(parts: Program, lane: Lane) -> float:
         return 0.0
     pressure_1, pressure_2 = present_pressures(parts, lane)
     torque = parts.actuator.torque(lane.plant, lane.state.angle, pressure_1, pressure_2)
-    return float(controlled(lane.state.angle, pressure_1, pressure_2, torque))
+    return float(parts.controlled_value(lane.state.angle, pressure_1, pressure_2, torque))
 
 
 def begin_course(parts: Program, lane: Lane, interval: float, last: int) -> None:

@@ -1,11 +1,8 @@
 """A leg that walks with the device, in a step: the gait leads its shank, the foot is free or on the ground."""
 
-from collections.abc import Mapping
-from typing import Any
-
 from ppafo.engine.groups import Groups, given, handed, kept
 from ppafo.engine.program import Program
-from ppafo.engine.scheme import believed, walking
+from ppafo.engine.scheme import walking
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
 from ppafo.engine.scheme.walking import CarriedFoot, DeviceShare, WalkEnd, WalkState, WalkStep
 from ppafo.engine.step.lane import Lane, Now
@@ -50,15 +47,6 @@ def groups(parts: Program) -> Groups:
         "ahead": handed(HeldChambers),
         "ended": handed(WalkEnd),
     }
-
-
-ASKED = believed.ASKED
-"""Groups of rows that what stands in ``links`` takes before its own arguments."""
-
-
-def links(parts: Program) -> Mapping[Any, Any]:
-    """Replacements of functions of the controller: its observer assumes the chambers of the actuator that walks."""
-    return believed.links_of_observer(parts.actuator)
 
 
 # Before the gas.

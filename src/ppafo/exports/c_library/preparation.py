@@ -26,7 +26,7 @@ from ppafo.model.effects.kind import Effect
 from ppafo.model.gait import ShankSeries
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.plant import PlantParameters
-from ppafo.model.regulator import SupplyLines
+from ppafo.model.regulator import SupplyLines, lines_at_start
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device, SonicOrifice
@@ -36,7 +36,6 @@ from ppafo.simulation.leg import foot_load, with_load
 from ppafo.simulation.numbers import path_of_locked_angle
 from ppafo.simulation.plan import StepCounts, relative_tolerance, state_with_volumes, step_counts, thermal_gas
 from ppafo.simulation.scenario import Leg, Scenario, vane_motion
-from ppafo.simulation.supply_lines import lines_at_start
 
 OF_VANE = ("torque_constant", "displacement_per_radian")
 """Numbers of the vane, without meaning for an actuator of another shape."""
@@ -107,11 +106,6 @@ class Preparation:
         of_line = ("droop", "largest_flow", "volume")
         found = [c_identifier(f"{SUPPLY_LINE}.{line}.{name}") for line in SUPPLY_LINES for name in of_line]
         return [*found, "relieving"]
-
-    @property
-    def line_volumes(self) -> list[str]:
-        """Names of the volumes of the supply lines."""
-        return [c_identifier(f"{SUPPLY_LINE}.{line}.volume") for line in SUPPLY_LINES]
 
     @property
     def wall_settings(self) -> list[str]:
@@ -391,6 +385,8 @@ def start(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     program = parts.program
     lane.result = LaneResult(0.0, NEVER_FAILED, 0.0)
     lane.pace = StepControl(lane.step)
+    for name, of_plant in program.groups_of_plant.items():
+        lane[name] = of_plant(lane.plant)
     if program.gas.START is not None:
         lane.masses = program.gas.START(lane.plant, lane.state, parts=program.functions)
     lane.valve_state = parts.constant(program.valve.initial())

@@ -67,11 +67,19 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
                 f"{plateau.count} samples, from sample {before + plateau.first + 1}, and was still moving "
                 f"before: the sensor is saturated or the vane is at a stop; give end"
             )
+    time, velocity = part.time[rows], None
     if VELOCITY in part:
-        _check_velocity(source, part, rows)
-    velocity = part[VELOCITY][rows] if VELOCITY in part else None
-    time = part.time[rows]
-    return FreeDecay(time=time - time[0], angle=part[ANGLE][rows], sign=sign, velocity=velocity)
+        velocity = part[VELOCITY][rows]
+        # The angle is compared with the area under the velocity.
+        moved = np.concatenate(([0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time))))
+        deviation = angle - angle.mean()
+        gain = float(deviation @ moved / (deviation @ deviation))
+        if abs(gain - 1.0) > _VELOCITY_MAY_DIFFER:
+            raise IdentificationError(
+                f"{source.name}: {PROCEDURE}: channel '{VELOCITY}' is {gain:.3g} times as fast as 'angle' changes; "
+                f"check unit and sign of both"
+            )
+    return FreeDecay(time=time - time[0], angle=angle, sign=sign, velocity=velocity)
 
 
 def _falling_part(source: RecordingSource, part: Recording, starts_here: bool) -> tuple[slice, float]:
@@ -92,19 +100,6 @@ def _falling_part(source: RecordingSource, part: Recording, starts_here: bool) -
             f"first reversal, {MINIMUM_SAMPLES} are needed; record longer, or give start and end"
         )
     return slice(first, last), sign
-
-
-def _check_velocity(source: RecordingSource, part: Recording, rows: slice) -> None:
-    """Raise IdentificationError for a velocity that is not how fast the angle changes, by the area under it."""
-    time, angle, velocity = part.time[rows], part[ANGLE][rows], part[VELOCITY][rows]
-    moved = np.concatenate(([0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time))))
-    deviation = angle - angle.mean()
-    gain = float(deviation @ moved / (deviation @ deviation))
-    if abs(gain - 1.0) > _VELOCITY_MAY_DIFFER:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: channel '{VELOCITY}' is {gain:.3g} times as fast as 'angle' changes; "
-            f"check unit and sign of both"
-        )
 
 
 def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:

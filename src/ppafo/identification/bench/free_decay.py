@@ -12,8 +12,7 @@ Without an inertia only beta/I [1/s] and T_c/I [rad/s^2] follow.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -107,6 +106,8 @@ def course(times: Floats, speed: float, slowing: Slowing) -> _DecayCurve:
 
 _RISE, _RISE_VELOCITY, _INERTIA, _GAIN = "rise of the friction near standstill", "its velocity", "inertia", "gain"
 """Names of the tolerances: log of 1 + q [-], w_s [rad/s], relative errors of the inertia and of the angle [-]."""
+_START_ANGLE, _START_SPEED = "start angle {}", "start speed {}"
+"""Names of what each decay starts with [rad, rad/s], by its number."""
 _USUAL_RISE_VELOCITY, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY = 0.1, 1.0e-3, 2.0
 """Velocity at which half of the rise is left [rad/s]."""
 _LEAST_SPEED, _LEAST_SWEPT = 1.0e-6, 1.0e-9
@@ -137,27 +138,66 @@ def free_decay(
     check_sources(sources, PROCEDURE, (ANGLE,), MINIMUM_SAMPLES)
     sources, said = without_wrong_samples(sources, PROCEDURE, (ANGLE, VELOCITY), start, end)
     decays = tuple(decay_of(source, start, end) for source in sources)
-    pushes = [_push_of(decay) for decay in decays]
-    law = _Law(decays, inertia or 1.0, *(_OF_THE_DEVICE if inertia else _OVER_INERTIA))
+    damping, friction = _OF_THE_DEVICE if inertia else _OVER_INERTIA
+    # An inertia of 1 kg m^2 stands for none.
+    stated_inertia = inertia or 1.0
+
+    def slowing_at(at: Values, moved: float) -> Slowing:
+        return Slowing(
+            damping_rate=max(at[damping.path], 0.0) / moved,
+            deceleration=max(at[friction.path], 0.0) / moved,
+            rise=math.expm1(at.get(_RISE, 0.0)),
+            rise_velocity=at.get(_RISE_VELOCITY, 0.0),
+        )
+
+    def law(at: Values) -> Floats:
+        slowing, series = slowing_at(at, stated_inertia * (1.0 + at[_INERTIA])), []
+        for number, decay in enumerate(decays, start=1):
+            _, swept, speed = course(decay.time, at[_START_SPEED.format(number)], slowing)
+            series.append(at[_START_ANGLE.format(number)] + (1.0 + at[_GAIN]) * decay.sign * swept)
+            if decay.velocity is not None:
+                series.append(decay.sign * speed)
+        return np.concatenate(series)
+
+    starts, rates = list[FitVariable](), []
+    for number, decay in enumerate(decays, start=1):
+        velocity, _ = smoothed_rates(decay.time, decay.angle)
+        speed = max(float(np.abs(velocity[:FEWEST_SMOOTHED]).max()), _LEAST_SPEED)
+        swept = max(abs(float(decay.angle[-1] - decay.angle[0])), _LEAST_SWEPT)
+        starts.append(sought(_START_ANGLE.format(number), float(decay.angle[0]), scale=swept))
+        # The direction is the push's: a speed of 0 or below would be another decay.
+        starts.append(sought(_START_SPEED.format(number), speed, 1e-9 * speed, 10.0 * speed))
+        # With viscous damping alone the way is speed over rate, with Coulomb friction alone speed^2 over twice the
+        # deceleration: half of each is a start between the two.
+        rates.append((0.5 * speed / swept, 0.25 * speed**2 / swept))
+    damping_rate, deceleration = (float(median) for median in np.median(rates, axis=0))
+    most, usual = math.log1p(rise), _USUAL_RISE_VELOCITY
+    # Between no rise and all of it nothing is known, not even the order of magnitude: an even distribution of the
+    # logarithm, its width over the root of 12.
+    near_rest = (
+        FitVariable(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)),
+        FitVariable(_RISE_VELOCITY, usual, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY, usual, usual),
+    )
     numbers = (
-        *law.sought_from(pushes),
-        *(number for place, push in enumerate(pushes) for number in _start_numbers(place, push)),
-        *_near_rest(rise),
-        *tolerance(_INERTIA, inertia_deviation / law.inertia),
+        sought(damping.path, stated_inertia * damping_rate, 0.0),
+        sought(friction.path, stated_inertia * deceleration, 0.0),
+        *starts,
+        *(near_rest if most > 0.0 else ()),
+        *tolerance(_INERTIA, inertia_deviation / stated_inertia),
         *within(_GAIN, tolerances.gain_of(ANGLE)),
     )
     fit, model = solve(law, _readings(sources, decays), numbers, confidence)
-    slowing = law.slowing(fit.by_name)
+    slowing = slowing_at(fit.by_name, stated_inertia)
     at_rest = sum(
-        float(decay.time[-1]) > course_to_standstill(fit.by_name[_speed_name(place)], slowing).time[-1]
-        for place, decay in enumerate(decays)
+        float(decay.time[-1]) > course_to_standstill(fit.by_name[_START_SPEED.format(number)], slowing).time[-1]
+        for number, decay in enumerate(decays, start=1)
     )
     unknown = "" if inertia else "; the inertia is not known, so only ratios to it follow"
     return result_of(
         PROCEDURE,
         sources,
         fit,
-        (law.damping, law.friction),
+        (damping, friction),
         f"{count_of(len(decays), 'decay')}, {at_rest} to standstill; beta/I = {slowing.damping_rate:.4g} 1/s, T_c/I = "
         f"{slowing.deceleration:.4g} rad/s^2{unknown}",
         _panels(decays, model, slowing),
@@ -174,100 +214,6 @@ _OVER_INERTIA = (
     ReportedNumber("free_decay.damping_over_inertia", "1/s", "Viscous damping over the inertia"),
     ReportedNumber("free_decay.friction_over_inertia", "rad/s^2", "Dynamic friction over the inertia"),
 )
-
-
-class _Push(NamedTuple):
-    """Rough initial values of a decay: angle [rad], speed [rad/s], and the total angle swept [rad]."""
-
-    angle: float
-    speed: float
-    swept: float
-
-
-def _push_of(decay: FreeDecay) -> _Push:
-    velocity, _ = smoothed_rates(decay.time, decay.angle)
-    speed = max(float(np.abs(velocity[:FEWEST_SMOOTHED]).max()), _LEAST_SPEED)
-    swept = max(abs(float(decay.angle[-1] - decay.angle[0])), _LEAST_SWEPT)
-    return _Push(float(decay.angle[0]), speed, swept)
-
-
-def _angle_name(place: int) -> str:
-    """Return the name of the angle from which the decay at a place of the recordings starts."""
-    return f"start angle {place + 1}"
-
-
-def _speed_name(place: int) -> str:
-    """Return the name of the speed with which the decay at a place of the recordings starts."""
-    return f"start speed {place + 1}"
-
-
-def _start_numbers(place: int, push: _Push) -> tuple[FitVariable, FitVariable]:
-    """Return the start of a decay, which is sought: angle [rad] and speed [rad/s]."""
-    return (
-        sought(_angle_name(place), push.angle, scale=push.swept),
-        # The direction is the push's: a speed of 0 or below would be another decay.
-        sought(_speed_name(place), push.speed, 1e-9 * push.speed, 10.0 * push.speed),
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class _Law:
-    """Equation (1) of some decays with one damping and one friction; an ``inertia`` of 1 kg m^2 stands for none."""
-
-    decays: tuple[FreeDecay, ...]
-    inertia: float
-    damping: ReportedNumber
-    friction: ReportedNumber
-
-    def __call__(self, at: Values) -> Floats:
-        """Return the angles [rad] of all decays at some numbers, each with its velocity [rad/s] where it has one."""
-        moved = self.inertia * (1.0 + at[_INERTIA])
-        slowing = Slowing(
-            damping_rate=max(at[self.damping.path], 0.0) / moved,
-            deceleration=max(at[self.friction.path], 0.0) / moved,
-            rise=math.expm1(at[_RISE]),
-            rise_velocity=at[_RISE_VELOCITY],
-        )
-        series = []
-        for place, decay in enumerate(self.decays):
-            _, swept, speed = course(decay.time, at[_speed_name(place)], slowing)
-            series.append(at[_angle_name(place)] + (1.0 + at[_GAIN]) * decay.sign * swept)
-            if decay.velocity is not None:
-                series.append(decay.sign * speed)
-        return np.concatenate(series)
-
-    def sought_from(self, pushes: Sequence[_Push]) -> tuple[FitVariable, FitVariable]:
-        """Return damping and friction, which are sought from rough values of all decays."""
-        # With viscous damping alone the way is speed over rate, with Coulomb friction alone speed^2 over twice the
-        # deceleration: half of each is a start between the two.
-        rates = [(0.5 * push.speed / push.swept, 0.25 * push.speed**2 / push.swept) for push in pushes]
-        damping_rate, deceleration = (float(median) for median in np.median(rates, axis=0))
-        return (
-            sought(self.damping.path, self.inertia * damping_rate, 0.0),
-            sought(self.friction.path, self.inertia * deceleration, 0.0),
-        )
-
-    def slowing(self, fitted: Values) -> Slowing:
-        """Return how the vane slows down with the fitted numbers, at the inertia that was given."""
-        return Slowing(
-            damping_rate=fitted[self.damping.path] / self.inertia,
-            deceleration=fitted[self.friction.path] / self.inertia,
-            rise=math.expm1(fitted.get(_RISE, 0.0)),
-            rise_velocity=fitted.get(_RISE_VELOCITY, 0.0),
-        )
-
-
-def _near_rest(rise: float) -> tuple[FitVariable, ...]:
-    """Return the tolerances of seals that grip harder near standstill: by how much, and from which velocity on."""
-    most, usual = math.log1p(rise), _USUAL_RISE_VELOCITY
-    if not most > 0.0:
-        return ()
-    # Between no rise and all of it nothing is known, not even the order of magnitude: an even distribution of the
-    # logarithm, its width over the root of 12.
-    return (
-        FitVariable(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)),
-        FitVariable(_RISE_VELOCITY, usual, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY, usual, usual),
-    )
 
 
 def _readings(sources: tuple[RecordingSource, ...], decays: tuple[FreeDecay, ...]) -> PooledReadings:

@@ -42,6 +42,8 @@ _LEVELS = "choked flow", "subsonic flow", "flow at nearly equal pressures"
 """Name of a reading's flow regime, by its pressure ratio."""
 _SPAN, _SUBSONIC = 0.15, 0.6
 """Span of the pressure ratios, and the largest of them, from which both numbers of ISO 6358 can be fitted."""
+_LARGEST_COEFFICIENT = 1.0
+"""Discharge coefficient [-] that no opening exceeds: the flow would exceed a loss-free nozzle."""
 
 
 def open_valve_flow(
@@ -106,27 +108,17 @@ def open_valve_flow(
         f"{NEXT_LAW[law]}, or leave those readings out",
         remarks,
     )
-    return result if area is None else _doubted(result, size.path, area)
-
-
-_MOST = 1.0
-"""Discharge coefficient [-] that no opening exceeds: the flow would exceed a loss-free nozzle."""
-
-
-def _doubted(result: BenchResult, path: str, area: float) -> BenchResult:
-    """Return the result with a remark on a discharge coefficient above 1 and its three possible causes."""
-    found = next((one for one in result.estimates if one.path == path and one.unit == ""), None)
-    if found is None or found.low <= _MOST:
+    # The size is the first of the estimates; without a unit it is a discharge coefficient.
+    coefficient, *others = result.estimates
+    if area is None or coefficient.unit or coefficient.low <= _LARGEST_COEFFICIENT:
         return result
     doubt = (
-        f"Cd = {found.value:.3g} is above 1, which no opening has: the unit of mass_flow or of a pressure is another "
-        f"one (a flow per minute is 60 times one per second), or the valve is larger than the set's {area * 1e6:.4g} "
-        f"mm^2; Cd A is {found.value * area * 1e6:.4g} mm^2"
+        f"Cd = {coefficient.value:.3g} is above 1, which no opening has: the unit of mass_flow or of a pressure is "
+        f"another one (a flow per minute is 60 times one per second), or the valve is larger than the set's "
+        f"{area * 1e6:.4g} mm^2; Cd A is {coefficient.value * area * 1e6:.4g} mm^2"
     )
-    estimates = tuple(
-        replace(one, verdict="holds for this model only") if one is found else one for one in result.estimates
-    )
-    return replace(result, estimates=estimates, remarks=(doubt, *result.remarks))
+    doubted = replace(coefficient, verdict="holds for this model only")
+    return replace(result, estimates=(doubted, *others), remarks=(doubt, *result.remarks))
 
 
 _BESIDE = ReportedNumber("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside it")
@@ -189,7 +181,7 @@ def open_readings(
     pressures = [pool(sources, name) for name in CHANNELS[:2]]
     check_no_wrong_reading(sources, PROCEDURE, "mass_flow", pressures, is_open)
     direction = pressures[0] - pressures[1]
-    read = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow, is_open)
-    possible = read.possible[is_open]
-    kept = [label for label, is_kept in zip(recordings_of(sources), read.possible.tolist(), strict=True) if is_kept]
-    return upstream[possible], downstream[possible], np.abs(flow[possible]), kept, (*remarks, *read.remarks)
+    _, is_kept, told = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow, is_open)
+    possible = is_kept[is_open]
+    labels = [label for label, is_one in zip(recordings_of(sources), is_kept.tolist(), strict=True) if is_one]
+    return upstream[possible], downstream[possible], np.abs(flow[possible]), labels, (*remarks, *told)

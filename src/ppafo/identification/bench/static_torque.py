@@ -13,7 +13,6 @@ torque gives an area [m^2] and forces, for which a set has no place.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,17 +72,17 @@ def static_torque(
     """
     readings = readings_of(sources)
     names = readings.names
-    rough = _straight_line(readings, ", ".join(source.name for source in sources))
     files = [source.name for source in sources]
+    slope, zero, friction, size = _straight_line(readings, ", ".join(files))
     frictions = [f"friction of {file}" for file in files] if len(files) > 1 else []
     is_anew = "zero" in tolerances.each_recording and len(files) > 1
     zeros = [f"zero of the pressure sensor of {file}" for file in files] if is_anew else ["zero of the pressure sensor"]
     span = float(np.abs(readings.pressure).max())
     numbers = (
-        sought(names.slope_path, rough.slope),
-        sought(names.friction_path, rough.friction, scale=rough.size),
-        sought(names.growth_path, 0.0, scale=rough.size / span),
-        sought(names.zero_path, rough.zero, scale=rough.size),
+        sought(names.slope_path, slope),
+        sought(names.friction_path, friction, scale=size),
+        sought(names.growth_path, 0.0, scale=size / span),
+        sought(names.zero_path, zero, scale=size),
         *(number for name in zeros for number in within(name, tolerances.zero_of_pressure)),
         *within("gain of the pressure sensor", tolerances.gain_of("pressure")),
         *within(f"gain of the {names.load} sensor", tolerances.gain_of(names.load)),
@@ -99,7 +98,15 @@ def static_torque(
         shown = (1.0 + at[f"gain of the {names.load} sensor"]) * (at[names.slope_path] * pressure - held)
         return np.asarray(readings.weight * (shown + at[names.zero_path]))
 
-    fitted, weighted = solve(law, _weighted(readings), numbers, confidence)
+    middle = 0.5 * float(readings.pressure.max() + readings.pressure.min())
+    groups = (
+        np.where(readings.branch > 0.0, "the rising branch", "the falling branch").tolist(),
+        np.where(readings.pressure > middle, "readings at higher pressures", "readings at lower pressures").tolist(),
+    )
+    sensors = [names.load] * readings.pressure.size
+    # Loads over their noise.
+    pooled = PooledReadings(readings.weight * readings.torque, sensors, readings.recordings, groups)
+    fitted, weighted = solve(law, pooled, numbers, confidence)
     values, residuals = fitted.by_name, readings.torque - weighted / readings.weight
     slope, slope_unit = in_shown_unit(values[names.slope_path], names.slope_unit)
     friction, unit = in_shown_unit(values[names.friction_path], names.unit)
@@ -109,7 +116,21 @@ def static_torque(
         PROCEDURE,
         sources,
         fitted,
-        _reported(readings),
+        (
+            ReportedNumber(
+                names.slope_path, names.slope_unit, f"{names.slope.capitalize()}, the common slope of both branches"
+            ),
+            ReportedNumber(
+                names.friction_path, names.unit, f"{names.friction.capitalize()} without a pressure difference"
+            ),
+            ReportedNumber(
+                names.growth_path, f"{names.unit}/Pa", f"Growth of the {names.friction} with the pressure difference"
+            ),
+            # A zero of the scale may be an answer.
+            ReportedNumber(
+                names.zero_path, names.unit, f"Zero of the {names.load} sensor", float(np.ptp(readings.torque))
+            ),
+        ),
         f"{readings.pressure.size} readings, {count_of(readings.repetitions, 'repetition')}; {names.slope} "
         f"{slope:.4g} {slope_unit}, {names.friction} {friction:.3g} {unit}; "
         f"scatter {scatter:.3g} {unit}",
@@ -122,33 +143,6 @@ def static_torque(
             residuals,
         ),
         f"one {names.slope} and a {names.friction} linear in pressure do not describe them",
-    )
-
-
-def _weighted(readings: "_Sweeps") -> PooledReadings:
-    """Return the loads over their noise, in groups whose own numbers are compared with those of all."""
-    pressure = readings.pressure
-    middle = 0.5 * float(pressure.max() + pressure.min())
-    groups = (
-        np.where(readings.branch > 0.0, "the rising branch", "the falling branch").tolist(),
-        np.where(pressure > middle, "readings at higher pressures", "readings at lower pressures").tolist(),
-    )
-    sensors = [readings.names.load] * pressure.size
-    return PooledReadings(readings.weight * readings.torque, sensors, readings.recordings, groups)
-
-
-def _reported(readings: "_Sweeps") -> tuple[ReportedNumber, ...]:
-    """Return the numbers to report; a zero of the scale may be an answer."""
-    names = readings.names
-    return (
-        ReportedNumber(
-            names.slope_path, names.slope_unit, f"{names.slope.capitalize()}, the common slope of both branches"
-        ),
-        ReportedNumber(names.friction_path, names.unit, f"{names.friction.capitalize()} without a pressure difference"),
-        ReportedNumber(
-            names.growth_path, f"{names.unit}/Pa", f"Growth of the {names.friction} with the pressure difference"
-        ),
-        ReportedNumber(names.zero_path, names.unit, f"Zero of the {names.load} sensor", float(np.ptp(readings.torque))),
     )
 
 
@@ -171,20 +165,12 @@ def _of_files(at: Values, names: list[str], files: Labels) -> Floats:
     return np.asarray(values[files] if len(names) > 1 else values)
 
 
-class _Rough(NamedTuple):
-    """A straight line through both branches: slope, zero, friction, and the size of the latter or of its scatter.
+def _straight_line(readings: "_Sweeps", files: str) -> tuple[float, float, float, float]:
+    """Return first guesses from a straight line through both branches, in units of the load.
 
-    In units of the load, the slope over the pressure [Pa].
+    The slope over the pressure [Pa], the zero, the friction, and the size of the latter or of its scatter.
+    IdentificationError, with the names of the files, for signs that no device has.
     """
-
-    slope: float
-    zero: float
-    friction: float
-    size: float
-
-
-def _straight_line(readings: "_Sweeps", files: str) -> _Rough:
-    """Return first guesses; IdentificationError, with the names of the files, for signs that no device has."""
     columns = (readings.pressure, np.ones_like(readings.pressure), -readings.branch)
     design = np.stack(columns, axis=1)
     # Pressures are some 1e5 times as large as the other columns.
@@ -203,7 +189,7 @@ def _straight_line(readings: "_Sweeps", files: str) -> _Rough:
             f"{files}: {PROCEDURE}: the rising branch lies above the falling one, as if friction drove the motion; "
             "reverse the sign of channel 'direction'"
         )
-    return _Rough(slope=slope, zero=zero, friction=friction, size=max(abs(friction), deviation))
+    return slope, zero, friction, max(abs(friction), deviation)
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,22 +215,12 @@ def names_of(load: str, slides: bool) -> _LoadNames:
     """Return what the numbers of a torque or a force are called, of an actuator that slides or is held."""
     word, key = ("friction in motion", "dynamic") if slides else ("static friction", "static")
     if load == _FORCE:
-        growth = "static_torque.friction_per_pressure"
-        return _LoadNames(
-            load,
-            "N",
-            "area",
-            "static_torque.area",
-            "m^2",
-            word,
-            f"static_torque.{key}_friction",
-            growth,
-            is_in_motion=slides,
-        )
-    growth, slope = f"effects.seal_friction.{key}_per_pressure", "actuator.torque_constant"
-    return _LoadNames(
-        load, "N m", "torque constant", slope, "m^3", word, f"friction.{key}_torque", growth, is_in_motion=slides
-    )
+        unit, slope = "N", ("area", "static_torque.area", "m^2")
+        frictions = f"static_torque.{key}_friction", "static_torque.friction_per_pressure"
+    else:
+        unit, slope = "N m", ("torque constant", "actuator.torque_constant", "m^3")
+        frictions = f"friction.{key}_torque", f"effects.seal_friction.{key}_per_pressure"
+    return _LoadNames(load, unit, *slope, word, *frictions, is_in_motion=slides)
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,10 +82,21 @@ def valve_map(
     ``path`` is the valve's in a set (``valves.main``).
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
-    _check_recordings(sources)
-    direction = np.sign(pool(sources, "command") * (pool(sources, PRESSURES[0]) - pool(sources, PRESSURES[1])))
-    read = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow)
-    sweep = _sweep_of(sources, read.flow)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("command", "mass_flow"), absolute=PRESSURES)
+    for source in sources:
+        requested = source.recording["command"]
+        wrong = np.flatnonzero(np.abs(requested) > 1.0 + 1e-9)
+        if wrong.size:
+            raise IdentificationError(
+                f"{source.name}: {PROCEDURE}: channel 'command' is {requested[wrong[0]]:g} at sample {wrong[0] + 1}; "
+                f"it goes from -1 to 1: scale it in a column map"
+            )
+    command, upstream, downstream = (pool(sources, name) for name in CHANNELS if name != "mass_flow")
+    direction = np.sign(command * (upstream - downstream))
+    measured, is_possible, remarks = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow)
+    commands = tuple(source.recording["command"] for source in sources)
+    branch = np.concatenate([_branch(source) for source in sources])
+    sweep = _Sweep(commands, command, measured, upstream, downstream, branch)
     areas = _areas(sources, sweep, gas)
     band = f"{path}.dead_band"
     numbers = (
@@ -103,7 +114,7 @@ def valve_map(
         shape = np.abs(orifice_shape(before, behind, gas.heat_capacity_ratio))
         flow = read_flow(at, gas, area * gas.choked_flow_constant * shape)
         # A play needs every command, so that readings that cannot be drop out of the flow alone.
-        return np.where(read.possible, flow, sweep.flow)
+        return np.where(is_possible, flow, sweep.flow)
 
     fitted, model = solve(law, _readings(sources, sweep), numbers, confidence)
     values, residuals = fitted.by_name, sweep.flow - model
@@ -121,19 +132,7 @@ def valve_map(
         f"scatter {scatter:.2%} of the largest flow",
         with_residuals("Valve map", *axes, _marks(sweep, model), sweep.command, residuals),
         "the opening is not the same in both directions, or not linear in the command",
-        (*read.remarks, *(() if is_clear else (one_way,)), *(() if sweep.is_two_way else (no_play,))),
-    )
-
-
-def _sweep_of(sources: tuple[RecordingSource, ...], flow: Floats) -> _Sweep:
-    command, upstream, downstream = (pool(sources, name) for name in CHANNELS if name != "mass_flow")
-    return _Sweep(
-        commands=tuple(source.recording["command"] for source in sources),
-        command=command,
-        flow=flow,
-        upstream=upstream,
-        downstream=downstream,
-        branch=np.concatenate([_branch(source) for source in sources]),
+        (*remarks, *(() if is_clear else (one_way,)), *(() if sweep.is_two_way else (no_play,))),
     )
 
 
@@ -207,19 +206,6 @@ def spool_of(command: Floats, width: float) -> Floats:
         position = spool_position(position, requested, width)
         positions.append(position)
     return np.array(positions)
-
-
-def _check_recordings(sources: tuple[RecordingSource, ...]) -> None:
-    """Refuse recordings that lack a channel or samples, or whose command is no command of a valve."""
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("command", "mass_flow"), absolute=PRESSURES)
-    for source in sources:
-        command = source.recording["command"]
-        wrong = np.flatnonzero(np.abs(command) > 1.0 + 1e-9)
-        if wrong.size:
-            raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: channel 'command' is {command[wrong[0]]:g} at sample {wrong[0] + 1}; "
-                f"it goes from -1 to 1: scale it in a column map"
-            )
 
 
 def _areas(sources: tuple[RecordingSource, ...], sweep: _Sweep, gas: GasAt) -> Floats:

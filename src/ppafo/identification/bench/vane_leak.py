@@ -14,7 +14,7 @@ fast D falls.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -106,13 +106,13 @@ def vane_leak(
     for source in sources:
         # One of them may be of a room.
         check_moves(source, PROCEDURE, max(CHANNELS, key=lambda name: float(np.ptp(source.recording[name]))))
-    closed = tuple(closed_chambers(source, start, end) for source in sources)
-    if len({(item.fuller, item.changing) for item in closed}) > 1:
+    decays = tuple(closed_chambers(source, start, end, number) for number, source in enumerate(sources, start=1))
+    if len({(item.fuller, item.changing) for item in decays}) > 1:
         raise IdentificationError(
             "chamber 1 empties in some recordings and chamber 2 in others; give each its own procedure"
         )
     volumes = volume_1, volume_2
-    found = _decaying_leak(sources, closed, opening, size, volumes, volume_deviation, tolerances, confidence)
+    found = _decaying_leak(sources, decays, opening, size, volumes, volume_deviation, tolerances, confidence)
     return replace(found, remarks=(*said, *found.remarks))
 
 
@@ -130,12 +130,13 @@ def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumb
 
 
 class _ClosedChambers(NamedTuple):
-    """Two closed chambers: time [s], pressures [Pa] of the fuller and the other, which is the fuller."""
+    """Two closed chambers: time [s], pressures [Pa] of the fuller and the other, number of the fuller, of the decay."""
 
     time: Floats
     first: Floats
     second: Floats
     fuller: int
+    number: int
 
     @property
     def edge(self) -> int:
@@ -162,9 +163,58 @@ class _ClosedChambers(NamedTuple):
         """Place of the pressure from which the leak is known: the first, but where that is of a room."""
         return 1 if self.room == 0 else 0
 
+    @property
+    def sensors(self) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
+        """Channels of the fuller chamber and of the other, with their pressures [Pa]."""
+        return (f"pressure_{self.fuller}", self.first), (f"pressure_{3 - self.fuller}", self.second)
 
-def closed_chambers(source: RecordingSource, start: float | None, end: float | None) -> _ClosedChambers:
-    """Return the chambers of a recording between its start and equal pressures.
+    @property
+    def fitted(self) -> list[tuple[str, Floats]]:
+        """The pressures [Pa] that are fitted, with their channels: the one of a room is not."""
+        return [pair for place, pair in enumerate(self.sensors) if place != self.room]
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Pressure difference at the start and at the end [Pa], each a mean over the samples of an edge.
+
+        Taken from straight lines through them, so that an edge in which the difference falls does not shorten the fall.
+        """
+        edge, difference = self.edge, self.first - self.second
+        if edge < 2:
+            return float(difference[0]), float(difference[-1])
+        start, end = (
+            float(np.polyfit(self.time[rows] - self.time[at], difference[rows], 1)[1])
+            for rows, at in ((slice(edge), 0), (slice(-edge, None), -1))
+        )
+        return start, end
+
+    def start_of(self, sensor: str) -> str:
+        """Name of the pressure of a chamber at the start [Pa]."""
+        return f"start of {sensor}, decay {self.number}"
+
+    def relaxation_of(self, sensor: str) -> str:
+        """Name of the share by which a pressure is off just after filling [-]."""
+        return f"relaxation of {sensor}, decay {self.number}"
+
+    def numbers(self) -> Iterator[FitVariable]:
+        """Yield the unknowns: initial pressures, the room's within its noise, and initial offsets of the readings."""
+        for place, (sensor, values) in enumerate(self.sensors):
+            size = max(abs(self.changes[self.changing]), float(np.std(np.diff(values))), 1.0)
+            found = sought(self.start_of(sensor), float(values[: self.edge].mean()), 1.0, scale=size)
+            if place == self.room:
+                found = replace(found, start=float(values.mean()), deviation=max(float(values.std()), 1.0))
+            yield found
+        for sensor, _ in self.fitted:
+            yield from within(self.relaxation_of(sensor), _MOST_RELAXED)
+
+    def halves(self) -> list[str]:
+        """Return for each sample of a pressure whether the difference has fallen by less than half or by more."""
+        half = int(np.argmax(self.first - self.second < 0.5 * sum(self.ends)))
+        return ["the early fall"] * half + ["the late fall"] * (self.time.size - half)
+
+
+def closed_chambers(source: RecordingSource, start: float | None, end: float | None, number: int) -> _ClosedChambers:
+    """Return the chambers of the recording of a decay between its start and equal pressures.
 
     IdentificationError where too few samples are left.
     """
@@ -193,7 +243,7 @@ def closed_chambers(source: RecordingSource, start: float | None, end: float | N
             f"{MINIMUM_SAMPLES} are needed; record faster, or give start"
         )
     time = part.time[:last] - part.time[0]
-    return _ClosedChambers(time=time, first=first[:last], second=second[:last], fuller=fuller)
+    return _ClosedChambers(time=time, first=first[:last], second=second[:last], fuller=fuller, number=number)
 
 
 _POINTS = 400
@@ -227,113 +277,9 @@ def pressures_of_fall(
     return end + left, end
 
 
-def _at_end(time: Floats, values: Floats, end: float) -> float:
-    """Value at a time [s] of the straight line through the samples beside it."""
-    if values.size < 2:
-        return float(values[0])
-    return float(np.polyfit(time - end, values, 1)[1])
-
-
-@dataclass(frozen=True, slots=True)
-class _LeakDecay:
-    """The closed chambers of one recording, with the names of the numbers that are sought of it alone."""
-
-    chambers: _ClosedChambers
-    number: int
-
-    @property
-    def sensors(self) -> tuple[str, str]:
-        """Channels of the fuller chamber and of the other."""
-        fuller = self.chambers.fuller
-        return f"pressure_{fuller}", f"pressure_{3 - fuller}"
-
-    @property
-    def fitted(self) -> list[tuple[str, Floats]]:
-        """The pressures [Pa] that are fitted, with their channels: the one of a room is not."""
-        pairs = zip(self.sensors, (self.chambers.first, self.chambers.second), strict=True)
-        return [pair for place, pair in enumerate(pairs) if place != self.chambers.room]
-
-    @property
-    def difference(self) -> Floats:
-        """Pressure difference [Pa]."""
-        return self.chambers.first - self.chambers.second
-
-    @property
-    def ends(self) -> tuple[float, float]:
-        """Pressure difference at the start and at the end [Pa], each a mean over the samples of an edge.
-
-        Taken from straight lines through them, so that an edge in which the difference falls does not shorten the fall.
-        """
-        edge, difference, time = self.chambers.edge, self.difference, self.chambers.time
-        return _at_end(time[:edge], difference[:edge], time[0]), _at_end(time[-edge:], difference[-edge:], time[-1])
-
-    def start_of(self, sensor: str) -> str:
-        """Name of the pressure of a chamber at the start [Pa]."""
-        return f"start of {sensor}, decay {self.number}"
-
-    def relaxation_of(self, sensor: str) -> str:
-        """Name of the share by which a pressure is off just after filling [-]."""
-        return f"relaxation of {sensor}, decay {self.number}"
-
-    def numbers(self) -> Iterator[FitVariable]:
-        """Yield the unknowns: initial pressures, the room's within its noise, and initial offsets of the readings."""
-        chambers = self.chambers
-        pairs = zip(self.sensors, (chambers.first, chambers.second), strict=True)
-        for place, (sensor, values) in enumerate(pairs):
-            size = max(abs(chambers.changes[chambers.changing]), float(np.std(np.diff(values))), 1.0)
-            found = sought(self.start_of(sensor), float(values[: chambers.edge].mean()), 1.0, scale=size)
-            if place == chambers.room:
-                found = replace(found, start=float(values.mean()), deviation=max(float(values.std()), 1.0))
-            yield found
-        for sensor, _ in self.fitted:
-            yield from within(self.relaxation_of(sensor), _MOST_RELAXED)
-
-    def halves(self) -> list[str]:
-        """Return for each sample of a pressure whether the difference has fallen by less than half or by more."""
-        first, last = self.ends
-        difference = self.difference
-        half = int(np.argmax(difference < 0.5 * (first + last)))
-        return ["the early fall"] * half + ["the late fall"] * (difference.size - half)
-
-
-@dataclass(frozen=True, slots=True)
-class _DecayLaw:
-    """The pressures of all decays as one leak makes them, out of a chamber of a volume [m^3] or of 1 m^3."""
-
-    opening: Opening
-    paths: Paths
-    volume: float
-    decays: tuple[_LeakDecay, ...]
-
-    @property
-    def longest(self) -> float:
-        """Time of the longest decay [s]."""
-        return max(float(decay.chambers.time[-1]) for decay in self.decays)
-
-    def __call__(self, at: Values) -> Floats:
-        """Return the fitted pressures [Pa], one after the other."""
-        gas = self.opening.gas
-        # Flow goes with 1 / sqrt(T), the pressure that it makes with T.
-        warm = gas.specific_gas_constant * np.sqrt(gas.temperature * (gas.temperature + at[TEMPERATURE]))
-        rate = warm * (1.0 + at[GAS_LAW]) / (self.volume * (1.0 + at[_VOLUME]))
-        relaxed = self.longest / _RELAXED * math.exp(at[_RELAXATION])
-        return np.concatenate([part for decay in self.decays for part in self._pressures(decay, at, rate, relaxed)])
-
-    def _pressures(self, decay: _LeakDecay, at: Values, rate: float, relaxed: float) -> Iterator[Floats]:
-        chambers = decay.chambers
-        first, second = (at[decay.start_of(sensor)] for sensor in decay.sensors)
-        ratio = at[_RATIO] if chambers.room is None else 0.0 if chambers.room == 1 else math.inf
-        falls = pressures_of_fall(self.opening, self.paths.sizes(at), first, second, ratio, rate, chambers.time)
-        faded = np.exp(-chambers.time / relaxed)
-        for place, (sensor, pressure) in enumerate(zip(decay.sensors, falls, strict=True)):
-            if place == chambers.room:
-                continue
-            yield pressure * (1.0 + at[decay.relaxation_of(sensor)] * faded) + at[f"zero of {sensor}"]
-
-
 def _decaying_leak(
     sources: tuple[RecordingSource, ...],
-    closed: tuple[_ClosedChambers, ...],
+    decays: tuple[_ClosedChambers, ...],
     opening: Opening,
     size: ReportedNumber,
     volumes: tuple[float | None, float | None],
@@ -341,35 +287,62 @@ def _decaying_leak(
     tolerances: Tolerances,
     confidence: float,
 ) -> BenchResult:
-    fuller = closed[0].fuller
+    fuller = decays[0].fuller
     # The chamber whose pressure says how much leaks: the one that empties, or that fills from a room.
-    chamber = fuller if closed[0].changing == 0 else 3 - fuller
+    chamber = fuller if decays[0].changing == 0 else 3 - fuller
     volume, other_volume = volumes if chamber == 1 else volumes[::-1]
     if volume is None:
+        # Only the ratio of the size to the volume is known.
         size, opening = _over_volume(size, chamber), replace(opening, known=1.0)
-    paths, reported, start, alone = _sought(size, volume is not None, closed, opening, volume or 1.0)
-    decays = tuple(_LeakDecay(chambers, number) for number, chambers in enumerate(closed, start=1))
-    law = _DecayLaw(opening, paths, volume or 1.0, decays)
+    # Without one the chamber is taken to have 1 m^3.
+    emptied = volume or 1.0
+    paths, reported, start, alone = _sought(size, volume is not None, decays, opening, emptied)
+    longest = max(float(decay.time[-1]) for decay in decays)
+
+    def law(at: Values) -> Floats:
+        gas, fitted = opening.gas, list[Floats]()
+        # Flow goes with 1 / sqrt(T), the pressure that it makes with T.
+        warm = gas.specific_gas_constant * np.sqrt(gas.temperature * (gas.temperature + at[TEMPERATURE]))
+        rate = warm * (1.0 + at[GAS_LAW]) / (emptied * (1.0 + at[_VOLUME]))
+        relaxed = longest / _RELAXED * math.exp(at[_RELAXATION])
+        for decay in decays:
+            first, second = (at[decay.start_of(sensor)] for sensor, _ in decay.sensors)
+            ratio = at[_RATIO] if decay.room is None else 0.0 if decay.room == 1 else math.inf
+            falls = pressures_of_fall(opening, paths.sizes(at), first, second, ratio, rate, decay.time)
+            faded = np.exp(-decay.time / relaxed)
+            for place, ((sensor, _), pressure) in enumerate(zip(decay.sensors, falls, strict=True)):
+                if place != decay.room:
+                    offset = 1.0 + at[decay.relaxation_of(sensor)] * faded
+                    fitted.append(pressure * offset + at[f"zero of {sensor}"])
+        return np.concatenate(fitted)
+
     numbers = (
         *paths.sought(start, alone),
-        *_ratio(closed, volume, other_volume, volume_deviation),
+        *_ratio(decays, volume, other_volume, volume_deviation),
         *(number for decay in decays for number in decay.numbers()),
         # Of the logarithm of a time, for only its order of magnitude is known.
         FitVariable(_RELAXATION, 0.0, -5.0, math.log(_RELAXED), 1.0, 1.5),
         *gas_tolerances(opening.gas, tolerances),
         *tolerance(_VOLUME, volume_deviation if volume else 0.0),
-        *(zero for sensor in decays[0].sensors for zero in within(f"zero of {sensor}", tolerances.zero_of_pressure)),
+        *(zero for sensor, _ in decays[0].sensors for zero in within(f"zero of {sensor}", tolerances.zero_of_pressure)),
     )
-    readings = _readings(sources, decays)
+    series = [(sensor, values, decay) for decay in decays for sensor, values in decay.fitted]
+    readings = PooledReadings(
+        np.concatenate([values for _, values, _ in series]),
+        [sensor for sensor, values, _ in series for _ in range(values.size)],
+        recordings_of(sources, [decay.time.size * len(decay.fitted) for decay in decays]),
+        # A law that is wrong parts early from late falls.
+        ([half for _, _, decay in series for half in decay.halves()],),
+    )
     found, model = solve(law, readings, numbers, confidence)
-    times = [decay.chambers.time for decay in decays for _ in decay.fitted]
+    times = [decay.time for _, _, decay in series]
     time, parts = np.concatenate(times), np.split(model, np.cumsum([one.size for one in times])[:-1])
     curves = zip(times, parts, strict=True)
     marks = [
         readings_mark("measured", time, readings.measured),
         *(curve_mark("" if number else opening.law, *curve) for number, curve in enumerate(curves)),
     ]
-    is_room = all(chambers.room is not None for chambers in closed)
+    is_room = all(decay.room is not None for decay in decays)
     room = (f"the pressure in chamber {3 - chamber} is constant, so it is treated as a room",) if is_room else ()
     fall = max(1.0 - last / first for first, last in (decay.ends for decay in decays))
     return result_of(
@@ -377,7 +350,7 @@ def _decaying_leak(
         sources,
         found,
         reported,
-        f"{count_of(len(closed), 'decay')} of up to {law.longest:.3g} s; the pressure difference falls by {fall:.1%}",
+        f"{count_of(len(decays), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}",
         with_residuals(
             "Closed chambers", TIME, Kind("Pressure", "Pa_a", "pressure"), marks, time, readings.measured - model
         ),
@@ -395,10 +368,10 @@ def _over_volume(size: ReportedNumber, fuller: int) -> ReportedNumber:
 
 
 def _ratio(
-    closed: tuple[_ClosedChambers, ...], volume: float | None, other: float | None, deviation: float
+    decays: tuple[_ClosedChambers, ...], volume: float | None, other: float | None, deviation: float
 ) -> tuple[FitVariable, ...]:
     """Return the ratio of the volumes [m^3], each known to the relative deviation or sought; none beside a room."""
-    changes = [chambers.changes for chambers in closed if chambers.room is None]
+    changes = [decay.changes for decay in decays if decay.room is None]
     if not changes:
         return ()
     if volume and other:
@@ -406,31 +379,20 @@ def _ratio(
     return (sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in changes])), 1.0e-3), 1.0e-6),)
 
 
-def _readings(sources: tuple[RecordingSource, ...], decays: tuple[_LeakDecay, ...]) -> PooledReadings:
-    """Return the fitted pressures with their sensors and recordings, early and late falls apart."""
-    series = [(sensor, values, decay) for decay in decays for sensor, values in decay.fitted]
-    return PooledReadings(
-        np.concatenate([values for _, values, _ in series]),
-        [sensor for sensor, values, _ in series for _ in range(values.size)],
-        recordings_of(sources, [decay.difference.size * len(decay.fitted) for decay in decays]),
-        ([half for _, _, decay in series for half in decay.halves()],),
-    )
-
-
 def _sought(
     size: ReportedNumber,
     has_volume: bool,
-    closed: tuple[_ClosedChambers, ...],
+    decays: tuple[_ClosedChambers, ...],
     opening: Opening,
     emptied: float,
 ) -> tuple[Paths, tuple[ReportedNumber, ...], OpeningSizes, OpeningSizes]:
     """Return the numbers of a leak from closed chambers: paths, what is reported, the start, and each part alone."""
     gas = opening.gas
     rate = gas.specific_gas_constant * gas.temperature / emptied
-    rough = _rough_size(closed, opening, OpeningSizes(1.0), rate)
+    rough = _rough_size(decays, opening, OpeningSizes(1.0), rate)
     if opening.law != "both":
         return Paths(size.path), (size,), OpeningSizes(rough), OpeningSizes(rough)
-    laminar = _rough_size(closed, opening, OpeningSizes(0.0, beside=1.0), rate)
+    laminar = _rough_size(decays, opening, OpeningSizes(0.0, beside=1.0), rate)
     beside = replace(_beside(has_volume), size=laminar)
     # Half of the fall each: the search finds how much of it is whose.
     start, alone = OpeningSizes(0.5 * rough, beside=0.5 * laminar), OpeningSizes(rough, beside=laminar)
@@ -445,10 +407,10 @@ def _beside(has_volume: bool) -> ReportedNumber:
     return ReportedNumber("vane_leak.coefficient_over_volume", "kg/(s Pa^2 m^3)", f"{text}, over the volume")
 
 
-def _rough_size(closed: tuple[_ClosedChambers, ...], opening: Opening, unit: OpeningSizes, rate: float) -> float:
+def _rough_size(decays: tuple[_ClosedChambers, ...], opening: Opening, unit: OpeningSizes, rate: float) -> float:
     """Return how many times a ``unit`` of the opening makes the first pressure fall as it does on average; above 0."""
     found = []
-    for item in closed:
+    for item in decays:
         flow = float(np.mean(opening.flow(unit, item.first, item.second)))
         scatter = float(np.std(np.diff((item.first, item.second)[item.changing])))
         # Of a chamber that holds, what its noise would hide.
@@ -469,9 +431,9 @@ def _steady_leak(
         check_not_clipped(source, PROCEDURE, "mass_flow", "pressure_1", source.recording["pressure_1"])
     first, second, flow = (pool(sources, name) for name in STEADY)
     check_no_wrong_reading(sources, PROCEDURE, "mass_flow", (first, second), np.ones(flow.size, dtype=bool))
-    read = meter_readings(sources, PROCEDURE, first - second, tolerances.zero_of_flow)
-    first, second, flow = (each[read.possible] for each in (first, second, read.flow))
-    names = [name for name, is_kept in zip(recordings_of(sources), read.possible.tolist(), strict=True) if is_kept]
+    flow, is_possible, remarks = meter_readings(sources, PROCEDURE, first - second, tolerances.zero_of_flow)
+    first, second, flow = (each[is_possible] for each in (first, second, flow))
+    names = [name for name, is_kept in zip(recordings_of(sources), is_possible.tolist(), strict=True) if is_kept]
     difference = first - second
     # A leak of another law parts low from high pressures.
     is_high = difference > np.median(difference)
@@ -500,5 +462,5 @@ def _steady_leak(
         f"{flow.size} steady readings; scatter {scatter:.2%} of the largest flow",
         with_residuals("Steady leak", *axes, marks, difference, flow - model),
         _REMEDY.format(NEXT_LAW[opening.law]),
-        read.remarks,
+        remarks,
     )

@@ -52,10 +52,10 @@ def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExper
 
     IdentificationError for a candidate without noise in a channel that can be fitted.
     """
-    return tuple(sorted((_expect(fit, one) for one in candidates), key=lambda one: -one.gain))
+    return tuple(sorted((_benefit(fit, one) for one in candidates), key=lambda one: -one.gain))
 
 
-def _expect(fit: TrajectoryFit, candidate: CandidateExperiment) -> ExpectedBenefit:
+def _benefit(fit: TrajectoryFit, candidate: CandidateExperiment) -> ExpectedBenefit:
     noise = dict(candidate.noise) or dict(fit.fit.noise)
     if not noise or any(name not in FITTED_CHANNELS or not one > 0.0 for name, one in noise.items()):
         raise IdentificationError(

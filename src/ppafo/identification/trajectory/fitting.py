@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,13 +11,11 @@ from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
 from ppafo.identification.fit import fit as fit_residuals
 from ppafo.identification.residuals import ResidualBlock
-from ppafo.identification.trajectory.experiment import FittedExperiment
 from ppafo.identification.trajectory.numbers import ZERO_OF, FitNumber, broken_rule, full_path, reach_of, with_numbers
 from ppafo.identification.trajectory.problem import TrajectoryProblem, numbers_of
 from ppafo.identification.trajectory.runs import (
     FitChannel,
     Floats,
-    PreparedExperiment,
     blocks_of,
     numbers_in,
     prepare,
@@ -124,7 +121,12 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     numbers = numbers_of(problem)
     free = [number.free for number in numbers]
     start = np.array([number.start for number in free])
-    runs = tuple(_prepared(experiment, numbers, start) for experiment in problem.experiments)
+    runs = tuple(
+        prepare(
+            one, numbers_in(one.label, numbers, start), reach_of([item for item in numbers if item.acts_in(one.label)])
+        )
+        for one in problem.experiments
+    )
     report(Progress(f"trajectory fit: {len(free)} numbers, {len(runs)} recordings"))
     blocks = blocks_of(runs, numbers, start)
     fitted = fit_residuals(
@@ -136,14 +138,20 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         is_motion=True,
     )
     conflict = conflict_in_words(fitted, "the model is incomplete") or _wandering(fitted, numbers)
-    sought = {row: number for row, number in enumerate(numbers) if not number.is_tolerance}
-    tolerated = {row: number for row, number in enumerate(numbers) if number.is_tolerance}
-    estimates = tuple(_estimate(problem, fitted, number, row, conflict) for row, number in sought.items())
-    errors = np.sqrt(np.diag(fitted.covariance))
     # Tolerances are marginalised: their rows are left out, their share of the variance stays.
-    rows = list(sought)
+    rows = [row for row, number in enumerate(numbers) if not number.is_tolerance]
+    estimates = tuple(_estimate(problem, fitted, numbers[row], row, conflict) for row in rows)
+    errors = np.sqrt(np.diag(fitted.covariance))
     covariance = fitted.covariance[np.ix_(rows, rows)]
-    fitted_runs = _fitted_runs(problem, runs, numbers, fitted)
+    models, measurements, channels = list[Recording](), list[Recording](), list[ChannelFit]()
+    signals = signals_of(runs, numbers, fitted.values[:, None])
+    for experiment, run, columns in zip(problem.experiments, runs, signals, strict=True):
+        modelled = {name: Channel(column[:, 0], CHANNELS[name].unit) for name, column in columns.items()}
+        samples = {channel.name: Channel(channel.values, CHANNELS[channel.name].unit) for channel in run.channels}
+        models.append(Recording(f"model of {run.label}", run.time, modelled, kind="simulated"))
+        measurements.append(Recording(experiment.label, run.time, samples, kind=experiment.recording.kind))
+        channels += (_channel(fitted, run.label, channel, columns[channel.name][:, 0]) for channel in run.channels)
+    scenarios = tuple(with_numbers(run.scenario, numbers_in(run.label, numbers, fitted.values)) for run in runs)
     return TrajectoryFit(
         problem=problem,
         numbers=numbers,
@@ -151,59 +159,35 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         estimates=estimates,
         covariance=covariance,
         correlation=covariance / np.outer(errors[rows], errors[rows]),
-        known=tuple(_known(fitted, number, row, float(errors[row]), estimates) for row, number in tolerated.items()),
-        channels=tuple(channel for run in fitted_runs for channel in run.channels),
-        models=tuple(run.model for run in fitted_runs),
-        measurements=tuple(run.measurement for run in fitted_runs),
-        scenarios=tuple(run.scenario for run in fitted_runs),
+        known=tuple(
+            _known(fitted, number, row, float(errors[row]), estimates)
+            for row, number in enumerate(numbers)
+            if number.is_tolerance
+        ),
+        channels=tuple(channels),
+        models=tuple(models),
+        measurements=tuple(measurements),
+        scenarios=scenarios,
         conflict=conflict,
-        remarks=_remarks(fitted, fitted_runs, estimates),
+        remarks=_remarks(fitted, scenarios, estimates),
         outliers=tuple(_left_out(fitted, blocks, {run.label: run.time for run in runs})),
     )
 
 
-def _prepared(experiment: FittedExperiment, numbers: tuple[FitNumber, ...], start: Floats) -> PreparedExperiment:
-    """Return an experiment with all that its runs have in common, at the numbers from which the search starts."""
-    acting = [number for number in numbers if number.acts_in(experiment.label)]
-    return prepare(experiment, numbers_in(experiment.label, numbers, start), reach_of(acting))
-
-
-class _FittedRun(NamedTuple):
-    """An experiment with the fitted numbers: its scenario, the model and the samples, and what is left of each."""
-
-    scenario: Scenario
-    model: Recording
-    measurement: Recording
-    channels: tuple[ChannelFit, ...]
-
-
-def _fitted_runs(
-    problem: TrajectoryProblem, runs: tuple[PreparedExperiment, ...], numbers: tuple[FitNumber, ...], fitted: Fit
-) -> list[_FittedRun]:
-    """Return every experiment with the fitted numbers, in the order of the problem."""
-    fitted_runs = []
-    signals = signals_of(runs, numbers, fitted.values[:, None])
-    for experiment, run, columns in zip(problem.experiments, runs, signals, strict=True):
-        modelled = {name: Channel(column[:, 0], CHANNELS[name].unit) for name, column in columns.items()}
-        samples = {channel.name: Channel(channel.values, CHANNELS[channel.name].unit) for channel in run.channels}
-        fitted_runs.append(
-            _FittedRun(
-                scenario=with_numbers(run.scenario, numbers_in(run.label, numbers, fitted.values)),
-                model=Recording(f"model of {run.label}", run.time, modelled, kind="simulated"),
-                measurement=Recording(experiment.label, run.time, samples, kind=experiment.recording.kind),
-                channels=tuple(
-                    _channel(fitted, run.label, channel, columns[channel.name][:, 0]) for channel in run.channels
-                ),
-            )
-        )
-    return fitted_runs
-
-
-def _remarks(fitted: Fit, runs: Sequence[_FittedRun], estimates: Sequence[Estimate]) -> tuple[str, ...]:
+def _remarks(fitted: Fit, scenarios: Sequence[Scenario], estimates: Sequence[Estimate]) -> tuple[str, ...]:
     """Return what a fitted device breaks of the rules of devices, and that the search did not converge."""
-    remarks = [text for text in dict.fromkeys(broken_rule(run.scenario.device) for run in runs) if text]
+    remarks = [text for text in dict.fromkeys(broken_rule(scenario.device) for scenario in scenarios) if text]
     if fitted.edge:
-        remarks.append(_at_edge(fitted.edge, estimates))
+        wanted, bounds = [], []
+        for estimate in (one for one in estimates if one.path in fitted.edge):
+            side = fitted.edge[estimate.path]
+            wanted.append(f"{estimate.path} {'above' if side > 0 else 'below'} {_in_unit(estimate.value, estimate)}")
+            inside = estimate.value - side * _INSIDE * abs(estimate.value)
+            bounds.append(f'{"high" if side > 0 else "low"} = "{_in_unit(inside, estimate)}" of {estimate.path}')
+        remarks.append(
+            f"the recordings favour {' and '.join(wanted)}, where no run succeeds; check recordings, scenario and set, "
+            f"or give {' and '.join(bounds)}, and the fit ends there as at a bound"
+        )
     elif not fitted.has_converged:
         starts = ", ".join(f'start = "{_in_unit(each.value, each)}" of {each.path}' for each in estimates)
         remarks.append(
@@ -211,20 +195,6 @@ def _remarks(fitted: Fit, runs: Sequence[_FittedRun], estimates: Sequence[Estima
             "where it ended"
         )
     return tuple(remarks)
-
-
-def _at_edge(edge: Mapping[str, int], estimates: Sequence[Estimate]) -> str:
-    """Return the numbers that end where no run succeeds beyond them, and the bounds with which a fit ends before."""
-    wanted, bounds = [], []
-    for estimate in (one for one in estimates if one.path in edge):
-        side = edge[estimate.path]
-        wanted.append(f"{estimate.path} {'above' if side > 0 else 'below'} {_in_unit(estimate.value, estimate)}")
-        inside = estimate.value - side * _INSIDE * abs(estimate.value)
-        bounds.append(f'{"high" if side > 0 else "low"} = "{_in_unit(inside, estimate)}" of {estimate.path}')
-    return (
-        f"the recordings favour {' and '.join(wanted)}, where no run succeeds; check recordings, scenario and set, or "
-        f"give {' and '.join(bounds)}, and the fit ends there as at a bound"
-    )
 
 
 def _left_out(fitted: Fit, blocks: Sequence[ResidualBlock], times: Mapping[str, Floats]) -> Iterator[str]:
@@ -252,25 +222,10 @@ def _known(fitted: Fit, number: FitNumber, row: int, error: float, estimates: Se
     name, free = number.free.name, number.free
     shares = {estimate.path: dict(fitted.shares[estimate.path]).get(name, 0.0) for estimate in estimates}
     widens = max(shares, key=lambda path: shares[path], default="")
-    before, before_error = _in_its_unit(number, free.start, free.deviation)
-    after, after_error = _in_its_unit(number, float(fitted.values[row]), error)
-    return NuisanceParameter(
-        name=name,
-        unit=number.unit,
-        before=before,
-        before_error=before_error,
-        after=after,
-        after_error=after_error,
-        widens=widens,
-        share=shares.get(widens, 0.0),
-    )
-
-
-def _in_its_unit(number: FitNumber, value: float, error: float) -> tuple[float, float]:
-    """Return a number and its standard error in its unit [SI]; the fit may have moved its logarithm."""
-    if not number.is_logarithm:
-        return value, error
-    return math.exp(value), math.exp(value) * error
+    known = [(free.start, free.deviation), (float(fitted.values[row]), error)]
+    if number.is_logarithm:
+        known = [(math.exp(value), math.exp(value) * deviation) for value, deviation in known]
+    return NuisanceParameter(name, number.unit, *known[0], *known[1], widens, shares.get(widens, 0.0))
 
 
 def _wandering(fitted: Fit, numbers: tuple[FitNumber, ...]) -> str:
@@ -330,17 +285,7 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
         for experiment in problem.experiments
         if number.acts_in(experiment.label)
     )
-    return Estimate(
-        path=name,
-        value=value,
-        unit=number.unit,
-        low=low,
-        high=high,
-        verdict=verdict,
-        explanation=text,
-        recordings=recordings,
-        confidence=problem.confidence,
-    )
+    return Estimate(name, value, number.unit, low, high, verdict, text, recordings, problem.confidence)
 
 
 def _channel(fitted: Fit, experiment: str, measured: FitChannel, model: Floats) -> ChannelFit:

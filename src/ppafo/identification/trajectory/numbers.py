@@ -172,8 +172,21 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
     path = paths.pop()
     quantity = [declaration_of(path, scenario) for scenario in scenarios][-1]
     for experiment in experiments:
-        _check_has_effect(parameter, path, experiment)
-    start = _start_in(path, experiments[0]) if parameter.start is None else parameter.start
+        # What the run follows as it was recorded no number moves.
+        followed = dict.fromkeys(supply_paths(experiment.scenario.device), SUPPLY)
+        if DORSIFLEXION_SUPPLY in experiment.inputs:
+            followed["plant.dorsiflexion_pressure"] = DORSIFLEXION_SUPPLY
+        channel = EXTERNAL_TORQUE if path == "motion.external_torque" else followed.get(_SUPPLIES.get(path, ""))
+        if channel in experiment.inputs:
+            raise IdentificationError(
+                f"{parameter.name}: the run of experiment '{experiment.label}' follows the recorded '{channel}', so "
+                "this number has no effect in it; omit one of the two"
+            )
+    start = parameter.start
+    if start is None:
+        # Of how a run begins the recording may say more than the scenario.
+        is_state = path.partition(".")[0] in _STATE
+        start = number_at(scenario_of(experiments[0]) if is_state else scenarios[0], path)
     low, high = _bounds(parameter, path, start, quantity)
     _check_bounds(parameter, start, low, high, quantity)
     if parameter.is_logarithm:
@@ -185,26 +198,6 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
     free = FitVariable(full_path(parameter.name, scenarios[0]), start, low, high, scale, parameter.deviation)
     unit = quantity.unit.removesuffix("_a").removesuffix("_d") or "-"
     return FitNumber(path, unit, free, parameter.recordings, parameter.is_tolerance, parameter.is_logarithm)
-
-
-def _check_has_effect(parameter: FreeParameter, path: str, experiment: FittedExperiment) -> None:
-    """Raise IdentificationError for a number whose recording the run of an experiment follows in its place."""
-    followed = dict.fromkeys(supply_paths(experiment.scenario.device), SUPPLY)
-    if DORSIFLEXION_SUPPLY in experiment.inputs:
-        followed["plant.dorsiflexion_pressure"] = DORSIFLEXION_SUPPLY
-    channel = EXTERNAL_TORQUE if path == "motion.external_torque" else followed.get(_SUPPLIES.get(path, ""))
-    if channel in experiment.inputs:
-        raise IdentificationError(
-            f"{parameter.name}: the run of experiment '{experiment.label}' follows the recorded '{channel}', so "
-            "this number has no effect in it; omit one of the two"
-        )
-
-
-def _start_in(path: str, experiment: FittedExperiment) -> float:
-    """Return the number [SI] from which a search starts that says none itself."""
-    # Of how a run begins the recording may say more than the scenario.
-    is_state = path.partition(".")[0] in _STATE
-    return number_at(scenario_of(experiment) if is_state else experiment.scenario, path)
 
 
 def _bounds(parameter: FreeParameter, path: str, start: float, quantity: Quantity) -> tuple[float, float]:

@@ -30,7 +30,7 @@ from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
 from ppafo.parameters.plant import switches_of
 from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus, resolution_of, rounding_of
-from ppafo.simulation.plan import plan_run, plan_runs
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, SUPPLY
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_prescribed_angle
 from ppafo.simulation.scenario import FreeMotion, Scenario
@@ -291,7 +291,7 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
             f"{said}: an effect was switched on or off by the fit, which is another model; give a start and a lower "
             f"bound above 0"
         )
-    planned, _ = plan_runs(scenario)
+    planned, _ = scenario.motion.motion_kind.plan(scenario)
     # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
     supplied = planned.plant
 

@@ -74,7 +74,8 @@ class ActuatorKind:
     ``settings`` is a NamedTuple class that declares the numbers, each an ``Annotated[float, Number(...)]``.
 
     ``problem(settings, range)`` says in words what of the numbers does not fit together; empty where all of it does,
-    None where the declared limits say all.
+    None where the declared limits say all. ``has_one_chamber(table)`` is true where chamber 2 is nothing but its dead
+    volume, in an actuator with a table (None without one).
     """
 
     name: str
@@ -82,6 +83,7 @@ class ActuatorKind:
     settings: type
     model: ActuatorModel
     problem: Callable[[Any, Range], str] | None = None
+    has_one_chamber: Callable[[Any], bool] = lambda _: False
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

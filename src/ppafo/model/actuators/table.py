@@ -241,6 +241,12 @@ def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: floa
     return active_1 + active_2 - shape.stiffness * (angle - shape.rest_angle)
 
 
+def has_one_chamber(table: Table) -> bool:
+    """True where the volume of chamber 2 is 0 at every angle and pressure."""
+    curves = (table.chamber_2.lowest, *(rise.gain for rise in table.chamber_2.rises))
+    return not any(number for curve in curves for number in (*curve.powers, *curve.bends))
+
+
 class TableSettings(NamedTuple):
     """Settings of an actuator by table: what its material does without pressure."""
 
@@ -267,4 +273,5 @@ KIND = ActuatorKind(
     settings=TableSettings,
     # The file is judged where it is read.
     model=ActuatorModel(Measured, prepare, chambers, pressures, torque, table=Table),
+    has_one_chamber=has_one_chamber,
 )

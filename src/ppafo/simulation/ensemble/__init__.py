@@ -12,6 +12,7 @@ from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError
 from ppafo.metrics import MetricKind, metric_kind
 from ppafo.model.controlled import CONTROLLED
+from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.check import MARGIN, finer
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
@@ -128,6 +129,8 @@ def _check_channel(base: Scenario, name: str) -> None:
         raise ScenarioError(f"{base.name}: there is no '{name}' to trace: reference.of is '{base.controlled}'")
     if name == CONTROLLED[controlled].reference and base.controller.is_open_loop:
         raise ScenarioError(f"{base.name}: a constant command follows no reference, so there is none to trace")
+    if name in OF_SECOND_CHAMBER and base.device.actuator.has_one_chamber:
+        raise ScenarioError(f"{base.name}: there is no '{name}' to trace: {base.device.name} has one chamber")
     if name.startswith("temperature_") and base.gas_model is None:
         raise ScenarioError(f"{base.name}: '{name}' needs gas with an energy balance ([gas_model] kind = \"thermal\")")
 

@@ -20,7 +20,6 @@ from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import ScenarioColumns
 from ppafo.simulation.motion_kind import MotionKind, RunTimes
 from ppafo.simulation.numbers import declared_numbers, with_numbers
-from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_text
 
@@ -143,7 +142,7 @@ def _plan_batches(
     """Batches of some runs that ask for one program; what cannot be planned is refused."""
     part = screen.at(places)
     while part.members.size:
-        run, problems = plan_runs(part.scenario)
+        run, problems = part.scenario.motion.motion_kind.plan(part.scenario)
         bad = [problem for problem in problems if np.any(problem[0])]
         if not bad:
             run = run if change is None else change(run)
@@ -174,8 +173,9 @@ def _inconsistent(scenario: Scenario) -> tuple[Problem, ...]:
         first, second = operator.attrgetter(path, other)(scenario.device)
 
         def line(run: int) -> str:
-            unit = declared_numbers(scenario)[path].unit
-            return f"{path} = {at(first, run):.9g} {unit} must be {relation} {other} = {at(second, run):.9g} {unit}"
+            unit, room = declared_numbers(scenario)[path].unit, at(scenario.device.supply.atmospheric_pressure, run)
+            number, limit = (shown_text(at(value, run), unit, ".9g", room) for value in (first, second))
+            return f"{path} = {number} must be {relation} {other} = {limit}"
 
         return np.logical_not(holds), line
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.control.kind import ControllerKind
-from ppafo.metrics.metric import has_reference
+from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
@@ -124,25 +124,41 @@ class Tracking:
 
 def tracking_in(result: "RecordedResult") -> Tracking | None:
     """Verdict on a result; None where it follows its reference, or has none."""
-    scenario, metrics = result.scenario, {name: metric.value for name, metric in result.metrics.items()}
+    return tracking_of(result.scenario, result.scenario.law, result.recording, *_reversals_and_stride(result))
+
+
+@in_units(lambda result: result.scenario.device.shown)
+def following_text(result: "RecordedResult") -> str:
+    """Sentence on a result that follows its reference, with its RMS error; "" where it does not, or is not judged."""
+    scenario = result.scenario
+    judged = _judged(scenario, scenario.law, result.recording, *_reversals_and_stride(result))
+    if judged is None or judged[0].failure is not None:
+        return ""
+    settled, controlled = judged[0].settled, CONTROLLED[scenario.controlled]
+    # On a ramp every loop is behind, and a walk whose law requests no torque has a peak alone.
+    if settled.ends_on_ramp or controlled_in(result.recording) is None:
+        return ""
+    error, wanted = (change_text(controlled.name, each) for each in (settled.error, settled.wanted))
+    since = f" from {settled.start:.3g} s on" if settled.start > 0.0 else ""
+    return f"the {controlled.words} follows its reference: RMS {error} of {wanted} wanted{since}"
+
+
+def _reversals_and_stride(result: "RecordedResult") -> tuple[float, float]:
+    """Reversals of the command in a result, and the duration of its strides [s], 0 for a task."""
+    metrics = {name: metric.value for name, metric in result.metrics.items()}
     strides, time = metrics.get("strides", 0.0), result.recording.time
-    stride_time = float(time[-1] - time[0]) / strides if strides > 0.0 else 0.0
-    return tracking_of(scenario, scenario.law, result.recording, metrics.get(REVERSALS, 0.0), stride_time)
+    return metrics.get(REVERSALS, 0.0), float(time[-1] - time[0]) / strides if strides > 0.0 else 0.0
 
 
-@in_units(lambda scenario, *_, **__: scenario.device.shown)
-def tracking_of(
-    scenario: Scenario, law: ControllerKind | None, recording: Recording, reversals: float, stride_time: float = 0.0
-) -> Tracking | None:
-    """Verdict on a recording whose command reversed so often; None where it follows its reference, or has none.
-
-    ``stride_time`` [s] is the duration of a stride of a walk, 0 for a task.
-    """
+def _judged(
+    scenario: Scenario, law: ControllerKind | None, recording: Recording, reversals: float, stride_time: float
+) -> tuple[Case, float] | None:
+    """Run with its kind of failure, if any, and its command reversals over the most; None where nothing is judged."""
     is_task = scenario.follows_reference
     if (
         len(recording) < _FEWEST_SAMPLES
         or scenario.controller.is_open_loop
-        or (is_task and not has_reference(recording))
+        or (is_task and controlled_in(recording) is None)
     ):
         return None
     limit = 0.0 if is_task else torque_limit(scenario.controller.settings)
@@ -161,8 +177,24 @@ def tracking_of(
     if failure is None and is_task and abs(settled.missing) > LARGEST_SHARE * settled.wanted:
         failure = "does not follow" if torque_beyond_reach(case) is not None else None
         case = case._replace(failure=failure)
-    if failure is None:
+    return case, turning
+
+
+@in_units(lambda scenario, *_, **__: scenario.device.shown)
+def tracking_of(
+    scenario: Scenario, law: ControllerKind | None, recording: Recording, reversals: float, stride_time: float = 0.0
+) -> Tracking | None:
+    """Verdict on a recording whose command reversed so often; None where it follows its reference, or has none.
+
+    ``stride_time`` [s] is the duration of a stride of a walk, 0 for a task.
+    """
+    judged = _judged(scenario, law, recording, reversals, stride_time)
+    if judged is None or (failure := judged[0].failure) is None:
         return None
+    case, turning = judged
+    settled, is_task = case.settled, scenario.follows_reference
+    limit = 0.0 if is_task else torque_limit(scenario.controller.settings)
+    duration = float(np.ptp(recording.time[[0, -1]]))
     cause, *others = causes_of_task(case) if is_task else causes_of_walk(case)
     return Tracking(
         kind=failure,

@@ -3,7 +3,7 @@
 import io
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -200,7 +200,8 @@ def _row(axes: "Axes", result: WalkResult, label: str, colour: str) -> None:
     axes.set_axis_off()
 
 
-class _StateBand(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class _StateBand:
     """State of a row: name, its short form for a narrow block, colour, and the test of a channel's values for it."""
 
     name: str

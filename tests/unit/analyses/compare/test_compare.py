@@ -159,7 +159,15 @@ def test_a_loop_that_oscillates_is_said_and_is_on_no_front() -> None:
     assert task.pareto_front == ["paper"]
     said = [text for text in finding.found.remarks if "the torque loop oscillates" in text]
     assert len(said) == 1
-    assert "device's: `controller.proportional_gain" in said[0]
+    assert "other controller.proportional_gain, controller.derivative_gain alone did not mend it" in said[0]
+
+
+def test_a_remedy_that_is_said_was_tried() -> None:
+    beyond = ppafo.load_scenario("torque-task-proportional", ["reference.level=9 N m"])
+    remarks = compare({"beyond": beyond, "paper": ppafo.load_scenario("torque-task-proportional")}).found.remarks
+    said = next(text for text in remarks if text.startswith("beyond"))
+    assert "with `supply.pressure = " in said
+    assert "it does, as a further run shows; it is not among the best" in said
 
 
 def test_mistakes_are_one_line() -> None:

@@ -1,0 +1,45 @@
+"""An actuator with one chamber: its second port is a dead volume, of which nothing is measured or shown."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ppafo
+from ppafo.errors import ScenarioError
+from ppafo.signals.recording import OF_SECOND_CHAMBER
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.scenario import Scenario
+
+BLADDER = Path(__file__).parents[2] / "actuators" / "measured-bladder.toml"
+
+
+@pytest.fixture(scope="module")
+def bladder() -> Scenario:
+    return ppafo.load_scenario("torque-task-proportional", [f"device.set={BLADDER}", "run.duration=0.2 s"])
+
+
+def test_a_single_chamber_has_no_second_pressure_and_gas(bladder: Scenario) -> None:
+    result = ppafo.simulate(bladder)
+    assert OF_SECOND_CHAMBER.isdisjoint(result.recording.names)
+    assert not {"gas_leaked", "gas_imbalance"} & set(result.metrics)
+    assert result.metrics["largest_pressure"].value == result.recording["pressure_1"].max()
+    assert "largest chamber pressure" in str(result)
+    names = [line.get_label() for axes in result.plot().axes for line in axes.lines]
+    assert not [name for name in names if "chamber" in str(name)]
+    assert result.check().is_determined
+
+
+def test_many_runs_of_a_single_chamber_find_what_one_finds(bladder: Scenario) -> None:
+    alone = ppafo.simulate(bladder).metrics["largest_pressure"].value
+    columns = {"supply.pressure": np.array([bladder.device.supply.pressure])}
+    many = run_ensemble(bladder, columns, ("largest_pressure", "gas_leaked"))
+    assert many.metrics["largest_pressure"].tolist() == [alone]
+    assert np.isnan(many.metrics["gas_leaked"]).all()
+    with pytest.raises(ScenarioError, match="no 'pressure_2' to trace: measured-bladder has one chamber"):
+        run_ensemble(bladder, columns, (), ("pressure_2",))
+
+
+def test_a_single_chamber_takes_no_reference_of_the_other() -> None:
+    with pytest.raises(ScenarioError, match=r"has one chamber; take reference.of = 'pressure_1'"):
+        ppafo.load_scenario("pressure-loop", [f"device.set={BLADDER}", "reference.of=pressure_2"])
