@@ -17,6 +17,7 @@ from ppafo.analyses.parts.question import parts as parts
 from ppafo.analyses.reproduce.answer import Reproduction as Reproduction
 from ppafo.analyses.reproduce.question import reproduce as reproduce
 from ppafo.analyses.sensitivity.question import sensitivity as sensitivity
+from ppafo.analyses.sets.audit import audit as audit
 from ppafo.analyses.sweep.answer import load_study_results as load_study_results
 from ppafo.analyses.sweep.results import StudyResults as StudyResults
 from ppafo.analyses.sweep.solve import sweep as sweep
@@ -51,7 +52,6 @@ from ppafo.parameters import apply_overrides as apply_overrides
 from ppafo.parameters import list_sets as list_sets
 from ppafo.parameters import load_device as load_device
 from ppafo.parameters import load_parameter_set as load_parameter_set
-from ppafo.parameters.audit import audit as audit
 from ppafo.parameters.device import Device as Device
 from ppafo.parameters.parts import Catalogue as Catalogue
 from ppafo.parameters.parts import Part as Part

@@ -17,7 +17,7 @@ from ppafo.errors import PpafoError
 from ppafo.gait import Gait
 from ppafo.gait.document import load_gait
 from ppafo.parameters import build_device, load_parameter_set
-from ppafo.parameters.audit import audit
+from ppafo.parameters.audit import findings_of
 from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.parameters.parts import load_catalogue
@@ -31,7 +31,7 @@ PACKAGE = resources.files("ppafo")
 
 def use_set(parameter_set: ParameterSet) -> None:
     """What every later step does with a set: its audit has a document, its valves have devices."""
-    json.dumps([finding.document() for finding in audit(parameter_set)], allow_nan=False)
+    json.dumps([finding.document() for finding in findings_of(parameter_set)], allow_nan=False)
     for valve in parameter_set.valve_kinds:
         build_device(parameter_set, valve)
 

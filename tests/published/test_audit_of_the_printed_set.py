@@ -3,9 +3,9 @@
 import pytest
 
 from ppafo.parameters import load_parameter_set
-from ppafo.parameters.audit import AuditFinding, audit
+from ppafo.parameters.audit import AuditFinding, findings_of
 
-FOUND = {finding.id: finding for finding in audit(load_parameter_set("ppafo2011-printed"))}
+FOUND = {finding.id: finding for finding in findings_of(load_parameter_set("ppafo2011-printed"))}
 
 
 def side(finding: AuditFinding, label: str) -> float:
@@ -132,6 +132,6 @@ def test_nothing_else_is_called_an_error() -> None:
 
 def test_the_completed_set_has_no_error_and_gives_a_reason_for_each_that_it_keeps() -> None:
     completed = load_parameter_set("ppafo2011")
-    found = audit(completed)
+    found = findings_of(completed)
     assert [finding.id for finding in found if finding.severity == "error"] == []
     assert {finding.id for finding in found if finding.accepted} == set(completed.accepted)

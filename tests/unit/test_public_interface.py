@@ -62,7 +62,7 @@ def test_a_plain_run_loads_nothing_of_walking() -> None:
 
 def test_public_functions_are_the_ones_of_their_modules() -> None:
     assert ppafo.simulate is importlib.import_module("ppafo.running").simulate
-    assert ppafo.audit is importlib.import_module("ppafo.parameters.audit").audit
+    assert ppafo.audit is importlib.import_module("ppafo.analyses.sets.audit").audit
 
 
 def test_three_lines_give_a_result_and_a_plot() -> None:

@@ -74,7 +74,7 @@ MADE: dict[str, Callable[[], Any]] = {
 IN_A_FOLDER: dict[str, Callable[[Path], Any]] = {
     "identify": _identified,
     "load_study_results": lambda folder: ppafo.load_study_results(
-        Path(ppafo.sweep(STUDY, draws=4, out=folder / "study").found.place.address)
+        ppafo.sweep(STUDY, draws=4, out=folder / "study").found.folder.path
     ),
     "read_recording": lambda folder: ppafo.read_recording(ppafo.simulate(TASK).save(folder / "run")),
     "read_result": lambda folder: ppafo.read_result(ppafo.simulate(TASK).save(folder / "run")),
@@ -106,6 +106,18 @@ def test_a_result_can_be_pickled_and_copied_and_still_prints_and_draws_itself(na
             assert other.plot().axes
         if isinstance(other, Finding):
             assert other.to_dict() == result.to_dict()
+
+
+def test_an_audit_is_a_finding_and_a_loop_over_it_goes_through_its_items(tmp_path: Path) -> None:
+    audited = ppafo.audit("ppafo2011-printed")
+    assert isinstance(audited, Finding)
+    assert not audited.passed
+    assert next(finding.severity for finding in audited) == "error"
+    assert tuple(audited) == audited.found.findings
+    audited.save(tmp_path / "audit")
+    assert "no changed value" not in (tmp_path / "audit" / "audit-ppafo2011-printed.txt").read_text()
+    with pytest.raises(TypeError, match="not iterable"):
+        iter(ppafo.bottle(gas_per_stride="0.3 g"))
 
 
 def _files() -> dict[str, Any]:

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
+from ppafo.engine.definitions import place_of
 from ppafo.engine.program import Program
-from ppafo.engine.source_text import place_of
 from ppafo.errors import ProgramError
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
 from ppafo.model.plant import PlantParameters, net_torque

@@ -6,7 +6,7 @@ A ``Finding`` is all that an analysis returns; text, JSON, page, figures and fol
 import html
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -192,6 +192,11 @@ class Finding(Generic[T_co]):
     def __str__(self) -> str:
         """Return what the command prints."""
         return text_of(self)
+
+    def __iter__(self) -> Iterator[Any]:
+        """Go through what was found, where that has items, as the findings of an audit; TypeError where it has none."""
+        found: Any = self.found
+        return iter(found)
 
     def __repr__(self) -> str:
         """Return what was found, and of what."""

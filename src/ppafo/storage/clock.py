@@ -9,6 +9,7 @@ import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
+from ppafo.storage.comma_separated import LONGEST_SHOWN
 from ppafo.wording import one_line
 
 DateOrder = Literal["day month", "month day"]
@@ -32,8 +33,6 @@ _SLASHED = re.compile(r"(\d{1,2})[/-](\d{1,2})[/-](\d{2,4})")
 _MONTHS = ("jan", "feb", "mar mär mrz", "apr", "may mai", "jun", "jul", "aug", "sep", "oct okt", "nov", "dec dez")
 _MONTH = {name: number for number, names in enumerate(_MONTHS, start=1) for name in names.split()}
 """Number of a month by the first three letters of its name, in English and German."""
-_LONGEST_SHOWN = 40
-"""Characters of a cell that a message repeats."""
 _PERIODS = (2.0**32 * 1.0e-6, 2.0**32 * 1.0e-3)
 """Seconds after which a counter of 32 bits begins again, of microseconds and of milliseconds."""
 _LARGEST_STEP = 10.0
@@ -86,7 +85,7 @@ def _stamp(cell: str, form: ClockForm | None, row: str) -> _Stamp:
     compact = _COMPACT.fullmatch(text)
     if compact is not None:
         text = f"{compact['date']} {compact['hour']}:{compact['minute']}:{compact['second']}{compact['rest']}"
-    shown = repr(text[:_LONGEST_SHOWN])
+    shown = repr(text[:LONGEST_SHOWN])
     match = _TIME.search(text)
     if match is None:
         raise DataError(f"{row}: {shown} is not a time of day such as '08:00:10,5'")
@@ -135,7 +134,7 @@ def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: Dat
         else:
             readings.append(np.array(days, dtype=np.float64))
     if not readings:
-        shown = words[unread_row][:_LONGEST_SHOWN]
+        shown = words[unread_row][:LONGEST_SHOWN]
         raise DataError(
             f"{rows[unread_row]}: {shown!r} is not a date such as '2026-03-21', '21.03.2026' or '03/21/2026'"
         )
@@ -144,7 +143,7 @@ def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: Dat
     since_first = [days - days[0] for days in growing]
     if len(since_first) > 1 and not np.array_equal(since_first[0], since_first[1]):
         raise DataError(
-            f"{rows[0]}: the date {words[0][:_LONGEST_SHOWN]!r} may begin with the day or with the month; give "
+            f"{rows[0]}: the date {words[0][:LONGEST_SHOWN]!r} may begin with the day or with the month; give "
             'date_order = "day month" or date_order = "month day"'
         )
     return growing[0]

@@ -19,6 +19,7 @@ from ppafo.errors import DataError, refused_as
 from ppafo.signals import RecordingKind
 from ppafo.signals.recording import TIME, Between, Floats
 from ppafo.storage.clock import ClockForm, DateOrder
+from ppafo.storage.comma_separated import LONGEST_SHOWN
 from ppafo.wording import nearest_name, one_line
 
 Thousands = Literal["point", "comma", "apostrophe", "blank"]
@@ -186,8 +187,6 @@ class MappedTable(NamedTuple):
     kind: RecordingKind
 
 
-LONGEST_SHOWN = 40
-"""Characters of a name or a cell that a message repeats."""
 _MOST_SHOWN = 20
 """Names that a message lists."""
 

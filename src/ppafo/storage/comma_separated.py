@@ -36,15 +36,6 @@ _LEVEL = "Pa_a"
 _ONLY_SIMULATED = "supplied_mass"
 
 
-def _own_columns() -> str:
-    """Return the remedy for columns of another form."""
-    named = argument_text("columns", "FILE.toml:NAME")
-    return (
-        f"; other columns are read through a column map: validate {named}, or columns = 'NAME' in a problem file of "
-        "identify"
-    )
-
-
 @dataclass(frozen=True, slots=True)
 class HeaderColumn:
     """Column as its header declares it: channel (or time), the unit of its numbers, interpolation between samples."""
@@ -74,14 +65,19 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
     for cell in cells:
         match = _HEADER.fullmatch(cell)
         if match is None:
-            shown = cell if len(cell) <= 40 else f"{cell[:36]} ..."
-            remedy = next((f"; {one} need a column map with {key}" for mark, one, key in _OTHERS if mark in cell), "")
-            known = CHANNELS.get(cell.strip())
-            if known is not None:
-                remedy = f": write '{cell.strip()} [{known.unit}]'"
+            bare, shown = cell.strip(), cell if len(cell) <= 40 else f"{cell[:36]} ..."
+            others = next((f"; {one} need a column map with {key}" for mark, one, key in _OTHERS if mark in cell), "")
+            if bare in CHANNELS:
+                remedy = f": write '{bare} [{CHANNELS[bare].unit}]'"
+            elif others or not bare:
+                remedy = others or "; does the line end with a comma?"
+            else:
+                named = argument_text("columns", "FILE.toml:NAME")
+                remedy = f"; other columns are read through a column map: validate {named}, or columns = 'NAME' in a "
+                remedy += "problem file of identify"
             raise DataError(
                 f"the header must name columns as 'name [unit]', separated by commas; '{one_line(shown)}' is not one"
-                f"{remedy or (_own_columns() if cell.strip() else '; does the line end with a comma?')}"
+                f"{remedy}"
             )
         name, unit, word = match[1], match[2], match[3]
         # Time itself does nothing between its samples.
@@ -108,10 +104,11 @@ def is_of_frame(cells: Sequence[str]) -> bool:
     return _ONLY_SIMULATED in names and names <= {TIME, *CHANNELS}
 
 
-def check_clock(time: Floats, lines: Sequence[int], noun: str = "line") -> None:
+def check_clock(time: Floats, lines: Sequence[int], noun: str = "line", may_have_trials: bool = True) -> None:
     """Refuse a clock [s] that goes backwards or stands still; ``lines`` are the lines of the rows in the file.
 
-    DataError names the line, or what ``noun`` calls it.
+    DataError names the line, or what ``noun`` calls it, and where the clock restarts the remedy of a column map, which
+    ``may_have_trials`` one after another.
     """
     stalled = np.flatnonzero(np.diff(time) <= 0.0)
     if stalled.size:
@@ -119,7 +116,7 @@ def check_clock(time: Floats, lines: Sequence[int], noun: str = "line") -> None:
         word = "stands still" if time[index] == time[index - 1] else "goes backwards"
         falls = np.flatnonzero(np.diff(time) < 0.0) + 1
         # Each trial of a file begins about where the first one does.
-        are_trials = falls.size > 0 and bool((time[falls] < time[1]).all())
+        are_trials = may_have_trials and falls.size > 0 and bool((time[falls] < time[1]).all())
         trials = (
             f", or take one of {falls.size + 1} trials with trial = 1, or 'all', in a column map" if are_trials else ""
         )
@@ -153,10 +150,9 @@ _MARKS: dict[RecordingKind, str] = {
 """Lines of comment; when read, the word before the colon counts."""
 
 _MARK = re.compile(r"#\s*(\w+):.*")
-_LONGEST_CELL = 40
-"""Characters of a cell that a message repeats."""
-_UNDERSCORE = "_"
-"""Python takes 1_000 for a thousand, and digits of any script; in a table they are a slip."""
+NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+LONGEST_SHOWN = 40
+"""Characters of a name or a cell that a message repeats."""
 
 SPLIT_NUMBERS = (
     "commas seem to separate columns and decimals alike: write the file with decimal points, or with another delimiter "
@@ -201,8 +197,6 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
 
     Gauge pressure counts from ``atmosphere`` [Pa absolute]. DataError for a file that is not usable.
     """
-    from ppafo.storage.clock import counted_on  # a run reads no clocks of loggers
-
     content = read_bytes(path)
     try:
         text = text_of(content, remedy='; a column map with encoding = "latin-1" reads that')
@@ -213,57 +207,68 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
             )
         lines = text.splitlines()
         first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
-        mark = _mark(next(islice(lines, first, None), ""))
-        rows = csv.reader(islice(lines, first, None), delimiter=mark, strict=True)
-        header = _whole_cells(next(rows, []), mark)
+        head = next(islice(lines, first, None), "")
+        # A tab or a semicolon only where all cells then are columns.
+        mark = next((mark for mark in "\t;" if mark in head and all(map(_HEADER.fullmatch, head.split(mark)))), ",")
+        rows: Iterator[list[str]] = csv.reader(islice(lines, first, None), delimiter=mark, strict=True)
+        header: list[str] = []
+        for cell in next(rows, []):
+            # The pieces of a unit that has a comma in it are one cell.
+            if header and "[" in header[-1] and "]" not in header[-1]:
+                header[-1] += mark + cell
+            else:
+                header.append(cell)
         if not header and not any(lines[first:]):
             raise DataError("has no header")
         # A first column without a name is the row number that pandas writes.
         is_counted = bool(header) and not header[0].strip()
         columns = parse_header(header[is_counted:])
-        values = _table(header, rows if mark == "," else _with_points(rows), first)
-        if not len(values):
-            raise DataError("has a header but no samples")
+        if mark != ",":
+            # Commas that separate no columns are decimal marks.
+            rows = (
+                [cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell for cell in row] for row in rows
+            )
+        values = _table(header, rows, first)
         if is_counted and not np.array_equal(values[:, 0], np.arange(len(values))):
             raise DataError("the first column has no name, and does not count the rows from 0; name it, or remove it")
-        values = values[:, is_counted:]
-        series = []
-        for index, column in enumerate(columns):
-            with refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
-                series.append(in_si(column, values[:, index], atmosphere))
-        series[0] = counted_on(series[0])
-        check_clock(series[0], range(first + 2, first + 2 + len(values)))
-        named = {
-            column.name: Channel(one, column.si_unit, column.between, column.unit)
-            for column, one in zip(columns[1:], series[1:], strict=True)
-        }
         kind = "simulated" if is_of_frame(header) else kind_of_comments(lines[:first])
-        return Recording(label or one_line(Path(path).stem), series[0], named, kind)
+        line_numbers = range(first + 2, first + 2 + len(values))
+        series = list(values[:, is_counted:].T)
+        return recording_of_columns(columns, series, line_numbers, label or one_line(Path(path).stem), kind, atmosphere)
     except csv.Error as error:
         raise DataError(f"{path}: is not a CSV file: {error}") from error
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
 
 
-def _mark(header: str) -> str:
-    """Return what separates the columns of a header: a tab or a semicolon only where all cells then are columns."""
-    return next((mark for mark in "\t;" if mark in header and all(map(_HEADER.fullmatch, header.split(mark)))), ",")
+def recording_of_columns(
+    columns: Sequence[HeaderColumn],
+    values: Sequence[Floats],
+    rows: Sequence[int],
+    label: str,
+    kind: RecordingKind,
+    atmosphere: float,
+    noun: str = "line",
+) -> Recording:
+    """Recording of columns in the units of their headers, time first; ``rows`` say where each row stands in the file.
 
+    DataError, which calls a row what ``noun`` says, for a unit that does not fit and a clock that does not grow.
+    """
+    from ppafo.storage.clock import counted_on  # a run reads no clocks of loggers
 
-def _whole_cells(cells: list[str], mark: str) -> list[str]:
-    """Return the cells of a header with the pieces of a unit that has a comma in it put together again."""
-    whole: list[str] = []
-    for cell in cells:
-        if whole and "[" in whole[-1] and "]" not in whole[-1]:
-            whole[-1] += mark + cell
-        else:
-            whole.append(cell)
-    return whole
-
-
-def _with_points(rows: Iterable[list[str]]) -> Iterator[list[str]]:
-    """Return rows whose columns no comma separates with decimal points, whichever mark they have."""
-    return ([cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell for cell in row] for row in rows)
+    if not len(values[0]):
+        raise DataError("has a header but no samples")
+    series = []
+    for column, numbers in zip(columns, values, strict=True):
+        with refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
+            series.append(in_si(column, numbers, atmosphere))
+    time = counted_on(series[0])
+    check_clock(time, rows, noun)
+    channels = {
+        column.name: Channel(one, column.si_unit, column.between, column.unit)
+        for column, one in zip(columns[1:], series[1:], strict=True)
+    }
+    return Recording(label, time, channels, kind)
 
 
 def kind_of_comments(comments: Iterable[str]) -> RecordingKind:
@@ -297,26 +302,22 @@ def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats
             raise DataError(f"line {line} has {len(row)} values for {len(header)} columns{remedy}")
         try:
             values = [float(cell) for cell in row]
-        except ValueError as error:
-            raise _no_number(header, row, line) from error
-        # All cells at once, as one by one costs more than reading the numbers.
+        except ValueError:
+            values = [math.nan]
+        # All cells at once, as one by one costs more than reading the numbers. Python takes 1_000 for a thousand, and
+        # digits of any script; in a table they are a slip.
         whole = "".join(row)
-        if not whole.isascii() or _UNDERSCORE in whole or not all(map(math.isfinite, values)):
-            raise _no_number(header, row, line)
+        if not whole.isascii() or "_" in whole or not all(map(math.isfinite, values)):
+            is_number = [cell.isascii() and finite_number(cell.strip()) is not None for cell in row]
+            name, cell = header[is_number.index(False)].strip(), one_line(row[is_number.index(False)])[:LONGEST_SHOWN]
+            is_comma = _DECIMAL_COMMA.fullmatch(cell)
+            remedy = '; decimal commas need a column map with decimal = "comma"' if is_comma else ""
+            raise DataError(f"line {line}, column '{name}': {cell!r} is not a number, or not a finite one{remedy}")
         numbers.extend(values)
     return np.array(numbers).reshape(-1, len(header))
 
 
-def _no_number(header: list[str], row: list[str], line: int) -> DataError:
-    """Return the error of a row in which a cell is no finite number."""
-    column = next((index for index, cell in enumerate(row) if not _is_finite(cell)), 0)
-    name, cell = header[column].strip(), one_line(row[column])[:_LONGEST_CELL]
-    remedy = '; decimal commas need a column map with decimal = "comma"' if _DECIMAL_COMMA.fullmatch(cell) else ""
-    return DataError(f"line {line}, column '{name}': {cell!r} is not a number, or not a finite one{remedy}")
-
-
-def _is_finite(cell: str) -> bool:
-    try:
-        return math.isfinite(float(cell)) and cell.isascii() and _UNDERSCORE not in cell
-    except ValueError:
-        return False
+def finite_number(text: str) -> float | None:
+    """Return the number that a cell of a table has, None where it is none or not a finite one."""
+    value = float(text) if NUMBER.fullmatch(text) else math.nan
+    return value if math.isfinite(value) else None

@@ -6,7 +6,6 @@ What cannot be read is named with file, line and column, and what is wrong in th
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -139,13 +138,6 @@ def with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
 _MASS_FLOW = "kg/s"
 
 
-class _Surroundings(NamedTuple):
-    """Surroundings that a file does not state: atmosphere [Pa absolute], gas of its volume flows, empty if unknown."""
-
-    atmosphere: float
-    gas: str
-
-
 def read_foreign(
     path: str | Path,
     columns: ColumnMap,
@@ -195,10 +187,9 @@ def read_trials(
             table = read_mapped_text(content, columns, map_name)
         else:
             table = read_mapped_matlab(content, columns, map_name)
-        surroundings = _Surroundings(atmosphere, gas)
         with in_map(map_name):
             channels = {
-                name: _channel(name, mapped, table, surroundings)
+                name: _channel(name, mapped, table, atmosphere, gas)
                 for name, mapped in columns.channels.items()
                 if name != TIME
             }
@@ -219,30 +210,31 @@ def read_trials(
 
 
 def _rows_of_trials(time: Floats, wanted: str | int | tuple[int, ...]) -> dict[str, slice]:
-    """Return the rows of trials in a file, each of which begins where the time [s] falls, by what is added to its name.
-
-    Trials count from 1. DataError where there are fewer.
-    """
+    """Return the rows of trials, from 1, by what is added to their names: each begins where the time [s] falls."""
     starts = [0, *(np.flatnonzero(np.diff(time) < 0.0) + 1).tolist(), time.size]
-    last = len(starts) - 1
-    numbers = range(1, last + 1) if isinstance(wanted, str) else (wanted,) if isinstance(wanted, int) else wanted
+    count = len(starts) - 1
+    numbers = range(1, count + 1) if isinstance(wanted, str) else np.atleast_1d(wanted).tolist()
     for trial in numbers:
-        if trial > last:
-            raise DataError(f"trial = {trial}: the clock restarts {last - 1} times, so the file has trials 1 to {last}")
-    if isinstance(wanted, int):
-        return {"": slice(starts[wanted - 1], starts[wanted])}
-    return {f" trial {number}": slice(starts[number - 1], starts[number]) for number in numbers}
+        if trial > count:
+            raise DataError(
+                f"trial = {trial}: the clock restarts {count - 1} times, so the file has trials 1 to {count}"
+            )
+    rows = {f" trial {number}": slice(starts[number - 1], starts[number]) for number in numbers}
+    return {"": rows[f" trial {wanted}"]} if isinstance(wanted, int) else rows
 
 
-def _channel(name: str, mapped: MappedChannel, table: MappedTable, surroundings: _Surroundings) -> Channel:
-    """Return a channel in SI, a constant one too; the quantity that it is multiplied by brings its own unit."""
+def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: float, gas: str = "") -> Channel:
+    """Return a channel in SI, a constant one too; the quantity that it is multiplied by brings its own unit.
+
+    The file does not state the ``atmosphere`` [Pa absolute], nor the gas of its volume flows, empty if unknown.
+    """
     from ppafo.units import split_number
 
     if mapped.constant is not None:
         with refused_as(DataError, f"channels.{name}.constant = {mapped.constant!r}", UnitError):
             value, unit = split_number(mapped.constant)
-            column = HeaderColumn(name, _flow_unit(name, unit, mapped, surroundings.gas) or PLAIN_NUMBER)
-            values = in_si(column, np.full(table.size, value), surroundings.atmosphere)
+            column = HeaderColumn(name, _flow_unit(name, unit, mapped, gas) or PLAIN_NUMBER)
+            values = in_si(column, np.full(table.size, value), atmosphere)
             return Channel(values, column.si_unit, mapped.between, column.unit)
     numbers = table.numbers.get(name, np.empty(0))
     values, unit = mapped.sign * (mapped.factor * numbers + mapped.offset), mapped.unit
@@ -253,8 +245,8 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, surroundings:
         values, unit = values * multiple, f"{unit} {unit_of_multiple}".removeprefix(f"{PLAIN_NUMBER} ").strip()
         key += f" with times = {mapped.times!r}"
     with refused_as(DataError, f"channels.{name}.{key}", UnitError):
-        column = HeaderColumn(name, _flow_unit(name, unit, mapped, surroundings.gas))
-        return Channel(in_si(column, values, surroundings.atmosphere), column.si_unit, mapped.between, column.unit)
+        column = HeaderColumn(name, _flow_unit(name, unit, mapped, gas))
+        return Channel(in_si(column, values, atmosphere), column.si_unit, mapped.between, column.unit)
 
 
 def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
@@ -272,11 +264,15 @@ def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
 def _time(mapped: MappedChannel, table: MappedTable, atmosphere: float) -> Floats:
     """Return the time [s] of the rows: by their number and a rate, from a clock, or from numbers with a unit."""
     if mapped.rate is not None:
+        from ppafo.units import parse_quantity
+
         with refused_as(DataError, f"channels.{TIME}.rate = {mapped.rate!r}", UnitError):
-            rate = _rate(mapped.rate)
+            rate = parse_quantity(mapped.rate, "1/s")
+            if rate <= 0.0:
+                raise UnitError("must be above 0 Hz")
         return np.arange(table.size) / rate
     if table.clock is None:
-        return counted_on(_channel(TIME, mapped, table, _Surroundings(atmosphere, gas="")).values)
+        return counted_on(_channel(TIME, mapped, table, atmosphere).values)
     rows = [f"{table.noun} {row}, channels.{TIME}" for row in table.rows]
     time = clock_seconds(table.clock, rows, table.dates, mapped.date_order, mapped.clock)
     steps = np.diff(time)
@@ -288,13 +284,3 @@ def _time(mapped: MappedChannel, table: MappedTable, atmosphere: float) -> Float
             f'column, such as {TIME} = {{ rate = "{mean_rate:g} Hz" }}, which is the mean of this file'
         )
     return time
-
-
-def _rate(text: str) -> float:
-    """Return rows per second of ``100 Hz``, ``100 1/s`` or ``10 1/min``; UnitError for another text."""
-    from ppafo.units import parse_quantity
-
-    rate = parse_quantity(text, "1/s")
-    if rate <= 0.0:
-        raise UnitError("must be above 0 Hz")
-    return rate

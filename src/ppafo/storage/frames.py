@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, UnitError, refused_as
-from ppafo.signals import Channel, Recording, RecordingKind
+from ppafo.errors import DataError, refused_as
+from ppafo.signals import Recording, RecordingKind
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, recording_kind
-from ppafo.storage.comma_separated import HeaderColumn, check_clock, in_si, parse_header
+from ppafo.storage.comma_separated import parse_header, recording_of_columns
 from ppafo.wording import one_line
 
 PANDAS_READERS = {
@@ -37,18 +37,18 @@ OTHER_READERS = {
 
 def remedy_for(path: str | Path) -> str:
     """Advice to read a table of another format with pandas, as the end of a message; empty for an unknown suffix."""
-    table = _read_by_pandas(path)
+    advice = written_as_csv(path)
     # The same advice, behind the one to do without a file.
-    return f"; in Python give the table itself, {table}, or{written_as_csv(path)[1:]}" if table else ""
+    return f"; in Python give the table itself, {_call_of_pandas(path)}, or{advice[1:]}" if advice else ""
 
 
 def written_as_csv(path: str | Path) -> str:
     """Advice to write a table of another format as CSV with pandas; empty for an unknown suffix."""
-    table = _read_by_pandas(path)
+    table = _call_of_pandas(path)
     return f"; write it as CSV: {table}.to_csv({f'{path}.csv'!r}, index=False)" if table else ""
 
 
-def _read_by_pandas(path: str | Path) -> str:
+def _call_of_pandas(path: str | Path) -> str:
     call = (PANDAS_READERS | OTHER_READERS).get(Path(path).suffix.lower())
     return "" if call is None else f"pandas.{call.format(path=str(path))}"
 
@@ -85,12 +85,8 @@ def recording_of_frame(
                 known = ", ".join(map(one_line, names))
                 raise DataError(f"the table has no column and no index '{TIME} [{TIME_UNIT}]'; it has {known}")
             names, values = [named, *names], [np.asarray(frame.index), *values]
-    at = next(place for place, name in enumerate(names) if _is_time(name))
-    order = [at, *(place for place in range(len(names)) if place != at)]
-    cells = [_cell(names[place], units) for place in order]
-    columns = [_numbers(names[place], values[place]) for place in order]
     title = label or str(attributes.get("title", "")) or "table"
-    return _recording(cells, columns, title, recording_kind(str(attributes.get("kind", kind))), atmosphere)
+    return _recording(names, values, units, title, str(attributes.get("kind", kind)), atmosphere)
 
 
 def read_parquet(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
@@ -115,56 +111,40 @@ def read_parquet(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> R
         # What pandas keeps of a frame's attributes, as text.
         attributes = json.loads((table.schema.metadata or {}).get(b"PANDAS_ATTRS", b"{}"))
         units |= attributes.get("units", {})
-        kind = recording_kind(str(attributes.get("kind", "measured")))
         names = [name for name in table.column_names if name != "__index_level_0__"]
-        at = next((place for place, name in enumerate(names) if _is_time(name)), None)
-        if at is None:
+        if not any(map(_is_time, names)):
             raise DataError(f"has no column '{TIME} [{TIME_UNIT}]'; it has {', '.join(map(one_line, names))}")
-        names = [names[at], *(name for name in names if name != names[at])]
-        columns = [_numbers(name, table[name].to_numpy()) for name in names]
-        cells = [_cell(name, units) for name in names]
-        return _recording(cells, columns, one_line(Path(path).stem), kind, atmosphere)
+        values = [table[name].to_numpy() for name in names]
+        kind = str(attributes.get("kind", "measured"))
+        return _recording(names, values, units, one_line(Path(path).stem), kind, atmosphere)
 
 
 def _is_time(name: str) -> bool:
     return name.partition("[")[0].strip() == TIME
 
 
-def _cell(name: str, units: Mapping[str, str]) -> str:
-    """Return the header of a column, with its unit from the attributes where the name does not state it."""
-    unit = units.get(name, "")
-    # Of a table without units all names are bare, its time too.
-    if "[" in name or not (unit or (name == TIME and any(units.values()))):
-        return name
-    return f"{name} [{PLAIN_NUMBER if unit == '1' else unit or TIME_UNIT}]"
-
-
-def _numbers(name: str, values: Any) -> Any:
-    if np.issubdtype(values.dtype, np.timedelta64):
-        return values / np.timedelta64(1, "s")
-    try:
-        numbers = values.astype(np.float64)
-    except (TypeError, ValueError) as error:
-        raise DataError(f"column '{one_line(name)}' is not of numbers") from error
-    wrong = np.flatnonzero(~np.isfinite(numbers))
-    if wrong.size:
-        raise DataError(f"column '{one_line(name)}': row {wrong[0]} is {numbers[wrong[0]]}, not a finite number")
-    return numbers
-
-
 def _recording(
-    cells: Sequence[str], values: Sequence[Any], label: str, kind: RecordingKind, atmosphere: float
+    names: Sequence[str], values: Sequence[Any], units: Mapping[str, str], label: str, kind: str, atmosphere: float
 ) -> Recording:
-    columns: list[HeaderColumn] = parse_header(list(cells))
-    if not len(values[0]):
-        raise DataError("has a header but no samples")
-    series = []
-    for column, numbers in zip(columns, values, strict=True):
-        with refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
-            series.append(in_si(column, numbers, atmosphere))
-    check_clock(series[0], range(len(series[0])), "row")
-    channels = {
-        column.name: Channel(numbers, column.si_unit, column.between, column.unit)
-        for column, numbers in zip(columns[1:], series[1:], strict=True)
-    }
-    return Recording(label, series[0], channels, kind)
+    """Return the recording of columns, whose units stand in their names or in ``units``, in any order."""
+    pairs = sorted(zip(names, values, strict=True), key=lambda pair: not _is_time(pair[0]))
+    heads, columns = [], []
+    for name, column in pairs:
+        unit, head = units.get(name, ""), name
+        # Of a table without units all names are bare, its time too.
+        if "[" not in name and (unit or (name == TIME and any(units.values()))):
+            head = f"{name} [{PLAIN_NUMBER if unit == '1' else unit or TIME_UNIT}]"
+        heads.append(head)
+        if np.issubdtype(column.dtype, np.timedelta64):
+            columns.append(column / np.timedelta64(1, "s"))
+            continue
+        try:
+            numbers = column.astype(np.float64)
+        except (TypeError, ValueError) as error:
+            raise DataError(f"column '{one_line(name)}' is not of numbers") from error
+        wrong = np.flatnonzero(~np.isfinite(numbers))
+        if wrong.size:
+            raise DataError(f"column '{one_line(name)}': row {wrong[0]} is {numbers[wrong[0]]}, not a finite number")
+        columns.append(numbers)
+    rows = range(len(columns[0]))
+    return recording_of_columns(parse_header(heads), columns, rows, label, recording_kind(kind), atmosphere, "row")

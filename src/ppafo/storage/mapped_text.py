@@ -4,7 +4,6 @@ Every refusal names line and column of the file, or the key of the map, and says
 """
 
 import csv
-import math
 import re
 from array import array
 from collections.abc import Callable, Iterator, Mapping
@@ -17,8 +16,8 @@ import numpy as np
 from ppafo.errors import DataError
 from ppafo.signals.recording import TIME
 from ppafo.storage.clock import is_clock
-from ppafo.storage.column_map import LONGEST_SHOWN, ColumnMap, MappedTable, in_map, shown_names
-from ppafo.storage.comma_separated import SPLIT_NUMBERS, kind_of_comments
+from ppafo.storage.column_map import ColumnMap, MappedTable, in_map, shown_names
+from ppafo.storage.comma_separated import LONGEST_SHOWN, SPLIT_NUMBERS, finite_number, kind_of_comments
 from ppafo.storage.files import text_of
 from ppafo.wording import nearest_name, one_line
 
@@ -26,7 +25,6 @@ _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t"}
 _MARKS = {"point": ".", "comma": ",", "apostrophe": "'", "blank": " "}
 """Decimal marks, and marks between groups of digits, by their name in a map."""
 _COMMENT = "#"
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _GROUPED = {
     name: re.compile(rf"[+-]?\d{{1,3}}(?:{re.escape(mark)}\d{{3}})+(?![\d{mark}])", re.ASCII)
     for name, mark in _MARKS.items()
@@ -84,11 +82,12 @@ def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> Mappe
     is_time_of_day = (
         time_index is not None and time_index < len(table.first_row) and is_clock(table.first_row[time_index])
     )
-    numbers = [
-        _numbers_of(name, index, table.title(index), columns)
-        for name, index in indices.items()
-        if not (name == TIME and is_time_of_day)
-    ]
+    numbers = []
+    for name, index in indices.items():
+        mapped = columns.channels[name]
+        words = (_WORDS_OF_DIRECTION if name == _DIRECTION else {}) if mapped.words is None else mapped.words
+        if not (name == TIME and is_time_of_day):
+            numbers.append(_Numbers(name, index, table.title(index), columns.decimal, mapped.thousands, words))
     clock: list[str] = []
     dates: list[str] = []
     last_index = max((*indices.values(), date_index or 0), default=0)
@@ -161,19 +160,13 @@ def _split(lines: list[str], columns: ColumnMap) -> Rows:
     for number, line in islice(enumerate(lines, start=1), columns.skip_lines, None):
         if not line.strip() or line.startswith(_COMMENT):
             continue
-        cells = _cells(line, number, columns)
-        if cells:
-            yield number, cells
-
-
-def _cells(line: str, number: int, columns: ColumnMap) -> list[str]:
-    """Return the cells of a line; DataError where its quotation marks do not fit."""
-    if columns.delimiter == "whitespace":
-        return line.split()
-    try:
-        return next(csv.reader([line], delimiter=_DELIMITERS[columns.delimiter], strict=True))
-    except csv.Error as error:
-        raise DataError(f"line {number} cannot be read: {error}") from error
+        if columns.delimiter == "whitespace":
+            yield number, line.split()
+            continue
+        try:
+            yield number, next(csv.reader([line], delimiter=_DELIMITERS[columns.delimiter], strict=True))
+        except csv.Error as error:
+            raise DataError(f"line {number} cannot be read: {error}") from error
 
 
 def _index_of(key: str, column: int | str, table: _StartedTable, lines: list[str]) -> int:
@@ -189,7 +182,19 @@ def _index_of(key: str, column: int | str, table: _StartedTable, lines: list[str
         raise DataError(f"{key} = {column!r} names a column, but the file has no header; give its number")
     numbers = [number for number, name in enumerate(names, start=1) if name == column]
     if not numbers:
-        remedy = _other_delimiter(names, lambda cells: column in cells) or _other_line(lines, names, column)
+        head = enumerate(lines[:_HEADER_WITHIN])
+        remedy = _other_delimiter(names, lambda cells: column in cells)
+        if not remedy:
+            # A line further down may be the header.
+            split = ((number, name, line.split(mark)) for number, line in head for name, mark in _DELIMITERS.items())
+            remedy = next(
+                (
+                    f'; line {number + 1} has it: give skip_lines = {number} and delimiter = "{name}"'
+                    for number, name, cells in split
+                    if column in (stripped := [cell.strip() for cell in cells]) and stripped != names
+                ),
+                "",
+            )
         hint = "" if remedy else nearest_name(column, names)
         raise DataError(f"{key} = {column!r}: there is no such column{hint}; the file has {shown_names(names)}{remedy}")
     if len(numbers) > 1:
@@ -204,16 +209,6 @@ def _other_delimiter(cells: list[str], is_there: Callable[[list[str]], bool]) ->
         split_again = [part.strip() for cell in cells for part in cell.split(mark)]
         if split_again != cells and is_there(split_again):
             return f'; give delimiter = "{name}"'
-    return ""
-
-
-def _other_line(lines: list[str], names: list[str], column: str) -> str:
-    """Return how many lines to skip where a line further down is the header, else nothing."""
-    for number, line in enumerate(lines[:_HEADER_WITHIN]):
-        for name, mark in _DELIMITERS.items():
-            cells = [cell.strip() for cell in line.split(mark)]
-            if column in cells and cells != names:
-                return f'; line {number + 1} has it: give skip_lines = {number} and delimiter = "{name}"'
     return ""
 
 
@@ -251,52 +246,29 @@ class _Numbers:
         for word, value in self.words.items():
             if word.lower() == text.lower():
                 return value
-        text = self._with_point(self._without_groups(text, line))
-        value = float(text) if _NUMBER.fullmatch(text) else math.nan
-        if not math.isfinite(value):
-            raise self._refusal(line, f"{_shown(cell)} is not a finite number", self._remedy(cell))
-        return value
-
-    def _without_groups(self, text: str, line: int) -> str:
-        """Return a number without the marks between its groups of digits: without its mark 1.5 would be 15."""
-        if self.thousands is None or _MARKS[self.thousands] not in text:
-            return text
-        grouped = _GROUPED[self.thousands].match(text)
-        if grouped is None:
-            fault = f'does not have groups of three digits, as thousands = "{self.thousands}" says'
-            raise self._refusal(line, f"{_shown(text)} {fault}")
-        return grouped.group().replace(_MARKS[self.thousands], "") + text[grouped.end() :]
-
-    def _with_point(self, text: str) -> str:
-        """Return a number with a decimal point; a point that is no mark of the file makes the text no number."""
-        return text if self.decimal == "point" else text.replace(".", "?").replace(_MARKS[self.decimal], ".")
-
-    def _remedy(self, cell: str) -> str:
-        """Return what to do about a cell that is no number, as the end of a message."""
+        at, key = f"line {line}, column {self.title!r}", f"(channels.{self.channel}.column)"
+        mark = _MARKS[self.thousands] if self.thousands else ""
+        # Marks between groups of digits have to be where they belong: without its mark 1.5 would be 15.
+        if self.thousands and mark in text:
+            grouped = _GROUPED[self.thousands].match(text)
+            if grouped is None:
+                raise DataError(
+                    f"{at}: {_shown(text)} does not have groups of three digits, as thousands = "
+                    f'"{self.thousands}" says {key}'
+                )
+            text = grouped.group().replace(mark, "") + text[grouped.end() :]
+        # A point that is no decimal mark of the file makes the text no number.
+        number = finite_number(text if self.decimal == "point" else text.replace(".", "?").replace(",", "."))
+        if number is not None:
+            return number
+        remedy = ""
         if self.words:
-            return f"; known words: {shown_names(self.words)}; others in channels.{self.channel}.words"
-        if self.decimal == "point" and "," in cell and _NUMBER.fullmatch(cell.strip().replace(",", ".")):
-            return '; give decimal = "comma"'
-        return "; it is a time of day" if is_clock(cell) and self.channel != TIME else ""
-
-    def _refusal(self, line: int, fault: str, remedy: str = "") -> DataError:
-        return DataError(f"line {line}, column {self.title!r}: {fault} (channels.{self.channel}.column){remedy}")
-
-
-def _numbers_of(channel: str, index: int, title: str, columns: ColumnMap) -> _Numbers:
-    """Return the column of a channel, still empty; of words, a direction knows the usual ones."""
-    mapped = columns.channels[channel]
-    words = mapped.words
-    if words is None:
-        words = _WORDS_OF_DIRECTION if channel == _DIRECTION else {}
-    return _Numbers(
-        channel=channel,
-        index=index,
-        title=title,
-        decimal=columns.decimal,
-        thousands=mapped.thousands,
-        words=words,
-    )
+            remedy = f"; known words: {shown_names(self.words)}; others in channels.{self.channel}.words"
+        elif self.decimal == "point" and "," in cell and finite_number(cell.strip().replace(",", ".")) is not None:
+            remedy = '; give decimal = "comma"'
+        elif is_clock(cell) and self.channel != TIME:
+            remedy = "; it is a time of day"
+        raise DataError(f"{at}: {_shown(cell)} is not a finite number {key}{remedy}")
 
 
 def _shown(cell: str) -> str:

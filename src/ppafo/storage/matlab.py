@@ -6,7 +6,7 @@ labels. Objects (timeseries, timetable, table, datetime) are in a form that is n
 line of MATLAB that saves them as plain arrays.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -46,19 +46,24 @@ _LABELS = ("colheaders", "labels", "names")
 """Fields of a structure that may have the names of the columns of another."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class MatlabFile:
     """Columns of numbers and of texts by name, every other text in the file, and the objects in it, name and class."""
 
-    columns: Mapping[str, Floats]
-    texts: Mapping[str, list[str]]
-    words: tuple[str, ...] = ()
-    objects: tuple[tuple[str, str], ...] = ()
+    columns: dict[str, Floats] = field(default_factory=dict)
+    texts: dict[str, list[str]] = field(default_factory=dict)
+    words: list[str] = field(default_factory=list)
+    objects: list[tuple[str, str]] = field(default_factory=list)
 
     def said_of_objects(self) -> str:
         """Return what to do with the objects of the file, as the end of a message; nothing where there are none."""
-        named = ((f"{name} ({kind})" if kind else name, _plainly(name, kind)) for name, kind in self.objects)
-        return "".join(f"; {called} is an object that only MATLAB reads, {remedy}" for called, remedy in named)
+        said = ""
+        for name, kind in self.objects:
+            save = "its numbers are saved as arrays of their own, such as t = ts.Time; y = ts.Data; save plain.mat t y"
+            if kind in _PLAIN:
+                save = f"it is saved as plain arrays by {_PLAIN[kind].format(name=name)}"
+            said += f"; {name}{f' ({kind})' * bool(kind)} is an object that only MATLAB reads, where {save}"
+        return said
 
 
 _OF_TABLE = "s = table2struct(T, 'ToScalar', true); save('plain.mat', '-struct', 's')"
@@ -72,23 +77,6 @@ _PLAIN = {
 """Line of MATLAB by the class of an object: it saves the numbers in it, and times in seconds, as plain arrays."""
 
 
-def _plainly(name: str, kind: str) -> str:
-    """Return how the numbers of an object are saved so that they can be read."""
-    if kind in _PLAIN:
-        return f"where it is saved as plain arrays by {_PLAIN[kind].format(name=name)}"
-    return "where its numbers are saved as arrays of their own, such as t = ts.Time; y = ts.Data; save plain.mat t y"
-
-
-@dataclass(slots=True)
-class _Contents:
-    """Content found in a file so far, as ``MatlabFile`` has it."""
-
-    columns: dict[str, Floats] = field(default_factory=dict)
-    texts: dict[str, list[str]] = field(default_factory=dict)
-    words: list[str] = field(default_factory=list)
-    objects: list[tuple[str, str]] = field(default_factory=list)
-
-
 def read_matlab(path: str | Path) -> MatlabFile:
     """Return the variables in a ``.mat`` file of any version. DataError for a file that is none."""
     is_hdf5 = read_bytes(path)[_HDF5_AT : _HDF5_AT + len(_HDF5)] == _HDF5
@@ -100,7 +88,7 @@ def read_matlab(path: str | Path) -> MatlabFile:
 def open_matlab(path: str | Path) -> MatlabFile:
     """Return what ``read_matlab`` does; damage can end the process."""
     content = read_bytes(path)
-    contents = _Contents()
+    contents = MatlabFile()
     try:
         if content[_HDF5_AT : _HDF5_AT + len(_HDF5)] == _HDF5:
             import h5py
@@ -114,14 +102,8 @@ def open_matlab(path: str | Path) -> MatlabFile:
     except _OF_DAMAGE as error:
         raise DataError(f"{path}: cannot be read as a .mat file: {one_line(error)}") from error
     if not contents.columns and not contents.texts:
-        file = MatlabFile({}, {}, objects=tuple(contents.objects))
-        raise DataError(f"{path}: has no variable of numbers{file.said_of_objects()}")
-    return MatlabFile(
-        contents.columns,
-        contents.texts,
-        tuple(contents.words),
-        tuple(contents.objects),
-    )
+        raise DataError(f"{path}: has no variable of numbers{contents.said_of_objects()}")
+    return contents
 
 
 class _Object(NamedTuple):
@@ -134,7 +116,7 @@ Tree = dict[str, Any] | list[Any] | NDArray[Any] | str | _Object
 """A variable as plain data: a structure, a cell array or an array of structures, numbers, a text, or an object."""
 
 
-def _read_older(path: str | Path, contents: _Contents) -> None:
+def _read_older(path: str | Path, contents: MatlabFile) -> None:
     """Add the variables of a file of version 4 to 7 to the contents."""
     import zlib
 
@@ -148,19 +130,18 @@ def _read_older(path: str | Path, contents: _Contents) -> None:
     for name, value in variables.items():
         # What MATLAB keeps for its objects has no name of its own.
         if name in ("__function_workspace__", "None"):
-            named = _named_object(value)
-            contents.objects += [named] if named[1] or not contents.objects else []
+            # An object says name and class in its first fields.
+            names = getattr(getattr(value, "dtype", None), "names", None) or ()
+            if {"s0", "s2"} <= set(names) and value.size == 1:
+                said = [
+                    one_line(word.decode("ascii", "replace") if isinstance(word, bytes) else word)
+                    for word in value.ravel()[0]
+                ]
+                contents.objects.append((said[0], said[2]))
+            elif not contents.objects:
+                contents.objects.append(("a variable", ""))
         elif not name.startswith("__"):
             _add(name, _tree_of(value), 0, contents)
-
-
-def _named_object(value: Any) -> tuple[str, str]:
-    """Return name and class of an object of SciPy, which says them in its first fields."""
-    names = getattr(getattr(value, "dtype", None), "names", None) or ()
-    if not {"s0", "s2"} <= set(names) or value.size != 1:
-        return "a variable", ""
-    said = [word.decode("ascii", "replace") if isinstance(word, bytes) else str(word) for word in value.ravel()[0]]
-    return one_line(said[0]), one_line(said[2])
 
 
 def _tree_of(value: Any) -> Tree:
@@ -224,7 +205,7 @@ def _tree_of_hdf5(node: Any, file: Any, depth: int) -> Tree:
     return "".join(map(chr, array.ravel().tolist())).strip() if kind == "char" else array
 
 
-def _add(name: str, tree: Tree, depth: int, contents: _Contents) -> None:
+def _add(name: str, tree: Tree, depth: int, contents: MatlabFile) -> None:
     """Add what is below a name to what was found."""
     if depth > _DEEPEST:
         return
@@ -252,7 +233,7 @@ def _add(name: str, tree: Tree, depth: int, contents: _Contents) -> None:
         _add_numbers(name, tree, contents)
 
 
-def _add_numbers(name: str, array: NDArray[Any], contents: _Contents) -> None:
+def _add_numbers(name: str, array: NDArray[Any], contents: MatlabFile) -> None:
     """Add a vector by its name, and of a matrix every column and every row, as far as there are not too many."""
     if array.dtype.kind not in "iufb" or array.size == 0:
         return
@@ -260,12 +241,6 @@ def _add_numbers(name: str, array: NDArray[Any], contents: _Contents) -> None:
     if numbers.ndim <= 1:
         contents.columns[name] = np.atleast_1d(numbers)
     elif numbers.ndim == 2:
-        contents.columns.update(_lines_of(name, numbers))
-
-
-def _lines_of(name: str, matrix: Floats) -> Iterator[tuple[str, Floats]]:
-    rows, columns = matrix.shape
-    if columns <= _MOST_COLUMNS:
-        yield from ((f"{name}(:,{number + 1})", matrix[:, number]) for number in range(columns))
-    if rows <= _MOST_COLUMNS:
-        yield from ((f"{name}({number + 1},:)", matrix[number]) for number in range(rows))
+        for lines, place in ((numbers.T, ":,{}"), (numbers, "{},:")):
+            if len(lines) <= _MOST_COLUMNS:
+                contents.columns |= {f"{name}({place.format(at)})": line for at, line in enumerate(lines, start=1)}

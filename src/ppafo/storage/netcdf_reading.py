@@ -4,6 +4,7 @@ h5netcdf would print a traceback of its own where it meets a damaged file. Befor
 lie in this file, in a common form, and in no more memory than such a file can need.
 """
 
+import contextlib
 import io
 import math
 import zlib
@@ -51,41 +52,25 @@ def read_netcdf(path: str | Path) -> Recording:
     DataError says what is wrong: a file that is damaged, points outside itself, unpacks to far more than it has, or
     whose numbers are packed, have gaps or are outside what the file calls valid.
     """
+    import h5py
+
     content = read_bytes(path)
     try:
-        return _recording_in(content, label=one_line(Path(path).stem))
+        with h5py.File(io.BytesIO(content), "r") as file:
+            variables = _own_variables(file)
+            _check_memory(variables, len(content))
+            for name, variable in variables.items():
+                _check_is_whole(name, variable)
+            time = _channel(TIME, variables.pop(TIME))
+            if time.unit != TIME_UNIT:
+                raise DataError(f"'{TIME}' is in '{time.unit}', it must be in '{TIME_UNIT}'")
+            channels = {name: _channel(name, variable) for name, variable in variables.items()}
+            kind = recording_kind(_attribute(file, "kind") or "measured")
+            return Recording(_attribute(file, "title") or one_line(Path(path).stem), time.values, channels, kind)
     except _DAMAGED as error:
         raise DataError(f"{path}: is not a whole NetCDF file of a recording: {one_line(error)}") from error
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
-
-
-def _recording_in(content: bytes, label: str) -> Recording:
-    """Return the recording in the bytes of a file; it is called ``label`` unless it says its title."""
-    import h5py
-
-    with h5py.File(io.BytesIO(content), "r") as file:
-        variables = _own_variables(file)
-        for name, variable in variables.items():
-            if variable.size != variables[TIME].size:
-                raise DataError(f"'{name}' has {variable.size} values for {variables[TIME].size} times")
-            # Only the common filters: gzip within gzip grows without limit.
-            properties = variable.id.get_create_plist()
-            filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
-            behind_gzip = filters[filters.index(_GZIP) + 1 :] if _GZIP in filters else []
-            if not set(filters) <= _SUPPORTED_FILTERS or not set(behind_gzip) <= {_FLETCHER}:
-                raise DataError(
-                    f"'{name}' is compressed in a way that is not supported; save it with gzip, or uncompressed"
-                )
-        _check_memory(variables, len(content))
-        for name, variable in variables.items():
-            _check_is_whole(name, variable)
-        time = _channel(TIME, variables.pop(TIME))
-        if time.unit != TIME_UNIT:
-            raise DataError(f"'{TIME}' is in '{time.unit}', it must be in '{TIME_UNIT}'")
-        channels = {name: _channel(name, variable) for name, variable in variables.items()}
-        kind = recording_kind(_attribute(file, "kind") or "measured")
-        return Recording(_attribute(file, "title") or label, time.values, channels, kind)
 
 
 def _own_variables(file: Any) -> dict[str, Any]:
@@ -104,6 +89,17 @@ def _own_variables(file: Any) -> dict[str, Any]:
             raise DataError(f"'{name}' must be numeric and one-dimensional over '{TIME}'")
         if variable.is_virtual or variable.external:
             raise DataError(f"the numbers of '{name}' are in another file; a recording must contain its numbers itself")
+    for name, variable in variables.items():
+        if variable.size != variables[TIME].size:
+            raise DataError(f"'{name}' has {variable.size} values for {variables[TIME].size} times")
+        # Only the common filters: gzip within gzip grows without limit.
+        properties = variable.id.get_create_plist()
+        filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
+        behind_gzip = filters[filters.index(_GZIP) + 1 :] if _GZIP in filters else []
+        if not set(filters) <= _SUPPORTED_FILTERS or not set(behind_gzip) <= {_FLETCHER}:
+            raise DataError(
+                f"'{name}' is compressed in a way that is not supported; save it with gzip, or uncompressed"
+            )
     return variables
 
 
@@ -134,18 +130,15 @@ def _check_is_whole(name: str, variable: Any) -> None:
     allowed_bytes = chunks[0] * variable.dtype.itemsize + _CHECKSUM_BYTES
     for number in range(chunk_count):
         chunk = variable.id.get_chunk_info(number)
-        compressed = b"" if variable.compression is None else variable.id.read_direct_chunk(chunk.chunk_offset)[1]
-        if _unpacks_beyond(compressed, allowed_bytes) or chunk.size > 2 * allowed_bytes:
+        content = b""
+        if variable.compression is not None:
+            compressed = variable.id.read_direct_chunk(chunk.chunk_offset)[1]
+            # With a limit, before the library takes as much memory as it asks. Where it is not compressed after all, or
+            # damaged, the library says so.
+            with contextlib.suppress(zlib.error):
+                content = zlib.decompressobj().decompress(compressed, allowed_bytes + 1)
+        if len(content) > allowed_bytes or chunk.size > 2 * allowed_bytes:
             raise DataError(f"'{name}' decompresses to more than its stated size")
-
-
-def _unpacks_beyond(compressed: bytes, allowed_bytes: int) -> bool:
-    """Tell whether a chunk unpacks to more: here, with a limit, before the library takes as much memory as it asks."""
-    try:
-        return len(zlib.decompressobj().decompress(compressed, allowed_bytes + 1)) > allowed_bytes
-    except zlib.error:
-        # It is not compressed after all, or damaged: the library says so.
-        return False
 
 
 def _channel(name: str, variable: Any) -> Channel:

@@ -15,9 +15,9 @@ import numpy as np
 from ppafo.errors import DataError
 from ppafo.signals import Recording, RecordingKind
 from ppafo.signals.recording import TIME, Floats
-from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart, without_copies
+from ppafo.storage.comma_separated import LONGEST_SHOWN, check_clock
 from ppafo.storage.files import write_file
-from ppafo.storage.text_table import LONGEST_SHOWN, check_growing, number_in, text_lines
+from ppafo.storage.text_table import doubled, number_in, said_of_doubled, text_lines, told_apart, without_copies
 from ppafo.wording import one_line
 
 _END = "endheader"
@@ -78,50 +78,48 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> OpenSimTable:
         header = _header(lines)
         label_line, written = _labels(lines, header)
         labels = told_apart(written)
-        row_lines = _row_lines(lines, label_line + 1, header)
+        # Blank lines may only follow the last row.
+        last = len(lines)
+        while last > label_line and not lines[last - 1].strip():
+            last -= 1
+        row_lines = range(label_line + 1, last + 1)
+        if not row_lines:
+            raise DataError("has labels but no rows")
+        if header.row_count is not None and header.row_count != len(row_lines):
+            raise DataError(
+                f"has {len(row_lines)} rows, its header states {header.row_count}: the file is cut off or was edited; "
+                "get it again, or correct the header"
+            )
         table = _numbers(lines, row_lines, labels, gaps)
         # Some tools repeat the last time.
         count = len(table)
         while count > 1 and table[count - 1, 0] == table[count - 2, 0]:
             count -= 1
-        kept = table[:count]
-        time = kept[:, 0]
-        check_growing(time, row_lines[: len(kept)])
+        time = table[:count, 0]
+        check_clock(time, row_lines[:count], may_have_trials=False)
     except DataError as error:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
     twins = doubled(written[1:], labels[1:])
-    named = {label: kept[:, index] for index, label in enumerate(labels) if index > 0}
-    columns = without_copies(named, twins)
+    columns = without_copies(dict(zip(labels[1:], table[:count, 1:].T, strict=True)), twins)
+    remarks = []
+    if header.column_count not in (None, len(labels)):
+        remarks.append(
+            f"the header states {header.column_count} columns, labels and every row have {len(labels)}, which were "
+            "taken"
+        )
+    if dropped := len(table) - count:
+        rows, verb = ("the last row repeats", "was") if dropped == 1 else (f"the last {dropped} rows repeat", "were")
+        remarks.append(f"{rows} the time {table[-1, 0]:g} s and {verb} dropped")
     return OpenSimTable(
         name=header.name,
         time=time,
         columns=columns,
         in_degrees=header.in_degrees,
         first_line=row_lines.start,
-        remarks=(
-            *_said_of_width(header, len(labels)),
-            *_said_of_dropped(len(table) - len(kept), float(table[-1, 0])),
-            *said_of_doubled(twins, columns, "columns"),
-        ),
+        remarks=(*remarks, *said_of_doubled(twins, columns, "columns")),
         kind=header.kind,
         is_old=header.is_old,
     )
-
-
-def _row_lines(lines: list[str], first: int, header: _Header) -> range:
-    """Return the numbers of the lines with rows, from ``first``; blank lines may only follow the last row."""
-    last = len(lines)
-    while last >= first and not lines[last - 1].strip():
-        last -= 1
-    row_lines = range(first, last + 1)
-    if not row_lines:
-        raise DataError("has labels but no rows")
-    if header.row_count is not None and header.row_count != len(row_lines):
-        raise DataError(
-            f"has {len(row_lines)} rows, its header states {header.row_count}: the file is cut off or was edited; "
-            "get it again, or correct the header"
-        )
-    return row_lines
 
 
 def _numbers(lines: list[str], row_lines: range, labels: list[str], gaps: Sequence[str]) -> Floats:
@@ -135,22 +133,6 @@ def _numbers(lines: list[str], row_lines: range, labels: list[str], gaps: Sequen
         others = zip(cells[1:], labels[1:], strict=True)
         table[row, 1:] = [number_in(cell, number, label, gaps) for cell, label in others]
     return table
-
-
-def _said_of_width(header: _Header, width: int) -> list[str]:
-    """Return a remark where the header states another number of columns than labels and rows have."""
-    if header.column_count in (None, width):
-        return []
-    stated = header.column_count
-    return [f"the header states {stated} columns, labels and every row have {width}, which were taken"]
-
-
-def _said_of_dropped(count: int, time: float) -> list[str]:
-    """Return a remark on a number of last rows that repeated a time [s] and were dropped."""
-    if not count:
-        return []
-    rows, verb = ("the last row repeats", "was") if count == 1 else (f"the last {count} rows repeat", "were")
-    return [f"{rows} the time {time:g} s and {verb} dropped"]
 
 
 def _header(lines: list[str]) -> _Header:
@@ -168,8 +150,12 @@ def _header(lines: list[str]) -> _Header:
             if not (text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS):
                 raise DataError(f"line {number}: {count[1]} is {one_line(text)[:LONGEST_SHOWN]!r}, not a whole number")
             counts[count[1].lower()] = int(text)
-        says_degrees = _says_degrees(line, number)
-        if says_degrees is not None:
+        key = _DEGREES.match(line)
+        if key is not None and key[1].lower() not in ("yes", "no"):
+            raise DataError(f"line {number}: inDegrees is {one_line(key[1])[:LONGEST_SHOWN]!r}; it is 'yes' or 'no'")
+        stated = key or _SENTENCE.search(line)
+        if stated is not None:
+            says_degrees = stated[1].lower() in ("yes", "degrees")
             if in_degrees is not None and says_degrees != in_degrees:
                 raise DataError(f"line {number}: the header states degrees and radians; correct the one that is wrong")
             in_degrees = says_degrees
@@ -185,17 +171,6 @@ def _header(lines: list[str]) -> _Header:
         kind=kind or "measured",
         is_old="datacolumns" in counts,
     )
-
-
-def _says_degrees(line: str, number: int) -> bool | None:
-    """Return whether a line of the header says that angles are in degrees; None where it says neither."""
-    key = _DEGREES.match(line)
-    if key is not None:
-        if key[1].lower() not in ("yes", "no"):
-            raise DataError(f"line {number}: inDegrees is {one_line(key[1])[:LONGEST_SHOWN]!r}; it is 'yes' or 'no'")
-        return key[1].lower() == "yes"
-    sentence = _SENTENCE.search(line)
-    return None if sentence is None else sentence[1].lower() == "degrees"
 
 
 def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
@@ -224,12 +199,6 @@ _SIGNS = {
 """Sign conventions stated in the header, for the columns in OpenSim's names."""
 
 
-def _signs(names: Sequence[str]) -> str:
-    said = [f"{name} {sign}" for name in names for form, sign in _SIGNS.items() if re.fullmatch(form, name)]
-    others = "other columns" if said else "columns"
-    return f"signs={'; '.join([*said, f'{others} have the signs of ppafo'])}"
-
-
 def opensim_bytes(recording: Recording) -> bytes:
     """Return a recording as a ``.sto`` file: SI units, angles in radians, labels ``time`` and the channels' names.
 
@@ -237,6 +206,8 @@ def opensim_bytes(recording: Recording) -> bytes:
     measured.
     """
     units = ", ".join(f"{name} [{recording.unit(name)}]" for name in recording.names)
+    signs = [f"{name} {sign}" for name in recording.names for form, sign in _SIGNS.items() if re.fullmatch(form, name)]
+    signs.append(f"{'other columns' if signs else 'columns'} have the signs of ppafo")
     head = [
         one_line(recording.label),
         "version=1",
@@ -245,7 +216,7 @@ def opensim_bytes(recording: Recording) -> bytes:
         "inDegrees=no",
         f"{_KIND}{recording.kind}",
         f"units={units}",
-        _signs(recording.names),
+        f"signs={'; '.join(signs)}",
         _END,
         "\t".join((TIME, *recording.names)),
     ]

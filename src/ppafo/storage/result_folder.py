@@ -56,7 +56,7 @@ MARK = "ppafo.json"
 
 _FORMAT = "ppafo files"
 _HASHES = "sha256"
-NOTHING_KEPT: Mapping[str, bytes] = MappingProxyType({})
+_NOTHING_KEPT: Mapping[str, bytes] = MappingProxyType({})
 
 
 def marked_folder(command: str) -> FolderKind:
@@ -109,7 +109,7 @@ def write_marked_folder(folder: Path, contents: Mapping[str, bytes], command: st
     write_owned_folder(folder, marked, marked_folder(command))
 
 
-def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes] = NOTHING_KEPT) -> None:
+def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes] = _NOTHING_KEPT) -> None:
     """Refuse a folder that holds anything of somebody else's, or that cannot be made. It is a DataError.
 
     Files that are ``kept`` as they are, such as one that grows from run to run, may have been changed.
@@ -135,7 +135,15 @@ def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes]
             f"{folder}: contains files that are not part of its {kind.noun} ({_some(foreign)}); move them or use "
             "another folder"
         )
-    changed = sorted(name for name, stated in hashes.items() if _is_changed(folder / name, stated, kept.get(name)))
+    changed = []
+    for name, stated in sorted(hashes.items()):
+        if os.path.lexists(folder / name):
+            try:
+                content = read_regular_file(folder / name)
+            except OSError:
+                content = None  # a link to nowhere, a pipe: not what was written
+            if content is None or (content != kept.get(name) and sha256(content).hexdigest() != stated):
+                changed.append(name)
     if changed:
         raise DataError(
             f"{folder}: contains files that were changed since its {kind.noun} was written ({_some(changed)}); move "
@@ -160,17 +168,6 @@ def read_json(path: Path) -> Any:
 
 def _some(names: Sequence[str]) -> str:
     return ", ".join(names[:_NAMED]) + (", ..." if len(names) > _NAMED else "")
-
-
-def _is_changed(path: Path, stated: str, kept: bytes | None) -> bool:
-    """Tell whether a file is there, has another hash than the one that was stated, and is not kept as it is."""
-    if not os.path.lexists(path):
-        return False
-    try:
-        content = read_regular_file(path)
-    except OSError:
-        return True  # a link to nowhere, a pipe: not what was written
-    return content != kept and sha256(content).hexdigest() != stated
 
 
 def _listed(folder: Path) -> list[Path]:
@@ -291,9 +288,6 @@ ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
 TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log", ".asc")
 """Suffixes of text tables."""
 
-WALK_RECORDING = "recording.nc"
-"""Recording in the folder of a walk."""
-
 
 @checked
 def read_recording(
@@ -336,19 +330,10 @@ def read_recording(
         return read_foreign(file, column_map, atmosphere=atmosphere, map_name=map_name)
     if file.is_dir() and (file / RUN_FILE).exists():
         return read_stored(file).recording
-    return _read_file(_recording_of_walk(file) if file.is_dir() else file, atmosphere)
-
-
-def _recording_of_walk(folder: Path) -> Path:
-    """Return the recording in the folder of a walk; DataError where there is none."""
-    file = folder / WALK_RECORDING
-    if not file.is_file():
-        raise DataError(f"{folder}: contains no result of a walk or a simulation (no {WALK_RECORDING}, no {RUN_FILE})")
-    return file
-
-
-def _read_file(file: Path, atmosphere: float) -> Recording:
-    """Return the recording in a file whose columns have the names of channels, by its suffix."""
+    if file.is_dir():
+        if not (file / NETCDF_FILE).is_file():
+            raise DataError(f"{file}: contains no result of a walk or a simulation (no {NETCDF_FILE}, no {RUN_FILE})")
+        file /= NETCDF_FILE
     if file.suffix == ".nc":
         from ppafo.storage.netcdf_reading import read_netcdf
         from ppafo.storage.trial_reading import check_can_be_read

@@ -1,19 +1,19 @@
-"""Common reading of the text tables of motion analysis, ``.mot``, ``.sto`` and ``.trc``: lines, numbers, a clock."""
+"""Common reading of the tables of motion analysis (``.mot``, ``.sto``, ``.trc``): lines, numbers, doubled names."""
 
-import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
+from ppafo.storage.comma_separated import LONGEST_SHOWN, finite_number
 from ppafo.storage.files import read_bytes, text_of
 from ppafo.wording import one_line
 
-LONGEST_SHOWN = 40
-"""Characters of a cell that a message repeats."""
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_MOST_SAID = 3
+"""Doubled names of which each has a remark."""
 
 
 def text_lines(path: str | Path) -> list[str]:
@@ -32,8 +32,8 @@ def number_in(cell: str, line: int, label: str, gaps: Sequence[str] = ()) -> flo
     """Return the number in a cell, NaN for one of the texts in ``gaps``; DataError names line and column."""
     if cell.lower() in gaps:
         return float("nan")
-    value = float(cell) if _NUMBER.fullmatch(cell) else float("nan")
-    if not np.isfinite(value):
+    value = finite_number(cell)
+    if value is None:
         shown = one_line(cell)[:LONGEST_SHOWN]
         raise DataError(
             f"line {line}, column {label!r}: {shown!r} is not a finite number; fill the gap or cut the file there"
@@ -41,10 +41,49 @@ def number_in(cell: str, line: int, label: str, gaps: Sequence[str] = ()) -> flo
     return value
 
 
-def check_growing(time: Floats, lines: Sequence[int]) -> None:
-    """Refuse a time [s] that does not grow from row to row; ``lines`` are the lines of the rows in the file."""
-    stalled = np.flatnonzero(np.diff(time) <= 0.0)
-    if stalled.size:
-        index = int(stalled[0]) + 1
-        word = "stands still" if time[index] == time[index - 1] else "goes backwards"
-        raise DataError(f"line {lines[index]}: the clock {word}: {time[index]:g} s follows {time[index - 1]:g} s")
+def told_apart(names: Sequence[str], descriptions: Sequence[str] = ()) -> list[str]:
+    """Return names of which none is there twice: those of a doubled name are its descriptions, or ``NAME#2``.
+
+    A description is taken where all of that name have one, and nothing else is called so.
+    """
+    counts = Counter(names)
+    twins = {name: [index for index, other in enumerate(names) if other == name] for name in counts if counts[name] > 1}
+    apart = list(names)
+    for name, places in twins.items():
+        said = [descriptions[index].strip() if index < len(descriptions) else "" for index in places]
+        are_names = all(said) and len(set(said)) == len(said) and not set(said) & {*apart, *counts}
+        for number, index in enumerate(places):
+            apart[index] = said[number] if are_names else f"{name}#{number + 1}"
+    return apart
+
+
+def doubled(names: Sequence[str], apart: Sequence[str]) -> dict[str, list[str]]:
+    """Return by each doubled name those that stand for it."""
+    twins: dict[str, list[str]] = {}
+    for name, own in zip(names, apart, strict=True):
+        if name != own:
+            twins.setdefault(name, []).append(own)
+    return twins
+
+
+def without_copies(columns: Mapping[str, Floats], twins: Mapping[str, Sequence[str]]) -> dict[str, Floats]:
+    """Return columns in which one stands by the doubled name for all of that name, where these are the same."""
+    same = {
+        name: own
+        for name, own in twins.items()
+        if all(np.array_equal(columns[own[0]], columns[other], equal_nan=True) for other in own[1:])
+    }
+    copies = {other for own in same.values() for other in own}
+    first = {own[0]: name for name, own in same.items()}
+    return {first.get(name, name): values for name, values in columns.items() if name in first or name not in copies}
+
+
+def said_of_doubled(twins: Mapping[str, Sequence[str]], left: Mapping[str, object], noun: str) -> list[str]:
+    """Return a remark on each doubled name of which more than one is left; beyond a few their number alone."""
+    said = [
+        f"{noun} of one name, {one_line(name)[:LONGEST_SHOWN]!r}: they are {', '.join(map(repr, own))} here"
+        for name, own in twins.items()
+        if all(other in left for other in own)
+    ]
+    more = len(said) - _MOST_SAID
+    return said if more <= 0 else [*said[:_MOST_SAID], f"so are {noun} of {more} more names"]

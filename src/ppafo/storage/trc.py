@@ -13,8 +13,8 @@ import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.signals.recording import TIME, Floats
-from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart, without_copies
-from ppafo.storage.text_table import LONGEST_SHOWN, check_growing, number_in, text_lines
+from ppafo.storage.comma_separated import LONGEST_SHOWN, check_clock
+from ppafo.storage.text_table import doubled, number_in, said_of_doubled, text_lines, told_apart, without_copies
 from ppafo.wording import one_line
 
 _FIRST_WORD = "PathFileType"
@@ -50,7 +50,12 @@ def read_trc(path: str | Path) -> MarkerTable:
         if unit not in _UNITS:
             shown = one_line(unit)[:LONGEST_SHOWN]
             raise DataError(f"line 3: Units is {shown!r}; allowed are {', '.join(_UNITS)}")
-        written = _names(lines[3])
+        head = [cell.strip() for cell in lines[3].split("\t")]
+        if len(head) < 3 or head[1].lower() != "time":
+            raise DataError("line 4: must begin with 'Frame#', 'Time' and the names of markers, separated by tabs")
+        written = [name for name in head[2:] if name]
+        if not written:
+            raise DataError("line 4: names no marker; every marker needs a name of its own")
         names = told_apart(written)
         time, coordinates = _rows(lines, names)
     except DataError as error:
@@ -58,17 +63,6 @@ def read_trc(path: str | Path) -> MarkerTable:
     twins = doubled(written, names)
     markers = without_copies(dict(zip(names, coordinates, strict=True)), twins)
     return MarkerTable(time, markers, unit, tuple(said_of_doubled(twins, markers, "markers")))
-
-
-def _names(line: str) -> list[str]:
-    """Return the names of the markers in line 4, which come after the names of frame and time."""
-    cells = [cell.strip() for cell in line.split("\t")]
-    if len(cells) < 3 or cells[1].lower() != "time":
-        raise DataError("line 4: must begin with 'Frame#', 'Time' and the names of markers, separated by tabs")
-    names = [name for name in cells[2:] if name]
-    if not names:
-        raise DataError("line 4: names no marker; every marker needs a name of its own")
-    return names
 
 
 def _rows(lines: list[str], names: list[str]) -> tuple[Floats, list[Floats]]:
@@ -90,5 +84,5 @@ def _rows(lines: list[str], names: list[str]) -> tuple[Floats, list[Floats]]:
     if not rows:
         raise DataError("has no rows")
     values = np.array(rows)
-    check_growing(values[:, 0], numbers)
+    check_clock(values[:, 0], numbers, may_have_trials=False)
     return values[:, 0], [values[:, 1 + 3 * index : 4 + 3 * index].T for index in range(len(names))]

@@ -12,7 +12,7 @@ from ppafo import load_device, load_parameter_set, load_scenario, load_study, lo
 from ppafo.cli.main import build_parser, main
 from ppafo.cli.new import KINDS
 from ppafo.kinds import kind_at
-from ppafo.parameters.audit import audit
+from ppafo.parameters.audit import findings_of
 
 SHIPPED = [
     (kind, Path(item.name).stem)
@@ -45,7 +45,7 @@ def test_every_template_loads_as_it_is_under_its_new_name(kind: str, capsys: pyt
 
 def test_the_set_of_the_template_passes_the_audit() -> None:
     main(["new", "set", "bench"])
-    assert {finding.severity for finding in audit(load_parameter_set("bench.toml"))} == {"note"}
+    assert {finding.severity for finding in findings_of(load_parameter_set("bench.toml"))} == {"note"}
     assert load_device("bench.toml").valve.kind == "proportional"
 
 
@@ -53,11 +53,11 @@ def test_what_a_copy_of_a_set_accepts_lapses_where_it_changes_a_value_of_the_fin
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     main(["new", "set", "own", "--from", "ppafo2011"])
-    same = {finding.id: finding.accepted for finding in audit(load_parameter_set("own.toml"))}
+    same = {finding.id: finding.accepted for finding in findings_of(load_parameter_set("own.toml"))}
     assert same["flow-of-solenoid"].startswith("As for the proportional valve")
     text = Path("own.toml").read_text(encoding="utf-8")
     Path("own.toml").write_text(text.replace("value = 12.6\n", "value = 5.0\n", 1), encoding="utf-8")
-    changed = {finding.id: finding for finding in audit(load_parameter_set("own.toml"))}
+    changed = {finding.id: finding for finding in findings_of(load_parameter_set("own.toml"))}
     assert (changed["flow-of-solenoid"].severity, changed["flow-of-solenoid"].accepted) == ("error", "")
     assert changed["flow-of-proportional"].accepted == same["flow-of-proportional"]
     capsys.readouterr()

@@ -3,7 +3,7 @@
 import pytest
 
 from ppafo.gait.recorded.near_columns import nearest_column
-from ppafo.storage.doubled_names import told_apart
+from ppafo.storage.text_table import told_apart
 
 MARKERS = ["RTOE.x", "RTOE.y", "RANK.x", "LKNE.x", "RHEE.x", "RASI.x"]
 COORDINATES = ["ankle_angle_l", "knee_angle_r", "hip_flexion_r", "subtalar_angle_r", "pelvis_tilt", "R.Knee.x"]

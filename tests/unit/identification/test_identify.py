@@ -20,7 +20,7 @@ from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory import FittedExperiment, tolerance_parameters
 from ppafo.identification.trajectory.tolerances import stated_by
 from ppafo.parameters import apply_overrides, build_device
-from ppafo.parameters.audit import audit
+from ppafo.parameters.audit import findings_of
 from ppafo.parameters.audit.changes import changes
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
 from ppafo.report.finding import files_of, text_of
@@ -176,7 +176,7 @@ def test_an_identified_set_is_audited_without_what_was_reported_of_the_set_that_
     assert any(path.startswith("reported.") for path in before.numbers)
     found = solved(FLOW).new_set.parameter_set
     assert not any(path.startswith("reported.") for path in found.numbers)
-    ids = {one.id for one in audit(found)}
+    ids = {one.id for one in findings_of(found)}
     assert {"flow-of-proportional", "idle-acceptance"} & ids == set()
     assert "open-flow-of-proportional" in ids
     assert not any(one.path.startswith("reported.") for one in changes(found, before))

@@ -13,7 +13,7 @@ from ppafo.engine.rows import leaves
 from ppafo.errors import ParameterError, PpafoError
 from ppafo.model.actuators.table import bases_at, level_of
 from ppafo.parameters.actuator_table import read_actuator_table, table_of, within_resolution
-from ppafo.parameters.audit import audit
+from ppafo.parameters.audit import findings_of
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
 from ppafo.parameters.measured_volumes import MeasuredVolumes, read_measured_volumes
 from ppafo.simulation.ensemble.columns import check_columns
@@ -173,9 +173,9 @@ def test_the_audit_says_by_how_much_a_rounded_table_is_moved(tmp_path: Path) -> 
     path, table = tmp_path / "measured-bladder.toml", tmp_path / "measured-bladder.csv"
     path.write_text(text.replace("angle_max]\nvalue = 110", "angle_max]\nvalue = 75"), encoding="utf-8")
     table.write_bytes((EXAMPLE / "measured-bladder.csv").read_bytes())
-    assert "rounded-table" not in {finding.id for finding in audit(path)}
+    assert "rounded-table" not in {finding.id for finding in findings_of(load_parameter_set(path))}
     table.write_text("\n".join([HEADER, *ROUNDED]), encoding="utf-8")
-    (found,) = (finding for finding in audit(path) if finding.id == "rounded-table")
+    (found,) = (finding for finding in findings_of(load_parameter_set(path)) if finding.id == "rounded-table")
     assert "within the steps of 0.1 mL" in found.paragraph
 
 

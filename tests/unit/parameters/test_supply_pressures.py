@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.parameters import apply_overrides, build_device, load_device, load_parameter_set
-from ppafo.parameters.audit import audit
+from ppafo.parameters.audit import findings_of
 from ppafo.units import to_si
 
 SET = (resources.files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text(encoding="utf-8")
@@ -78,7 +78,7 @@ def test_audit_finds_an_orifice_in_two_forms_and_says_what_each_valve_passes(tmp
     )
     path = tmp_path / "mine.toml"
     path.write_text(SET + more, encoding="utf-8")
-    found = {finding.id: finding for finding in audit(load_parameter_set(str(path)))}
+    found = {finding.id: finding for finding in findings_of(load_parameter_set(str(path)))}
     assert found["forms-of-solenoid"].severity == "error"
     assert "area, discharge_coefficient, critical_ratio, sonic_conductance" in found["forms-of-solenoid"].paragraph
     assert "open-flow-of-solenoid" not in found
@@ -90,7 +90,7 @@ def test_audit_prints_the_flow_of_a_valve_in_the_gas_of_the_set() -> None:
     flows = {}
     for gas in ("air", "CO2"):
         changed = apply_overrides(load_parameter_set("ppafo2011"), [*overrides, f"gas.species={gas}"], valve="solenoid")
-        found = {finding.id: finding for finding in audit(changed)}["open-flow-of-solenoid"]
+        found = {finding.id: finding for finding in findings_of(changed)}["open-flow-of-solenoid"]
         assert "counts for air" in found.paragraph
         flows[gas] = found.sides[0].value
     supply = psi(50.0) / 1e5

@@ -17,7 +17,7 @@ from ppafo import linearise, validate
 from ppafo.cli.main import main
 from ppafo.errors import PpafoError
 from ppafo.exports.c_library import c_library
-from ppafo.parameters.audit import audit
+from ppafo.parameters.audit import findings_of
 from ppafo.parameters.loading import load_device, load_parameter_set
 from ppafo.parameters.overrides import apply_overrides
 from ppafo.parameters.reach import supply_for, torque_reach
@@ -277,7 +277,7 @@ def test_a_linear_model_names_the_chamber_that_is_evacuated() -> None:
 @pytest.mark.parametrize(("text", "severity"), [("-60 kPa_g", "note"), ("0.5 bar_a", "warning")])
 def test_an_audit_tells_of_a_vacuum_and_doubts_an_absolute_unit(text: str, severity: str) -> None:
     changed = apply_overrides(load_parameter_set("ppafo2011"), [f"supply.pressure={text}"])
-    found = {finding.id: finding for finding in audit(changed)}
+    found = {finding.id: finding for finding in findings_of(changed)}
     assert found["vacuum-1"].severity == severity
     assert found["torque-ceiling"].sides[0].value > 0.0
     assert "from the atmosphere to" in found["open-flow-of-proportional"].paragraph

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 import ppafo
 from ppafo.errors import DataError
 from ppafo.storage.column_map import ColumnMap, json_schema, load_column_map
-from ppafo.storage.doubled_names import said_of_doubled
 from ppafo.storage.foreign import read_foreign, read_trials
+from ppafo.storage.text_table import said_of_doubled
 from tests.repeatable import TOO_SLOW
 
 TIME = {"column": 1, "unit": "ms"}

@@ -284,7 +284,7 @@ def test_a_variable_that_is_not_there_is_named_with_its_key(matlab: Path, column
 
 def test_an_object_of_matlab_is_named_with_what_to_save(tmp_path: Path) -> None:
     saved_v73(tmp_path / "run.mat")
-    assert read_matlab(tmp_path / "run.mat").objects == (("thing", "timeseries"),)
+    assert read_matlab(tmp_path / "run.mat").objects == [("thing", "timeseries")]
     channels = {"time": {"column": "thing.Time", "unit": "s"}}
     with pytest.raises(
         DataError, match=r"thing \(timeseries\) is an object .* t = thing\.Time; y = squeeze\(thing\.Data\)"
@@ -326,7 +326,7 @@ def test_an_object_of_an_older_file_is_named_with_the_line_that_saves_it_plainly
     thing = np.array([(b"log", b"MCOS", kind.encode(), np.zeros(6))], dtype=fields)
     monkeypatch.setattr(scipy.io, "loadmat", lambda *_, **__: {"y": PRESSURE, "None": thing})
     file = open_matlab(path)
-    assert file.objects == (("log", kind),)
+    assert file.objects == [("log", kind)]
     assert f"log ({kind}) is an object that only MATLAB reads" in file.said_of_objects()
     assert line in file.said_of_objects()
 

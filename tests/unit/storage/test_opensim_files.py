@@ -63,8 +63,8 @@ def test_line_ends_of_every_system_are_read(tmp_path: Path) -> None:
         (NEW + ROWS.replace("-1.6", "1,6"), "line 9, column 'knee_angle_r': '1,6' is not a finite number"),
         (NEW + ROWS.replace("-1.7", "1e999"), "line 10, column 'knee_angle_r': '1e999' is not a finite number"),
         (NEW + ROWS.replace("\t.5", ""), "line 10 has 2 values for 3 columns"),
-        (NEW + ROWS.replace("0.01", "0.00"), "line 9: the clock stands still: 0 s follows 0 s"),
-        (NEW + ROWS.replace("0.02", "-0.5"), "line 10: the clock goes backwards: -0.5 s follows 0.01 s"),
+        (NEW + ROWS.replace("0.01", "0.00"), "line 9, column 'time': the clock stands still: 0 s follows 0 s"),
+        (NEW + ROWS.replace("0.02", "-0.5"), "line 10, column 'time': the clock goes backwards: -0.5 s follows 0.01 s"),
         (NEW + ROWS + "\0", "is not a text file"),
     ],
 )

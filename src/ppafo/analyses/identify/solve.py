@@ -20,7 +20,7 @@ from ppafo.identification.source import RecordingSource, UsedRecording, double_u
 from ppafo.identification.tolerances import tolerances_of
 from ppafo.identification.trajectory.layout import ExperimentSection
 from ppafo.identification.trajectory.section import SectionContext, solve_section
-from ppafo.parameters.audit import audit
+from ppafo.parameters.audit import findings_of
 from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, number_in_si
@@ -180,7 +180,7 @@ def _named_set(identification: Identification, problem: ProblemFile) -> Paramete
         # Of a device that was measured, what others report of another one says nothing.
         is_of_report = {
             finding.id
-            for finding in audit(identification.before)
+            for finding in findings_of(identification.before)
             if any(value.path.startswith(_REPORTED) for value in finding.values)
         }
         old = replace(

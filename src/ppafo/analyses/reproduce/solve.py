@@ -25,12 +25,13 @@ from ppafo.analyses.reproduce.step_response import SupplyLevels, step_events, st
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.parameters import load_parameter_set
-from ppafo.parameters.audit import audit
+from ppafo.parameters.audit import findings_of
 from ppafo.parameters.overrides import Override, override_set, read_overrides
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.recording import Floats
-from ppafo.simulation.declaration import OF_A_VANE, value_at
+from ppafo.simulation.declaration import OF_A_VANE
+from ppafo.simulation.document import value_at
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.overrides import apply_overrides, chosen_by, is_of_device, unknown_value
 from ppafo.simulation.scenario import Scenario
@@ -283,9 +284,9 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
         synthetic=synthetic,
         assumed=assumed,
         printed_set=reported.parameter_set.name,
-        printed_findings=tuple(audit(reported.parameter_set)),
+        printed_findings=tuple(findings_of(reported.parameter_set)),
         completed_set=completed.name,
-        completed_findings=tuple(audit(completed)),
+        completed_findings=tuple(findings_of(completed)),
         overrides=tuple(overrides),
     )
 

@@ -1,14 +1,18 @@
 """Audit of parameter sets: changes against their parents and contradictions, in words and as data."""
 
 import textwrap
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
-from ppafo.errors import ParameterError, refused_as
+from ppafo.arguments import checked
+from ppafo.errors import ParameterError, at_fault, refused_as
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
-from ppafo.parameters.audit import AuditFinding, audit, changed_paths
+from ppafo.parameters.audit import AuditFinding, changed_paths, findings_of
 from ppafo.parameters.audit.changes import changes
+from ppafo.parameters.loading import set_or_load
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.finding import Finding, Section, columns_of
 from ppafo.wording import count_of
 
@@ -17,84 +21,126 @@ _INDENT = "    "
 _SEVERITIES = ("error", "warning", "note")
 
 
-def audited(
-    names: Sequence[str], parent: str | None, is_whole: bool, overrides: Sequence[str]
-) -> Finding[dict[str, Any]]:
+@dataclass(frozen=True, slots=True)
+class AuditedSet:
+    """A parameter set with its findings, errors first, and the parent that it was compared with."""
+
+    parameter_set: ParameterSet
+    parent: ParameterSet | None
+    findings: tuple[AuditFinding, ...]
+    overrides: tuple[str, ...] = ()
+
+    def __iter__(self) -> Iterator[AuditFinding]:
+        """Go through the findings."""
+        return iter(self.findings)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of findings by severity."""
+        return {name: sum(finding.severity == name for finding in self.findings) for name in _SEVERITIES}
+
+    def json_document(self) -> dict[str, Any]:
+        """Return the findings, and what the set changes of its parent, as plain data."""
+        parent = self.parent
+        return {
+            "set": self.parameter_set.name,
+            "overrides": list(self.overrides),
+            "counts": self.counts,
+            "findings": [finding.document() for finding in self.findings],
+            "parent": None if parent is None else parent.name,
+            "changes": [] if parent is None else [asdict(change) for change in changes(self.parameter_set, parent)],
+        }
+
+
+@checked
+def audit(
+    parameter_set: ParameterSet | str | Path, *, parent: ParameterSet | str | Path | None = None, plugins: Plugins = ()
+) -> Finding[AuditedSet]:
+    """Audit of a parameter set: contradictions and values that deserve attention, errors first.
+
+    An error that the set accepts with a reason becomes a warning that shows the reason. A reason that stands in its
+    ``parent`` too, the set that the file names unless given, lapses where the set changes a value of the finding. A
+    reason for something that is not found is a warning, so that it does not outlive what it excuses.
+
+    Arguments:
+        parameter_set: the set, its name or its file
+        parent: the set that it was made from; default: the one that its file names
+        plugins: modules of your own, files or names, whose objects files may name
+
+    Returns:
+        a Finding to go through: each item has its numbers, sentence and severity; it has passed without an error
+
+    Raises:
+        ParameterError: a set that cannot be read
+
+    >>> import ppafo
+    >>> [finding.id for finding in ppafo.audit("ppafo2011") if finding.severity == "warning"][:3]
+    ['flow-of-proportional', 'flow-of-solenoid', 'one-coefficient-proportional-solenoid']
+    """
+    name_plugins(plugins)
+    loaded = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
+    # An argument, or the key of the set.
+    with at_fault("parent"):
+        of_parent = set_or_load(loaded.parent or None if parent is None else parent)
+    return _finding_of([AuditedSet(loaded, of_parent, tuple(findings_of(loaded, of_parent)))], True)
+
+
+def audited(names: Sequence[str], parent: str | None, is_whole: bool, overrides: Sequence[str]) -> Finding[Any]:
     """Return changes and findings of one set, or a table of several; it has not passed where one is an error.
 
     Where ``is_whole`` is false, findings that concern no changed value of a set with a parent or overrides are counted.
     """
-    sets = [apply_overrides(load_parameter_set(name), overrides) for name in names]
-    parents = [_parent(parameter_set, parent) for parameter_set in sets]
-    findings = [audit(parameter_set, parent=before) for parameter_set, before in zip(sets, parents, strict=True)]
-    documents = [_document(*audited_set, overrides) for audited_set in zip(sets, parents, findings, strict=True)]
-    if len(sets) == 1:
-        compares = parents[0] is not None or bool(overrides)
-        changed = changed_paths(sets[0], parents[0]) if compares and not is_whole else None
-        parts = _parts(sets[0], findings[0], changed)
-        if parents[0] is not None:
-            parts.insert(0, _changes_part(sets[0].name, parents[0].name, documents[0]["changes"]))
+    sets = []
+    for name in names:
+        loaded = apply_overrides(load_parameter_set(name), overrides)
+        with refused_as(ParameterError, "--parent" if parent else f"{loaded.file}: parent", ParameterError):
+            of_parent = set_or_load(parent or loaded.parent or None)
+        sets.append(AuditedSet(loaded, of_parent, tuple(findings_of(loaded, of_parent)), tuple(overrides)))
+    return _finding_of(sets, is_whole)
+
+
+def _finding_of(sets: Sequence[AuditedSet], is_whole: bool) -> Finding[Any]:
+    first, is_one = sets[0], len(sets) == 1
+    if is_one:
+        compares = first.parent is not None or bool(first.overrides)
+        changed = changed_paths(first.parameter_set, first.parent) if compares and not is_whole else None
+        parts = _parts(first, changed)
     else:
-        parts = [_table(sets, findings)]
+        verdicts = [
+            {finding.id: "accepted" if finding.accepted else finding.severity for finding in each} for each in sets
+        ]
+        head = ["finding", *(each.parameter_set.name for each in sets)]
+        ids = dict.fromkeys(name for verdict in verdicts for name in verdict)
+        rows = ([name, *(verdict.get(name) for verdict in verdicts)] for name in ids)
+        parts = [Section(columns=columns_of(head, rows))]
     return Finding(
-        name=f"audit-{sets[0].name}" if len(sets) == 1 else "audit",
+        name=f"audit-{first.parameter_set.name}" if is_one else "audit",
         kicker="Audit",
-        title=", ".join(parameter_set.name for parameter_set in sets),
+        title=", ".join(each.parameter_set.name for each in sets),
         said=(),
         parts=parts,
-        found=documents[0] if len(sets) == 1 else {"sets": documents},
-        passed=not any(document["counts"]["error"] for document in documents),
+        found=first if is_one else {"sets": [each.json_document() for each in sets]},
+        passed=not any(each.counts["error"] for each in sets),
         kind="measured",
         command="sets audit",
     )
 
 
-def _parent(parameter_set: ParameterSet, parent: str | None) -> ParameterSet | None:
-    """Return the set to compare with: the one of the argument, else the one that the file names, if it names any."""
-    name = parent or parameter_set.parent
-    if not name:
-        return None
-    with refused_as(ParameterError, "--parent" if parent else f"{parameter_set.file}: parent", ParameterError):
-        return load_parameter_set(name)
+def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Section]:
+    """Return what a set changes of its parent, errors and what concerns a ``changed`` value, and how many there are.
 
-
-def _document(
-    parameter_set: ParameterSet, parent: ParameterSet | None, findings: list[AuditFinding], overrides: Sequence[str]
-) -> dict[str, Any]:
-    return {
-        "set": parameter_set.name,
-        "overrides": list(overrides),
-        "counts": _counts(findings),
-        "findings": [finding.document() for finding in findings],
-        "parent": None if parent is None else parent.name,
-        "changes": [] if parent is None else [asdict(change) for change in changes(parameter_set, parent)],
-    }
-
-
-def _counts(findings: list[AuditFinding]) -> dict[str, int]:
-    return {severity: sum(finding.severity == severity for finding in findings) for severity in _SEVERITIES}
-
-
-def _changes_part(name: str, parent: str, changed: list[dict[str, Any]]) -> Section:
-    """Return what a set changes of its parent."""
-    rows = [(change["path"], change["before"] or None, change["after"] or None, change["origin"]) for change in changed]
-    changes = count_of(len(rows), "value") if rows else "nothing"
-    said = f"{name} changes {changes} of its parent {parent}"
-    return Section(said=[said], columns=columns_of(("value", parent, name, "origin"), rows), left=4)
-
-
-def _table(sets: list[ParameterSet], findings: list[list[AuditFinding]]) -> Section:
-    """Return a row for each finding and a column for each set, with how serious it is there."""
-    verdicts = [
-        {finding.id: "accepted" if finding.accepted else finding.severity for finding in of_set} for of_set in findings
-    ]
-    head = ["finding", *(parameter_set.name for parameter_set in sets)]
-    ids = dict.fromkeys(name for verdict in verdicts for name in verdict)
-    return Section(columns=columns_of(head, ([name, *(verdict.get(name) for verdict in verdicts)] for name in ids)))
-
-
-def _parts(parameter_set: ParameterSet, findings: list[AuditFinding], changed: frozenset[str] | None) -> list[Section]:
-    """Return the errors and what concerns a ``changed`` value, all findings for None, then how many there are."""
+    All findings are shown where ``changed`` is None.
+    """
+    name, parent, findings = audited_set.parameter_set.name, audited_set.parent, audited_set.findings
+    parts = []
+    if parent is not None:
+        rows = [
+            (change.path, change.before or None, change.after or None, change.origin)
+            for change in changes(audited_set.parameter_set, parent)
+        ]
+        count = count_of(len(rows), "value") if rows else "nothing"
+        said = f"{name} changes {count} of its parent {parent.name}"
+        parts.append(Section(said=[said], columns=columns_of(("value", parent.name, name, "origin"), rows), left=4))
     shown = [
         finding
         for finding in findings
@@ -103,12 +149,12 @@ def _parts(parameter_set: ParameterSet, findings: list[AuditFinding], changed: f
         or not finding.values
         or any(value.path in changed for value in finding.values)
     ]
-    summary = ", ".join(count_of(count, severity) for severity, count in _counts(findings).items())
+    summary = ", ".join(count_of(count, severity) for severity, count in audited_set.counts.items())
     left = len(findings) - len(shown)
     if left:
         concern = "concerns" if left == 1 else "concern"
         summary += f"; {left} of them {concern} no changed value: --all"
-    return [*(Section(said=_lines(finding)) for finding in shown), Section(said=[f"{parameter_set.name}: {summary}"])]
+    return [*parts, *(Section(said=_lines(finding)) for finding in shown), Section(said=[f"{name}: {summary}"])]
 
 
 def _lines(finding: AuditFinding) -> list[str]:

@@ -6,10 +6,7 @@ To add one: a function in the module of its subject and one line here.
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path
 
-from ppafo.arguments import checked
-from ppafo.errors import at_fault
 from ppafo.parameters.audit.chambers import (
     check_filling,
     check_rotation,
@@ -29,11 +26,10 @@ from ppafo.parameters.audit.values import (
     check_ranges,
     check_statements,
 )
-from ppafo.parameters.loading import load_parameter_set, set_or_load
+from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.parameter_set import ParameterSet, overridden_paths, with_followers
-from ppafo.plugins import Plugins, name_plugins
 
-__all__ = ["AuditFinding", "ComparedNumber", "NamedValue", "Severity", "audit", "changed_paths"]
+__all__ = ["AuditFinding", "ComparedNumber", "NamedValue", "Severity", "changed_paths", "findings_of"]
 
 CHECKS: dict[str, Callable[[Evidence], Iterator[AuditFinding]]] = {
     "missing": check_missing,
@@ -60,36 +56,13 @@ CHECKS: dict[str, Callable[[Evidence], Iterator[AuditFinding]]] = {
 _ORDER = {"error": 0, "warning": 1, "note": 2}
 
 
-@checked
-def audit(
-    parameter_set: ParameterSet | str | Path, *, parent: ParameterSet | str | Path | None = None, plugins: Plugins = ()
-) -> list[AuditFinding]:
-    """Audit of a parameter set: contradictions and values that deserve attention, errors first.
+def findings_of(audited: ParameterSet, parent: ParameterSet | None = None) -> list[AuditFinding]:
+    """Return contradictions of a set and values that deserve attention, errors first; see ``ppafo.audit``.
 
-    An error that the set accepts with a reason becomes a warning that shows the reason. A reason that stands in its
-    ``parent`` too, the set that the file names unless given, lapses where the set changes a value of the finding. A
-    reason for something that is not found is a warning, so that it does not outlive what it excuses.
-
-    Arguments:
-        parameter_set: the set, its name or its file
-        parent: the set that it was made from; default: the one that its file names
-        plugins: modules of your own, files or names, whose objects files may name
-
-    Returns:
-        findings with their numbers, sentence and severity
-
-    Raises:
-        ParameterError: a set that cannot be read
-
-    >>> import ppafo
-    >>> [finding.id for finding in ppafo.audit("ppafo2011") if finding.severity == "warning"][:3]
-    ['flow-of-proportional', 'flow-of-solenoid', 'one-coefficient-proportional-solenoid']
+    ``parent`` is the set that it was made from, the one that its file names unless given: a reason that stands there
+    too lapses where the set changes a value of the finding.
     """
-    name_plugins(plugins)
-    audited = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
-    # An argument, or the key of the set.
-    with at_fault("parent"):
-        of_parent = set_or_load(audited.parent or None if parent is None else parent)
+    of_parent = set_or_load(parent or audited.parent or None)
     evidence = Evidence(with_followers(audited), audited.declarations())
     findings = [finding for check in CHECKS.values() for finding in check(evidence)]
     changed, ids = overridden_paths(audited), {finding.id for finding in findings}

@@ -7,18 +7,18 @@ import pytest
 
 from ppafo.errors import ParameterError
 from ppafo.parameters import apply_overrides, build_device, list_sets, load_parameter_set
-from ppafo.parameters.audit import AuditFinding, audit
+from ppafo.parameters.audit import AuditFinding, findings_of
 
 BASE = load_parameter_set("ppafo2011")
 REPORTED_FLOW = "reported.valves.proportional.mass_flow"
 
 
 def findings(*overrides: str) -> dict[str, AuditFinding]:
-    return {finding.id: finding for finding in audit(apply_overrides(BASE, overrides))}
+    return {finding.id: finding for finding in findings_of(apply_overrides(BASE, overrides))}
 
 
 def _of_set(name: str, *overrides: str) -> dict[str, AuditFinding]:
-    return {finding.id: finding for finding in audit(apply_overrides(load_parameter_set(name), overrides))}
+    return {finding.id: finding for finding in findings_of(apply_overrides(load_parameter_set(name), overrides))}
 
 
 def side(finding: AuditFinding, label: str) -> float:
@@ -142,7 +142,7 @@ def test_the_reason_does_not_cover_a_value_that_was_overridden() -> None:
 
 
 def test_a_reason_for_nothing_is_a_warning() -> None:
-    idle = audit(replace(BASE, accepted={**BASE.accepted, "volume-7": "because"}))
+    idle = findings_of(replace(BASE, accepted={**BASE.accepted, "volume-7": "because"}))
     assert [finding.severity for finding in idle if finding.id == "idle-acceptance"] == ["warning"]
 
 
@@ -153,7 +153,7 @@ def test_a_value_that_no_device_can_have_is_an_error() -> None:
 
 
 def test_a_set_with_almost_nothing_in_it_has_nothing_to_say_but_what_is_missing() -> None:
-    [finding] = audit(replace(BASE, numbers={}, texts={}, accepted={}))
+    [finding] = findings_of(replace(BASE, numbers={}, texts={}, accepted={}))
     assert (finding.id, finding.severity) == ("missing-values", "warning")
     with pytest.raises(ParameterError) as caught:
         build_device(replace(BASE, numbers={}, texts={}))
@@ -163,7 +163,7 @@ def test_a_set_with_almost_nothing_in_it_has_nothing_to_say_but_what_is_missing(
 
 
 def test_nothing_is_said_to_be_missing_in_a_complete_set_or_in_one_that_names_what_completes_it() -> None:
-    sets = [audit(load_parameter_set(name)) for name in list_sets()]
+    sets = [findings_of(load_parameter_set(name)) for name in list_sets()]
     assert not [finding for found in sets for finding in found if finding.id == "missing-values"]
 
 
@@ -218,7 +218,7 @@ def test_choked_filling_takes_the_time_of_the_closed_formula() -> None:
 
 def test_a_set_without_reports_is_asked_nothing() -> None:
     silent = {path: entry for path, entry in BASE.numbers.items() if not path.startswith("reported.")}
-    found = {finding.id for finding in audit(replace(BASE, numbers=silent))}
+    found = {finding.id for finding in findings_of(replace(BASE, numbers=silent))}
     assert not found & {"gas-of-one-filling", "walking-torque", "rated-torque", "walking-torque-in-time-solenoid"}
 
 
@@ -241,7 +241,7 @@ def test_a_torque_of_another_actuator_says_so() -> None:
 
 def with_key(path: str, key: str) -> list[AuditFinding]:
     numbers = {**BASE.numbers, path: BASE.numbers[path].model_copy(update={"key": key})}
-    return [item for item in audit(replace(BASE, numbers=numbers)) if item.id.endswith("-against-statement")]
+    return [item for item in findings_of(replace(BASE, numbers=numbers)) if item.id.endswith("-against-statement")]
 
 
 def test_a_value_with_the_key_of_a_statement_is_the_number_that_this_states() -> None:
@@ -265,7 +265,7 @@ def test_every_published_number_of_a_shipped_set_names_its_statement(name: str) 
         if entry.origin == "published" and not entry.key and not entry.source.startswith(WITHOUT_A_FILE)
     ]
     assert unnamed == []
-    assert not [found for found in audit(load_parameter_set(name)) if found.id.endswith("-against-statement")]
+    assert not [found for found in findings_of(load_parameter_set(name)) if found.id.endswith("-against-statement")]
 
 
 @pytest.mark.parametrize(

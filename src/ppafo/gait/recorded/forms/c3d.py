@@ -12,8 +12,8 @@ from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
 from ppafo.gait.recorded.table import Events, MotionTable, TrialData, bare_label
 from ppafo.signals.recording import Floats
-from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart
 from ppafo.storage.files import read_bytes
+from ppafo.storage.text_table import doubled, said_of_doubled, told_apart
 from ppafo.storage.trial_reading import check_can_be_read
 from ppafo.wording import one_line
 
