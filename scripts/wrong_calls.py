@@ -87,7 +87,6 @@ RIGHT: Mapping[str, tuple[str, ...]] = {
     "from zero": ("zero", "one and a half", "huge"),
     "function": ("class",),
     "path": ("no such name", "no such file", "'False'", "'-3'", "'nan'", "wrong unit"),
-    "address": (),
     "content": (),
 }
 """The values above that are right, by the kind of an argument; None besides where it is the default."""
@@ -151,7 +150,6 @@ KINDS: Mapping[str, str] = {
     "flag": "agreed check highest independent",
     "number": "at toes",
     "path": "out",
-    "address": "scheduler",
 }
 """Arguments by the kind that they have where a function does not say another one."""
 
@@ -195,7 +193,7 @@ ARGUMENTS: Mapping[str, str] = {
     ),
     "simulate": "scenario overrides",
     "simulate_many": "scenarios threads?",
-    "sweep": "overrides seed? threads? progress? study draws? out? scheduler? agreed",
+    "sweep": "overrides seed? threads? progress? study draws? out? agreed",
     "tune": "overrides seed? threads? progress? tuning",
     "validate": (
         "parameter_set:name recordings valve? overrides motion volume? initial thresholds longest_delay "

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from ppafo.errors import ScenarioError
 from ppafo.parameters.overrides import read_overrides
-from ppafo.simulation.loading import FILE, VANE, ScenarioRequest, scenario_of
+from ppafo.simulation.building import ScenarioRequest
+from ppafo.simulation.loading import FILE, VANE, scenario_of
 from ppafo.simulation.scenario import Scenario
 
 

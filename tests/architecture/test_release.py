@@ -56,7 +56,6 @@ def test_the_page_of_licences_lists_the_packages_of_the_lock() -> None:
 
 
 LAST_ADVISED = {
-    "distributed": "2026.1",  # CVE-2026-23528
     "jinja2": "3.1.6",  # CVE-2025-27516
     "pillow": "13.0",  # CVE-2026-112398 and those beside it, published with 13.0.0
     "pyarrow": "23.0.1",  # CVE-2026-25087

@@ -74,7 +74,7 @@ MADE: dict[str, Callable[[], Any]] = {
 IN_A_FOLDER: dict[str, Callable[[Path], Any]] = {
     "identify": _identified,
     "load_study_results": lambda folder: ppafo.load_study_results(
-        Path(ppafo.sweep(STUDY, draws=4, out=folder / "study").found.place.address)
+        ppafo.sweep(STUDY, draws=4, out=folder / "study").found.folder.path
     ),
     "read_recording": lambda folder: ppafo.read_recording(ppafo.simulate(TASK).save(folder / "run")),
     "read_result": lambda folder: ppafo.read_result(ppafo.simulate(TASK).save(folder / "run")),

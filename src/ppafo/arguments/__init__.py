@@ -1,7 +1,6 @@
 """Arguments: one signature makes the words of a command line and checks the calls in Python."""
 
 from ppafo.arguments.door import checked as checked
-from ppafo.arguments.words import Address as Address
 from ppafo.arguments.words import Angle as Angle
 from ppafo.arguments.words import Confidence as Confidence
 from ppafo.arguments.words import Count as Count

@@ -220,14 +220,6 @@ def point(text: str) -> float | str:
         raise ArgumentError(f"{text!r}: must be a time such as '1.5 s', or 'equilibrium'") from error
 
 
-def taken_address(value: Any) -> str:
-    """Return the address of a scheduler, which has a port or a protocol; ValueError for anything else."""
-    text = taken_text(value)
-    if ":" not in text:
-        raise ValueError
-    return text
-
-
 def taken_text(value: Any) -> str:
     """Return a text with something in it; ValueError for anything else.
 
@@ -459,7 +451,6 @@ Confidence = Annotated[float, fraction_word("confidence of all intervals; defaul
 MaximumFailed = Annotated[
     float, fraction_word("fraction of the runs that may fail before the study is refused; default {default}")
 ]
-Address = Annotated[str, Word("ADDRESS", take=taken_address, what="an address such as 'tcp://10.0.0.1:8786'")]
 Fraction = Annotated[float, fraction_word()]
 Side = Annotated[str, Word("right|left", help="which foot; default right")]
 Metrics = Annotated[Sequence[str], Word("NAME", option="--metric")]

@@ -7,7 +7,8 @@ from ppafo.errors import ScenarioError
 from ppafo.model.columns import Numeric, choose, larger, rounded_up, smaller, truncated
 from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
 from ppafo.parameters.overrides import read_overrides
-from ppafo.simulation.declaration import PERIOD, RATE, RUN, DocumentReader, value_at
+from ppafo.simulation.declaration import PERIOD, RATE, RUN
+from ppafo.simulation.document import DocumentReader, value_at
 from ppafo.simulation.motion_kind import RunTimes
 from ppafo.simulation.overrides import apply_overrides
 from ppafo.simulation.scenario import Scenario

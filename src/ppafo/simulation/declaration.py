@@ -1,29 +1,26 @@
-"""Every value that a scenario can hold: section, name, SI unit, range, default and meaning; and how one is read.
+"""Every value that a scenario can hold: section, name, SI unit, range, default and meaning.
 
 The schema, the conversion to SI, the messages and the overrides all read these lists; the settings of controllers and
 profiles come from their own catalogues. Limits are wide: they exclude slips of the pen and what no solver could handle.
-Reading turns a text with a unit into a float in SI, or into one clear line why not.
 """
 
 import functools
-import math
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from importlib import resources
 from typing import Any
 
-from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind
 from ppafo.documents.problems import quote
-from ppafo.errors import KindError, ScenarioError, UnitError, refused_as
+from ppafo.errors import KindError, ScenarioError, refused_as
 from ppafo.kinds import Kinds
 from ppafo.model.controlled import CONTROLLED, TORQUE
-from ppafo.model.declaration import Quantity, quantities_of, range_rule
+from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
-from ppafo.parameters.declaration import is_within, limits_text
 from ppafo.parameters.parameter_set import Entry
+from ppafo.simulation.document import REFERENCE_OF, controlled_in, kind_at
 from ppafo.simulation.motion_kind import MOTIONS, MotionSection, is_walk
 from ppafo.simulation.scenario import (
     FreeMotion,
@@ -35,12 +32,8 @@ from ppafo.simulation.scenario import (
     Sensors,
     SupplyLine,
 )
-from ppafo.units import format_quantity, parse_quantity, split_quantity, to_si
-from ppafo.units.shown import shown_unit
-from ppafo.wording import nearest_name, one_line
-
-PLAIN = ("", "1")
-"""Units of a plain number."""
+from ppafo.units import to_si
+from ppafo.wording import nearest_name
 
 *RUN, ACCURACY = quantities_of(RunSettings)
 FREE = quantities_of(FreeMotion)
@@ -73,8 +66,6 @@ RATE = Quantity("rate", "Hz", "samples per second; or give the period", None, 1.
 PERIOD = Quantity("period", "s", "time between two samples; or give the rate", None, 1.0e-8, 1.0e6)
 SAMPLING = (RATE, PERIOD)
 
-REFERENCE_OF = "reference.of"
-"""Path of the controlled quantity, a word of ``CONTROLLED``."""
 PURPOSE = "reference.beyond_reach"
 """Key of a file with the reason why its reference lies beyond the reach of the device."""
 _OF_REACH = ("reference.", "supply.", "actuator.", "motion.", "device.")
@@ -126,12 +117,6 @@ class DeclaredContent:
 def changes_reach(paths: Iterable[str]) -> bool:
     """True where a path is of a reference, or of what decides how far a device reaches."""
     return any(path.startswith(_OF_REACH) for path in paths)
-
-
-def controlled_in(document: Mapping[str, Any]) -> str:
-    """Return what the reference of a document is of: a torque where it says nothing, or nothing that is known."""
-    name = value_at(document, REFERENCE_OF)
-    return name if isinstance(name, str) and name in CONTROLLED else TORQUE
 
 
 def controller_settings(kind: str, controlled: str = TORQUE) -> tuple[Quantity, ...]:
@@ -283,21 +268,6 @@ def check_motion_kind(kind: object, place: str) -> None:
         )
 
 
-def kind_at(document: Mapping[str, Any], section: str) -> str:
-    """Return the kind that a section names, an empty text where it does not."""
-    kind = value_at(document, f"{section}.kind")
-    # Anything but a text is refused by the layout, with its place.
-    return kind if isinstance(kind, str) else ""
-
-
-def value_at(document: Mapping[str, Any], path: str) -> Any:
-    """Return what a document has at a dotted path, None where it has nothing."""
-    node: Any = document
-    for part in path.split("."):
-        node = node.get(part) if isinstance(node, Mapping) else None
-    return node
-
-
 @functools.cache
 def line_entries() -> dict[str, Entry]:
     """Return the defaults for what ``[supply_line]`` does not give, by path such as ``dorsiflexion.droop``."""
@@ -329,72 +299,3 @@ OF_A_VANE = DeclaredContent(
     find_kinds, texts, lambda document: quantities(document) | line_paths(), check_motion=check_motion_kind
 )
 """Possible content of the file of a vane alone; a file without supply lines can be given some."""
-
-
-@dataclass(frozen=True, slots=True)
-class DocumentReader:
-    """A document with what messages call it; ``overridden`` are the paths that an override has set."""
-
-    file: str
-    document: Mapping[str, Any]
-    overridden: frozenset[str] = frozenset()
-
-    def quote(self, path: str) -> str:
-        """Return file, key and value, as they were given."""
-        value = value_at(self.document, path)
-        if path in self.overridden:
-            return f"{self.file}: override {path}={one_line(value)}"
-        return f"{self.file}: {path} = {quote(value)}"
-
-    def refusal(self, path: str, reason: str) -> ScenarioError:
-        """Return the error that says why the value at a path is not usable."""
-        return ScenarioError(f"{self.quote(path)}: {reason}")
-
-    def number(self, path: str, quantity: Quantity, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-        """Return the value at a path in the quantity's SI unit; its default where nothing is given.
-
-        ScenarioError where it is no number, has another unit or is out of range.
-        """
-        value = value_at(self.document, path)
-        if value is None:
-            if quantity.default is None:
-                raise ScenarioError(f"{self.file}: '{path}' is missing: {quantity.summary or quantity.name}")
-            return quantity.default
-        # True and false are whole numbers to Python.
-        if isinstance(value, bool) or not isinstance(value, str | int | float):
-            raise self.refusal(path, f"must be {_form(quantity, 1.0)}")
-        try:
-            result = parse_quantity(value, quantity.unit, atmosphere) if isinstance(value, str) else float(value)
-        # A whole number of a file may be larger than any float.
-        except (UnitError, OverflowError) as error:
-            raise self.refusal(path, f"{error}{self._of_what(path, quantity)}") from error
-        if not isinstance(value, str) and not math.isfinite(result):
-            raise self.refusal(path, "is not a finite number")
-        if not isinstance(value, str) and quantity.unit not in PLAIN:
-            raise self.refusal(path, f"a number without a unit; must be {_form(quantity, result)}")
-        if not is_within(result, quantity):
-            given = split_quantity(value)[1] if isinstance(value, str) else quantity.unit
-            raise self.refusal(path, range_rule(quantity, limits_text(quantity, given)))
-        return result
-
-    def _of_what(self, path: str, quantity: Quantity) -> str:
-        """Return what decides the unit of a level of the reference or of a gain; an empty text for any other number."""
-        controlled = controlled_in(self.document)
-        followed = CONTROLLED[controlled]
-        is_level = path.startswith("reference.") and quantity.unit in (followed.level.unit, followed.difference)
-        is_gain = path.startswith("controller.") and controlled != TORQUE and followed.plain_unit in quantity.unit
-        return f"; {REFERENCE_OF} is '{controlled}'" if is_level or is_gain else ""
-
-    def section(
-        self, section: str, quantities: tuple[Quantity, ...], atmosphere: float = STANDARD_ATMOSPHERE
-    ) -> dict[str, float]:
-        """Return all values of a section by name, in SI; gauge pressures count from an atmosphere [Pa absolute]."""
-        return {
-            quantity.name: self.number(f"{section}.{quantity.name}", quantity, atmosphere) for quantity in quantities
-        }
-
-
-def _form(quantity: Quantity, number: float) -> str:
-    if quantity.unit in PLAIN:
-        return "a number"
-    return f"a text with its unit, for example '{format_quantity(number, shown_unit(quantity.unit))}'"

@@ -8,7 +8,8 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
 from ppafo.parameters.plant import number_under
-from ppafo.simulation.declaration import SUPPLY_LINES, DocumentReader, line_paths, value_at
+from ppafo.simulation.declaration import SUPPLY_LINES, line_paths
+from ppafo.simulation.document import DocumentReader, value_at
 
 if TYPE_CHECKING:
     from ppafo.model.regulator import SupplyLines

@@ -24,14 +24,12 @@ from ppafo.simulation.declaration import (
     LOCKED_ANGLE,
     SUPPLY_LINE,
     THERMAL,
-    DocumentReader,
-    kind_at,
     motion_quantities,
     profile_settings,
     quantities,
     shank_settings,
-    value_at,
 )
+from ppafo.simulation.document import DocumentReader, kind_at, value_at
 from ppafo.simulation.motion_kind import VANE, LawSignals, Measured, MotionSection, ProfileTable, RunTimes
 from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile, stops_of
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario, vane_motion

@@ -16,7 +16,8 @@ from ppafo.model.effects.kind import SECTION as EFFECTS_SECTION
 from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SECTIONS, SPECIES_PATH
 from ppafo.parameters.declaration import quantities as device_quantities
 from ppafo.parameters.overrides import Override, check_valve, layered, of_another_valve, other_forms, override_set
-from ppafo.simulation.declaration import OF_A_VANE, DeclaredContent, value_at
+from ppafo.simulation.declaration import OF_A_VANE, DeclaredContent
+from ppafo.simulation.document import value_at
 from ppafo.units import SI, number_text
 from ppafo.wording import nearest_name
 

@@ -13,7 +13,8 @@ from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, ControlledQuantity
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
 from ppafo.signals.recording import OF_SECOND_CHAMBER
-from ppafo.simulation.declaration import DocumentReader, kind_at, profile_settings
+from ppafo.simulation.declaration import profile_settings
+from ppafo.simulation.document import DocumentReader, kind_at
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
 from ppafo.units.shown import in_units, shown_text
 

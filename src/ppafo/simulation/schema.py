@@ -18,6 +18,7 @@ from ppafo.documents.problems import NAME
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration
+from ppafo.simulation.document import PLAIN, kind_at
 from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, MotionKind
 from ppafo.simulation.scenario import LARGEST_SEED
 
@@ -29,7 +30,7 @@ _QUANTITY_TEXT = {"type": "string", "pattern": _STARTS_WITH_NUMBER}
 def number_type(quantity: Quantity, words: tuple[str, ...] = ()) -> Any:
     """Return the type of a value: a text with its unit, a plain number where there is no unit, or one of some words."""
     forms: list[dict[str, Any]] = [_QUANTITY_TEXT]
-    forms += [{"type": "number"}] if quantity.unit in declaration.PLAIN else []
+    forms += [{"type": "number"}] if quantity.unit in PLAIN else []
     forms += [{"enum": list(words)}] if words else []
     return Annotated[Any, WithJsonSchema({"anyOf": forms} if len(forms) > 1 else forms[0])]
 
@@ -178,7 +179,7 @@ def scenario_file(document: Mapping[str, Any] | None = None) -> type[BaseModel]:
     """
     controllers, profiles = CONTROLLERS.loaded_or_own(), PROFILES.loaded()
     sections = declaration.SECTIONS if document is None else tuple(filter(document.__contains__, declaration.SECTIONS))
-    named = {} if document is None else {section: declaration.kind_at(document, section) for section in _WITH_KINDS}
+    named = {} if document is None else {section: kind_at(document, section) for section in _WITH_KINDS}
     # What the model depends on is given for the cache alone: a kind that is loaded meanwhile makes another model.
     kinds = (tuple(controllers.items()), tuple(profiles.items()), tuple(motion_kinds()))
     return _scenario_file(sections, tuple(named.items()), kinds)

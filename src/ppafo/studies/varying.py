@@ -14,8 +14,8 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import alternatives, fits, is_within, limits_text
 from ppafo.parameters.graph import counts_from, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si, unit_in
-from ppafo.simulation import declaration
-from ppafo.simulation.loading import parameter_set_of
+from ppafo.simulation.building import parameter_set_of
+from ppafo.simulation.document import PLAIN
 from ppafo.simulation.numbers import declared_numbers, number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
@@ -87,7 +87,7 @@ class VariedPath:
     def _in_si(self, value: str | float, quantity: Quantity) -> float:
         if isinstance(value, str):
             return _parse(value, quantity, self.atmosphere)
-        if quantity.unit not in declaration.PLAIN:
+        if quantity.unit not in PLAIN:
             raise UnitError(f"a number without a unit; give a text with a unit such as {quantity.unit}")
         return float(value)
 

@@ -26,9 +26,9 @@ from ppafo.parameters.declaration import fits
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
-from ppafo.storage.places import Place, read_document
 from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, chunk_size
+from ppafo.study.folder import StudyFolder
 from ppafo.units import to_si
 from ppafo.units.shown import GAUGE_ZERO
 from ppafo.version import __version__
@@ -176,20 +176,20 @@ def manifest(study: Study) -> dict[str, Any]:
     }
 
 
-def read_manifest(location: Place) -> dict[str, Any]:
+def read_manifest(folder: StudyFolder) -> dict[str, Any]:
     """Return the document of a folder of results; DataError where it is none."""
     try:
-        document = read_document(location, MANIFEST)
+        document = folder.read_document(MANIFEST)
     except (OSError, ValueError) as error:
-        raise DataError(f"{location.address}: contains no study results ({MANIFEST} cannot be read)") from error
+        raise DataError(f"{folder.path}: contains no study results ({MANIFEST} cannot be read)") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise DataError(f"{location.address}: {MANIFEST} is not a manifest of study results")
+        raise DataError(f"{folder.path}: {MANIFEST} is not a manifest of study results")
     if document.get("schema_version") != SCHEMA_VERSION:
         raise DataError(
-            f"{location.address}: has schema_version {quote(document.get('schema_version'))}, this version of ppafo "
+            f"{folder.path}: has schema_version {quote(document.get('schema_version'))}, this version of ppafo "
             f"reads {SCHEMA_VERSION}; make the result again with this version"
         )
-    validate(_Stored, document, f"{location.address}: {MANIFEST}", DataError)
+    validate(_Stored, document, f"{folder.path}: {MANIFEST}", DataError)
     return document
 
 
@@ -298,19 +298,19 @@ class _Stored(_Part):
         return self
 
 
-def check_same_study(location: Place, stored: Mapping[str, Any], requested: Mapping[str, Any]) -> None:
+def check_same_study(folder: StudyFolder, stored: Mapping[str, Any], requested: Mapping[str, Any]) -> None:
     """Refuse to go on with the results of another study, or of this one before it was changed."""
     before, now = stored.get("study", {}), requested["study"]
     if before.get("name") != now["name"]:
         raise StudyError(
-            f"{location.address}: contains the results of the study '{before.get('name')}', not of '{now['name']}'; "
+            f"{folder.path}: contains the results of the study '{before.get('name')}', not of '{now['name']}'; "
             "choose another folder"
         )
     changed = [line for key in _COMPARED for line in _differences(key, stored.get(key), requested[key])]
     if changed:
         named = "; ".join(changed[:_NAMED]) + (f"; and {len(changed) - _NAMED} more" if len(changed) > _NAMED else "")
         raise StudyError(
-            f"{location.address}: contains results of an earlier version of '{now['name']}': {named}; undo the change "
+            f"{folder.path}: contains results of an earlier version of '{now['name']}': {named}; undo the change "
             "or choose another folder"
         )
 

@@ -1,4 +1,4 @@
-"""The results of a study in a folder or at an address: chunks of rows, each with a note of its checksum.
+"""The results of a study in a folder: chunks of rows, each with a note of its checksum.
 
 A chunk counts as finished once its note is written, last; a file that does not match its note is computed again. Page
 checksums of Parquet miss a flipped bit here and there: SHA-256 does not.
@@ -28,13 +28,12 @@ from ppafo.storage.parquet import (
     table_of,
     texts_of_some,
 )
-from ppafo.storage.places import Place, place_at, read_document
 from ppafo.studies.distributions import Floats
 from ppafo.studies.study import Study
 from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, samples_of, varied_columns
+from ppafo.study.folder import StudyFolder
 from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, read_manifest
 from ppafo.study.runs import follows, unvaried, with_companions
-from ppafo.study.sent_plugins import SentPlugin, take_plugins
 from ppafo.wording import one_line
 
 if TYPE_CHECKING:
@@ -57,16 +56,6 @@ _BYTES_OF_FILE = 12_000
 
 
 @dataclass(frozen=True, slots=True)
-class ChunkTask:
-    """Work for a process beside the number of a chunk: study, address of the folder, threads, plug-in modules."""
-
-    study: Study
-    address: str
-    threads: int | None
-    plugins: tuple[SentPlugin, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class FinishedChunk:
     """A chunk that is written: its number, its runs, and how many of them failed."""
 
@@ -77,47 +66,47 @@ class FinishedChunk:
 
 @dataclass(frozen=True, slots=True)
 class StudyStore:
-    """The results of a study at a place, written chunk by chunk."""
+    """The results of a study in a folder, written chunk by chunk."""
 
     study: Study
-    place: Place
+    folder: StudyFolder
 
     @classmethod
-    def claim(cls, study: Study, location: Place, agreed: bool, threads: int | None) -> "StudyStore":
-        """Give a place to a study, or refuse it: of another study, of an earlier version, without room."""
-        names = location.names()
+    def claim(cls, study: Study, folder: StudyFolder, agreed: bool, threads: int | None) -> "StudyStore":
+        """Give a folder to a study, or refuse it: of another study, of an earlier version, without room."""
+        names = folder.names()
         if MANIFEST in names:
-            check_same_study(location, read_manifest(location), manifest(study))
+            check_same_study(folder, read_manifest(folder), manifest(study))
         elif names:
             raise StudyError(
-                f"{location.address}: is not empty and contains no study results (it has no {MANIFEST}); choose "
+                f"{folder.path}: is not empty and contains no study results (it has no {MANIFEST}); choose "
                 "another folder"
             )
         else:
-            check_room(study, location, agreed)
+            check_room(study, folder, agreed)
             # A few runs of each configuration, spread evenly: a path that cannot vary is refused at once.
             total = study.runs_of_configuration
             runs = np.unique(np.linspace(0, total - 1, min(total, _TRIED_RUNS)).astype(np.int64))
             for number in range(len(study.configurations)):
                 _result(study, Chunk(0, number, 0, runs.size), drawn_values(study, runs), threads)
-            location.write(MANIFEST, f"{json_text(manifest(study))}\n".encode())
-        location.tidy()
+            folder.write(MANIFEST, f"{json_text(manifest(study))}\n".encode())
+        folder.tidy()
         # After study.json, by which the folder is known to be ours.
         if study.text and STUDY_COPY not in names:
-            location.write(STUDY_COPY, study.text)
-        return cls(study, location)
+            folder.write(STUDY_COPY, study.text)
+        return cls(study, folder)
 
     def finished(self) -> list[FinishedChunk]:
         """Return the chunks whose files are as they were written."""
-        there, found = self.place.names(), []
+        there, found = self.folder.names(), []
         for number in range(chunk_count(self.study)):
             name = chunk_file(number)
             if note_file(number) not in there:
                 continue
             try:
-                note = read_document(self.place, note_file(number))
+                note = self.folder.read_document(note_file(number))
                 finished = FinishedChunk(number, int(note["runs"]), int(note["failed"]))
-                with self.place.open(name) as file:
+                with self.folder.open(name) as file:
                     is_whole = hashlib.file_digest(file, "sha256").hexdigest() == note["sha256"][name]
             except (OSError, ValueError, KeyError, TypeError, OverflowError):
                 continue
@@ -129,24 +118,26 @@ class StudyStore:
     def write(self, finished: FinishedChunk, content: bytes) -> FinishedChunk:
         """Write the file of a chunk, and last the note by which it counts as finished; return that."""
         name = chunk_file(finished.number)
-        self.place.write(name, content)
+        self.folder.write(name, content)
         checksums = {name: hashlib.sha256(content).hexdigest()}
         note = {"runs": finished.runs, "failed": finished.failed, "sha256": checksums}
-        self.place.write(note_file(finished.number), f"{json_text(note)}\n".encode())
+        self.folder.write(note_file(finished.number), f"{json_text(note)}\n".encode())
         return finished
 
 
-def stored_rows(location: Place, numbers: Sequence[int], columns: Sequence[str] | None = None) -> "Iterator[pa.Table]":
+def stored_rows(
+    folder: StudyFolder, numbers: Sequence[int], columns: Sequence[str] | None = None
+) -> "Iterator[pa.Table]":
     """Give the tables of some chunks one after the other; DataError where one is missing or damaged."""
     for number in numbers:
         name = chunk_file(number)
         try:
-            table = read_parquet(location.open(name), name, columns)
+            table = read_parquet(folder.open(name), name, columns)
             check_types(table, name)
             yield table
         except (DataError, OSError) as error:
             raise DataError(
-                f"{location.address}/{name}: is missing or damaged; run the study again into this folder to recompute "
+                f"{folder.path}/{name}: is missing or damaged; run the study again into this folder to recompute "
                 "this chunk"
             ) from error
 
@@ -175,11 +166,11 @@ def check_types(table: "pa.Table", name: str) -> None:
             raise DataError(f"{name}: column '{one_line(field.name)}' is of type {kind}")
 
 
-def compute_chunk(task: ChunkTask, number: int) -> tuple[FinishedChunk, bytes]:
+def compute_chunk(study: Study, number: int, threads: int | None) -> tuple[FinishedChunk, bytes]:
     """Return the file of a chunk, computed here and not yet written: a row for every run, in SI units, nan for none."""
-    study, part = task.study, chunk(task.study, number)
+    part = chunk(study, number)
     values = drawn_values(study, np.arange(part.first, part.first + part.runs))
-    result = _result(study, part, values, task.threads)
+    result = _result(study, part, values, threads)
     columns = {
         **_columns_of_runs(study, part, values),
         **_columns_of_endings(study, part, values, result),
@@ -264,19 +255,13 @@ def _columns_of_traces(study: Study, part: Chunk, result: EnsembleResult) -> dic
     return columns
 
 
-def work_on_chunk(task: ChunkTask, number: int) -> FinishedChunk:
-    """Compute and write a chunk: what a worker of a cluster does."""
-    take_plugins(task.plugins)
-    return StudyStore(task.study, place_at(task.address)).write(*compute_chunk(task, number))
-
-
 def trace_column(channel: str) -> str:
     """Return the name of the column with the values of a channel over time."""
     return f"{channel}{_OVER_TIME}"
 
 
 def chunk_file(number: int) -> str:
-    """Return the name of the file of a chunk, relative to the place."""
+    """Return the name of the file of a chunk, relative to the folder."""
     return f"runs/chunk-{number:07d}.parquet"
 
 
@@ -320,17 +305,16 @@ def estimate_bytes(study: Study) -> int:
     return study.runs * row + chunk_count(study) * _BYTES_OF_FILE
 
 
-def check_room(study: Study, location: Place, agreed: bool) -> None:
+def check_room(study: Study, folder: StudyFolder, agreed: bool) -> None:
     """Refuse a study that does not fit onto the disk, or that takes much of it and was not agreed to with ``--yes``."""
-    needed, free = estimate_bytes(study), location.free_bytes()
+    needed, free = estimate_bytes(study), folder.free_bytes()
     size = f"{study.runs:,} runs of '{study.name}' need about {_bytes_text(needed)}"
-    if free is not None and needed > free:
+    if needed > free:
         raise StudyError(
-            f"{location.address}: {size}, but only {_bytes_text(free)} are free: use fewer runs, metrics or "
-            "trajectories"
+            f"{folder.path}: {size}, but only {_bytes_text(free)} are free: use fewer runs, metrics or trajectories"
         )
     if needed > ASKED_ABOVE and not agreed:
-        raise StudyError(f"{location.address}: {size}; give --yes to start it anyway")
+        raise StudyError(f"{folder.path}: {size}; give --yes to start it anyway")
 
 
 def _bytes_text(size: int) -> str:

@@ -16,16 +16,8 @@ from ppafo.errors import KindError, ScenarioError, refused_as
 from ppafo.model.declaration import Quantity
 from ppafo.model.fault_catalogue import PLANT_FAULTS, PlantFault
 from ppafo.model.shut_off import SHUT_OFF
-from ppafo.simulation.declaration import (
-    PERIOD,
-    RATE,
-    SENSORS,
-    TEXTS,
-    DeclaredContent,
-    gas_settings,
-    kind_at,
-    line_paths,
-)
+from ppafo.simulation.declaration import PERIOD, RATE, SENSORS, TEXTS, DeclaredContent, gas_settings, line_paths
+from ppafo.simulation.document import kind_at
 from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, WALK, is_walk
 from ppafo.simulation.schema import (
     controller_table,

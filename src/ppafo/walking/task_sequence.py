@@ -22,7 +22,7 @@ from ppafo.model.elementary import sine_and_cosine
 from ppafo.model.gait import NEVER, PARTS, STANDS_AT, GaitNow, GaitTiming, SequencePart, TimedSequence
 from ppafo.model.leg import LegParameters
 from ppafo.signals.recording import Floats
-from ppafo.simulation.declaration import DocumentReader
+from ppafo.simulation.document import DocumentReader
 from ppafo.simulation.schema import kind_field, model_name, number_type, quantity_fields
 from ppafo.walking.preparation import standing_on
 from ppafo.wording import nearest_name

@@ -21,7 +21,8 @@ from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.leg import LegParameters
 from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
 from ppafo.signals.recording import Floats
-from ppafo.simulation.declaration import FOOT, DocumentReader, value_at
+from ppafo.simulation.declaration import FOOT
+from ppafo.simulation.document import DocumentReader, value_at
 
 SHANK_SHARE = 0.246
 """Knee to ankle as a share of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th

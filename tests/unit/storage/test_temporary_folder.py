@@ -14,7 +14,6 @@ from ppafo.page import wasm
 from ppafo.processor.catalog import MSP430F2013
 from ppafo.processor.images import processor_simulator
 from ppafo.storage.files import temporary_folder
-from ppafo.study.sent_plugins import SentPlugin, _written
 
 
 def simulated() -> None:
@@ -27,7 +26,6 @@ BUILDERS: dict[str, Callable[[], object]] = {
     "unit": lambda: platforms.build("linux64", {"unit.c": b"int"}, "unit.c"),
     "page": lambda: wasm.build("int"),
     "firmware": simulated,
-    "plugins": lambda: _written(SentPlugin(None, (("law.py", b"x"),))),  # type: ignore[arg-type]
     "study": lambda: temporary_folder("ppafo-study", {"a/b": b"x"}),
 }
 

@@ -30,7 +30,8 @@ from ppafo.parameters.overrides import Override, override_set, read_overrides
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.recording import Floats
-from ppafo.simulation.declaration import OF_A_VANE, value_at
+from ppafo.simulation.declaration import OF_A_VANE
+from ppafo.simulation.document import value_at
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.overrides import apply_overrides, chosen_by, is_of_device, unknown_value
 from ppafo.simulation.scenario import Scenario

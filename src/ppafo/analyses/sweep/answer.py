@@ -13,7 +13,7 @@ from ppafo.arguments import checked
 from ppafo.documents.models import validate
 from ppafo.errors import DataError, at_fault
 from ppafo.report.finding import Finding, Section, columns_of, facts, files_of
-from ppafo.storage.places import place_at, read_document
+from ppafo.study.folder import study_folder
 from ppafo.study.manifest import MANIFEST, read_manifest
 from ppafo.units.shown import in_units
 
@@ -186,28 +186,28 @@ def write_report(results: StudyResults) -> None:
     finding: Finding[Any] = finding_of(results)
     finding = replace(finding, name=Path(SUMMARY).stem, found=results.summary)
     for name, content in files_of(finding).items():
-        results.place.write(name, content)
+        results.folder.write(name, content)
 
 
 @checked
 def load_study_results(folder: str | Path) -> Finding[StudyResults]:
-    """Return the finished results of a study in a folder or at an address; DataError where there are none.
+    """Return the finished results of a study in a folder; DataError where there are none.
 
     >>> import ppafo
     >>> written = ppafo.sweep("torque-task-uncertainty", draws=4, out="four")
     >>> ppafo.load_study_results("four").said[0]
     'torque-task-uncertainty: 8 runs: 8 completed'
     """
-    location = place_at(folder)
+    stored = study_folder(folder)
     with at_fault("folder"):
-        document = read_manifest(location)
+        document = read_manifest(stored)
     try:
-        summary: dict[str, Any] = read_document(location, SUMMARY)
+        summary: dict[str, Any] = stored.read_document(SUMMARY)
     except (OSError, ValueError) as error:
         raise DataError(
-            f"{location.address}: the study is not finished (no complete {SUMMARY}); run it again to resume"
+            f"{stored.path}: the study is not finished (no complete {SUMMARY}); run it again to resume"
         ) from error
-    whose = f"{location.address}: {SUMMARY} is damaged; run the study again into this folder"
+    whose = f"{stored.path}: {SUMMARY} is damaged; run the study again into this folder"
     described = validate(_Summary, summary, whose, DataError)
     names = {configuration["name"] for configuration in document["study"]["configurations"]}
     # A configuration or a metric in one of the two documents alone would be looked up in vain.
@@ -215,4 +215,4 @@ def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     metrics = document["metrics"].keys()
     if not has_same_names or any(own.keys() != metrics for own in described.configurations.values()):
         raise DataError(f"{whose}: its configurations and metrics differ from {MANIFEST}")
-    return finding_of(StudyResults(location, document, summary))
+    return finding_of(StudyResults(stored, document, summary))

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ppafo.arguments import Address, Count, Fraction, Name, Overrides, Seed, Threads, Word, checked
+from ppafo.arguments import Count, Fraction, Name, Overrides, Seed, Threads, Word, checked
 from ppafo.progress import Report
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ def sweep_into_folder(
     draws: Count | None = None,
     seed: Seed | None = None,
     threads: Threads | None = None,
-    scheduler: Address | None = None,
     agreed: Agreed = False,
     statistic: StatisticWords | None = None,
     metric: MetricName | None = None,
@@ -47,9 +46,8 @@ def sweep_into_folder(
     """Run a study: many runs, one row each, resumable; or a statistic to a wanted precision.
 
     study: name of a study, or a .toml file
-    out: folder or address for the results; default out/NAME with the name of the study
+    out: folder for the results; default out/NAME with the name of the study
     draws: number of draws, instead of the number in the file; of a statistic the maximum, default 1,048,576
-    scheduler: address of a Dask scheduler whose workers compute the chunks
     agreed: start even if the results will fill much of the disk
     statistic: draw until the interval of a statistic is narrow enough, and keep no rows: mean, 'quantile 0.95',
         'probability above 1.2 N m', 'probability below 0.5 g'
@@ -93,15 +91,13 @@ def sweep_into_folder(
         chosen = study_of(study, overrides, draws, seed)
         place = out or Path("out") / chosen.name
         try:
-            swept = sweep(chosen, threads=threads, out=place, scheduler=scheduler, agreed=agreed, progress=progress)
+            swept = sweep(chosen, threads=threads, out=place, agreed=agreed, progress=progress)
             write_report(swept.found)
         except KeyboardInterrupt:
             raise KeyboardInterrupt(INTERRUPTED if is_begun(chosen, place) else INTERRUPTED_AT_ONCE) from None
         return swept
     if metric is None:
         raise StudyError(f"statistic '{statistic}': needs a metric, for example --metric rms_error")
-    if scheduler is not None:
-        raise StudyError(f"--scheduler {scheduler}: a statistic is computed on this machine; omit --scheduler")
     from ppafo.analyses.sweep.statistic import estimate
     from ppafo.storage.result_folder import check_owned_folder, marked_folder
 

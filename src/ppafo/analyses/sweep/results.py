@@ -12,7 +12,7 @@ from ppafo.errors import DataError, StudyError
 from ppafo.report.kind import Kind, of_stored_metric
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import as_numpy, column_names, matrix_of, read_parquet
-from ppafo.storage.places import Place
+from ppafo.study.folder import StudyFolder
 from ppafo.study.runs import joined
 from ppafo.study.store import check_types, chunk_file, stored_rows, trace_column
 from ppafo.wording import nearest_name
@@ -35,7 +35,7 @@ class StudyResults:
     ``kept`` holds a temporary folder as long as its results are used; None for a folder of one's own.
     """
 
-    place: Place
+    folder: StudyFolder
     document: Mapping[str, Any]
     summary: Mapping[str, Any]
     kept: tempfile.TemporaryDirectory[str] | None = None
@@ -44,7 +44,7 @@ class StudyResults:
         """Return name, runs, how many completed, and the metrics."""
         counted = ", ".join(f"{self.summary[key]:,} {key}" for key in ("completed", "diverged", "refused"))
         return (
-            f"StudyResults of '{self.name}' in {self.place.address}\n  {self.document['runs']:,} runs: {counted}\n  "
+            f"StudyResults of '{self.name}' in {self.folder.path}\n  {self.document['runs']:,} runs: {counted}\n  "
             f"varied: {', '.join(self.varied) or 'nothing'}\n  metrics: "
             f"{', '.join(self.document['metrics']) or 'none'}"
         )
@@ -79,7 +79,7 @@ class StudyResults:
             # All chunks have the columns of the first.
             first = chunk_file(0)
             traces = {trace_column(name) for name in CHANNELS}
-            columns = [name for name in column_names(self.place.open(first), first) if name not in traces]
+            columns = [name for name in column_names(self.folder.open(first), first) if name not in traces]
         return joined([as_numpy(part) for part in self.chunks(columns)])
 
     def by_configuration(self, column: str) -> dict[str, np.ndarray[Any, Any]]:
@@ -101,14 +101,14 @@ class StudyResults:
     def bands(self) -> Columns:
         """Return the bands: configuration, channel, time and a column for each quantile."""
         try:
-            table = read_parquet(self.place.open(BANDS), BANDS)
+            table = read_parquet(self.folder.open(BANDS), BANDS)
             check_types(table, BANDS)
             others = set(table.column_names) - set(_OF_BANDS)
             if not set(_OF_BANDS) < set(table.column_names) or not all(map(_QUANTILE.fullmatch, others)):
                 raise DataError(f"{BANDS}: has other columns than bands have")
         except (DataError, OSError) as error:
             raise DataError(
-                f"{self.place.address}/{BANDS}: is missing or damaged; run the study again into this folder"
+                f"{self.folder.path}/{BANDS}: is missing or damaged; run the study again into this folder"
             ) from error
         return as_numpy(table)
 
@@ -139,11 +139,11 @@ class StudyResults:
             own = len(numbers) // len(self.configurations)
             start = own * self.configurations.index(configuration)
             numbers = numbers[start : start + own]
-        return stored_rows(self.place, numbers, columns)
+        return stored_rows(self.folder, numbers, columns)
 
     def json_document(self) -> dict[str, Any]:
         """Return the summary, and where the rows are."""
-        return {**self.summary, "folder": self.place.address}
+        return {**self.summary, "folder": str(self.folder.path)}
 
 
 def metric_kind(results: StudyResults, metric: str) -> Kind:

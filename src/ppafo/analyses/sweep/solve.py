@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 
 from ppafo.analyses.sweep.answer import finding_of
 from ppafo.analyses.sweep.results import BANDS, SUMMARY, Columns, StudyResults
-from ppafo.arguments import Address, Count, Overrides, Seed, Threads, checked
+from ppafo.arguments import Count, Overrides, Seed, Threads, checked
 from ppafo.documents.json_text import json_text
-from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
@@ -34,20 +33,18 @@ from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
 from ppafo.storage.files import temporary_folder
 from ppafo.storage.parquet import TableColumn, encode_texts, matrix_of, parquet_bytes, table_of
-from ppafo.storage.places import place_at
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import study_of
 from ppafo.studies.loading import list_studies, load_study
 from ppafo.studies.study import Study, check_can_be_swept
 from ppafo.study.blocks import chunk_count, samples_of
+from ppafo.study.folder import study_folder
 from ppafo.study.manifest import read_manifest
 from ppafo.study.runs import RunCounter, joined
-from ppafo.study.sent_plugins import plugins_to_send
 from ppafo.study.store import (
     FOLLOWS,
     OSCILLATES,
     STATUSES,
-    ChunkTask,
     FinishedChunk,
     StudyStore,
     compute_chunk,
@@ -207,7 +204,6 @@ def sweep(
     seed: Seed | None = None,
     threads: Threads | None = None,
     out: str | Path | None = None,
-    scheduler: Address | None = None,
     agreed: bool = False,
     plugins: Plugins = (),
     progress: Report | None = None,
@@ -223,9 +219,8 @@ def sweep(
         draws: number of draws in place of the file's
         seed: random seed in place of the file's
         threads: threads of this process; default: all cores
-        out: a folder, or an address that fsspec knows, where a study that was begun resumes; default: a temporary
-            folder that lives as long as the returned object
-        scheduler: address of a Dask scheduler whose workers do the work
+        out: a folder, where a study that was begun resumes; default: a temporary one that lives as long as the
+            returned object
         agreed: consent to a folder that takes much of the disk
         plugins: modules of your own, files or names, whose objects files may name
         progress: called with every finished chunk
@@ -245,28 +240,23 @@ def sweep(
     name_plugins(plugins)
     chosen = study_of(study, overrides, draws, seed)
     check_can_be_swept(chosen)
-    if scheduler is not None:
-        from ppafo.analyses.sweep.cluster import check_scheduler
-
-        # Before a folder is made: a wrong address must leave nothing.
-        check_scheduler(scheduler)
     kept = temporary_folder("ppafo-study") if out is None else None
-    location = place_at(kept.name if kept is not None else str(out))
+    folder = study_folder(kept.name if kept is not None else str(out))
     tell_coarse_pairs(configuration.scenario for configuration in chosen.configurations)
-    store = StudyStore.claim(chosen, location, agreed, threads)
-    _work(ChunkTask(chosen, location.address, threads), store, scheduler, progress)
-    results = StudyResults(location, read_manifest(location), {}, kept)
+    store = StudyStore.claim(chosen, folder, agreed, threads)
+    _work(store, threads, progress)
+    results = StudyResults(folder, read_manifest(folder), {}, kept)
     summary = _summary(chosen, results)
     if chosen.outputs.bands:
-        location.write(BANDS, bands_file(chosen, results))
+        folder.write(BANDS, bands_file(chosen, results))
     # Last, because a study counts as finished once its summary is there.
-    location.write(SUMMARY, f"{json_text(summary)}\n".encode())
+    folder.write(SUMMARY, f"{json_text(summary)}\n".encode())
     return finding_of(replace(results, summary=summary))
 
 
 def is_begun(study: Study, folder: str | Path) -> bool:
     """Return whether a folder has a finished chunk of a study."""
-    names = place_at(str(folder)).names()
+    names = study_folder(folder).names()
     return any(note_file(number) in names for number in range(chunk_count(study)))
 
 
@@ -276,9 +266,9 @@ def studies_of_the_package() -> list[dict[str, Any]]:
     return [{"name": study.name, "runs": study.runs, "description": study.description} for study in studies]
 
 
-def _work(task: ChunkTask, store: StudyStore, scheduler: str | None, progress: Report | None) -> None:
+def _work(store: StudyStore, threads: int | None, progress: Report | None) -> None:
     """Compute the chunks that are missing, and add a line on this session to the log."""
-    study, location, started = store.study, store.place, time.monotonic()
+    study, folder, started = store.study, store.folder, time.monotonic()
     known = store.finished()
     earlier, missing = sum(block.runs for block in known), set(range(chunk_count(study)))
     missing -= {block.number for block in known}
@@ -288,48 +278,35 @@ def _work(task: ChunkTask, store: StudyStore, scheduler: str | None, progress: R
         tally.add(finished.runs, finished.failed)
 
     # Rows change below: an old summary would pass for a finished study meanwhile.
-    if missing and SUMMARY in location.names():
-        location.remove(SUMMARY)
-    if scheduler is None:
-        _compute_here(task, store, sorted(missing), count)
-    else:
-        from ppafo.analyses.sweep.cluster import compute_on_cluster
-
-        compute_on_cluster(scheduler, replace(task, plugins=plugins_to_send()), sorted(missing), count)
-        location.tidy()
-        names = location.names()
-        if any(note_file(number) not in names for number in missing):
-            raise StudyError(
-                f"--scheduler {scheduler}: the workers finished chunks that are not in {location.address}: --out must "
-                "be a folder that they share with this machine, or an address such as s3://bucket/study"
-            )
+    if missing and SUMMARY in folder.names():
+        folder.remove(SUMMARY)
+    _compute(store, sorted(missing), threads, count)
     line = {
         "ended": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         "machine": platform.platform(),
         "processors": os.cpu_count(),
         "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
-        "scheduler": scheduler,
-        "threads": task.threads,
+        "threads": threads,
         "runs": tally.done - earlier,
         "failed": tally.failed,
         "seconds": round(time.monotonic() - started, 3),
     }
     try:
-        with location.open(LOG) as file:
+        with folder.open(LOG) as file:
             before = file.read()
     except OSError:
         before = b""
-    location.write(LOG, before + f"{json.dumps(line)}\n".encode())
+    folder.write(LOG, before + f"{json.dumps(line)}\n".encode())
 
 
-def _compute_here(
-    task: ChunkTask, store: StudyStore, numbers: Iterable[int], finish: Callable[[FinishedChunk], None]
+def _compute(
+    store: StudyStore, numbers: Iterable[int], threads: int | None, finish: Callable[[FinishedChunk], None]
 ) -> None:
     """Compute chunks one after the other; while one is written, the next one is computed."""
     with ThreadPoolExecutor(1, "ppafo-writing") as writer:
         writing: Future[FinishedChunk] | None = None
         for number in numbers:
-            computed = compute_chunk(task, number)
+            computed = compute_chunk(store.study, number, threads)
             if writing is not None:
                 finish(writing.result())
             writing = writer.submit(store.write, *computed)

@@ -8,7 +8,8 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import consistency
 from ppafo.parameters.plant import effects_of
 from ppafo.simulation.clock import TIMES, step_unless_given, step_with_output, time_texts
-from ppafo.simulation.declaration import LOCKED_ANGLE, value_at
+from ppafo.simulation.declaration import LOCKED_ANGLE
+from ppafo.simulation.document import value_at
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form, path_of_locked_angle
 from ppafo.simulation.profiles import TOLERANCE
 from ppafo.simulation.scenario import Scenario

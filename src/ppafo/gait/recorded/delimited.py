@@ -10,10 +10,9 @@ from ppafo.documents.regular_file import decoded
 from ppafo.errors import DataError
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
-from ppafo.storage.comma_separated import SPLIT_NUMBERS
-from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart, without_copies
+from ppafo.storage.comma_separated import SPLIT_NUMBERS, check_clock
 from ppafo.storage.files import read_bytes
-from ppafo.storage.text_table import check_growing, number_in
+from ppafo.storage.text_table import doubled, number_in, said_of_doubled, told_apart, without_copies
 
 UNSEEN = ("", "nan", "-nan", "n/a", "na", "null")
 """Cells of a sample that was not recorded, in small letters."""
@@ -126,7 +125,7 @@ def table_of(
         time: Floats = np.arange(len(values), dtype=np.float64) if at is None else values[:, at]
         first = 0.0 if at is None else 1.0
         time = time * seconds if isinstance(clock, str) else (time - first) / clock.rate
-        check_growing(time, numbers)
+        check_clock(time, numbers, may_have_trials=False)
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
     twins = {name: others for name, others in doubled(written, apart).items() if name != timed}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.control.kind import ControllerKind
-from ppafo.metrics.metric import has_reference
+from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
@@ -136,7 +136,7 @@ def following_text(result: "RecordedResult") -> str:
         return ""
     settled, controlled = judged[0].settled, CONTROLLED[scenario.controlled]
     # On a ramp every loop is behind, and a walk whose law requests no torque has a peak alone.
-    if settled.ends_on_ramp or not has_reference(result.recording):
+    if settled.ends_on_ramp or controlled_in(result.recording) is None:
         return ""
     error, wanted = (change_text(controlled.name, each) for each in (settled.error, settled.wanted))
     since = f" from {settled.start:.3g} s on" if settled.start > 0.0 else ""
@@ -158,7 +158,7 @@ def _judged(
     if (
         len(recording) < _FEWEST_SAMPLES
         or scenario.controller.is_open_loop
-        or (is_task and not has_reference(recording))
+        or (is_task and controlled_in(recording) is None)
     ):
         return None
     limit = 0.0 if is_task else torque_limit(scenario.controller.settings)

@@ -13,7 +13,8 @@ from ppafo.model.source import content_energy, densest_gas, has_liquid, liquid_d
 from ppafo.parameters.bottles.bottle import PATHS, Bottle, is_of_catalogue, load_bottle
 from ppafo.parameters.device import Device
 from ppafo.parameters.parameter_set import Entry
-from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, DocumentReader, kind_at, value_at
+from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL
+from ppafo.simulation.document import DocumentReader, kind_at, value_at
 from ppafo.simulation.scenario import SupplyLine
 from ppafo.units import format_quantity, to_si
 from ppafo.units.shown import shown_text

@@ -55,7 +55,7 @@ def test_a_thinned_column_has_every_so_many_runs_across_chunks(small_results: St
 
 
 def test_results_load_again_from_their_folder(small_results: StudyResults) -> None:
-    again = load_study_results(small_results.place.address).found
+    again = load_study_results(small_results.folder.path).found
     assert again.summary == small_results.summary
     assert again.name == "small"
     assert again.configurations == ("proportional", "solenoid")
@@ -79,7 +79,7 @@ def test_results_do_what_everything_solved_does(small_results: StudyResults, tmp
     names = {path.name for path in (tmp_path / "saved").iterdir()}
     assert names == {"figure.png", "figure.svg", "ppafo.json", "report.html", "sweep.json", "sweep.txt"}
     stored = json.loads((tmp_path / "saved" / "sweep.json").read_text(encoding="utf-8"))
-    assert stored == finding.to_dict() == {**small_results.summary, "folder": small_results.place.address}
+    assert stored == finding.to_dict() == {**small_results.summary, "folder": str(small_results.folder.path)}
     page = (tmp_path / "saved" / "report.html").read_text(encoding="utf-8")
     assert "of their normal scores" in page
     assert "Sampled by sobol: 8 draws, seed 3." in page

@@ -18,10 +18,10 @@ from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.progress import Progress
 from ppafo.signals.recording import CHANNELS
-from ppafo.storage.places import DiskFolder
 from ppafo.studies.loading import load_study
 from ppafo.study import store
-from ppafo.study.store import ChunkTask, chunk_file, compute_chunk, estimate_bytes, stored_unit
+from ppafo.study.folder import StudyFolder
+from ppafo.study.store import chunk_file, compute_chunk, estimate_bytes, stored_unit
 
 AREA = {"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"}
 
@@ -98,7 +98,7 @@ def test_both_configurations_get_the_same_draws(small_results: StudyResults) -> 
 def test_the_folder_opens_as_it_is_with_units_in_the_columns(small_results: StudyResults) -> None:
     import pyarrow.dataset
 
-    folder = small_results.place.address
+    folder = small_results.folder.path
     table = pyarrow.dataset.dataset(f"{folder}/runs").to_table()
     assert table.num_rows == 32
     units = {field.name: (field.metadata or {}).get(b"unit") for field in table.schema}
@@ -148,9 +148,9 @@ def test_bands_read_a_few_times_at_once_are_the_same(
 
 
 def test_chunks_are_the_same_in_any_order_and_on_any_number_of_threads(small_results: StudyResults, small: Any) -> None:
-    written = contents(small_results.place.address)
+    written = contents(small_results.folder.path)
     for number in (7, 2, 0, 5):
-        _, content = compute_chunk(ChunkTask(load_study(small), "nowhere", 1 + number % 2), number)
+        _, content = compute_chunk(load_study(small), number, 1 + number % 2)
         assert content == written[chunk_file(number)]
 
 
@@ -182,7 +182,7 @@ def test_a_stopped_study_goes_on_to_the_same_bytes(
     with pytest.raises(DataError, match="the study is not finished"):
         load_study_results(out)
     sweep(small, out=out)
-    assert contents(out) == contents(small_results.place.address)
+    assert contents(out) == contents(small_results.folder.path)
     assert {path: path.stat().st_mtime_ns for path in before} == before
 
 
@@ -212,14 +212,14 @@ def test_damaged_chunks_are_found_and_computed_again(
     told: list[Progress] = []
     sweep(small, out=out, progress=told.append)
     assert len(told) == 1
-    assert contents(out) == contents(small_results.place.address)
+    assert contents(out) == contents(small_results.folder.path)
 
 
 def test_a_chunk_in_the_place_of_another_is_found(small_results: StudyResults, small: Any, tmp_path: Path) -> None:
     out = copied(small_results, tmp_path)
     (out / "runs" / "chunk-0000002.parquet").write_bytes((out / "runs" / "chunk-0000001.parquet").read_bytes())
     sweep(small, out=out)
-    assert contents(out) == contents(small_results.place.address)
+    assert contents(out) == contents(small_results.folder.path)
 
 
 def test_damage_is_named_where_results_are_read(small_results: StudyResults, tmp_path: Path) -> None:
@@ -233,8 +233,8 @@ def test_damage_is_named_where_results_are_read(small_results: StudyResults, tmp
 def copied(results: StudyResults, tmp_path: Path) -> Path:
     """A copy of finished results."""
     out = tmp_path / "out"
-    for name, content in contents(results.place.address).items():
-        DiskFolder(out).write(name, content)
+    for name, content in contents(results.folder.path).items():
+        StudyFolder(out).write(name, content)
     return out
 
 
@@ -258,25 +258,25 @@ def copied(results: StudyResults, tmp_path: Path) -> Path:
 def test_a_changed_study_is_refused_with_what_changed(
     small_results: StudyResults, small: Any, change: Callable[[Any], None], expected: str
 ) -> None:
-    before = contents(small_results.place.address)
+    before = contents(small_results.folder.path)
     change(small)
     with pytest.raises(StudyError, match=expected) as caught:
-        sweep(small, out=small_results.place.address)
+        sweep(small, out=small_results.folder.path)
     assert "\n" not in str(caught.value)
-    assert contents(small_results.place.address) == before
+    assert contents(small_results.folder.path) == before
 
 
 def test_the_folder_of_another_study_is_refused(small_results: StudyResults, small: Any) -> None:
     small["name"] = "other"
     with pytest.raises(StudyError, match="contains the results of the study 'small', not of 'other'"):
-        sweep(small, out=small_results.place.address)
+        sweep(small, out=small_results.folder.path)
 
 
 def test_a_study_whose_draws_were_changed_in_python_is_refused(small_results: StudyResults, small: Any) -> None:
     study = load_study(small)
     other = dataclasses.replace(study, sample=dataclasses.replace(study.sample, seed=study.sample.seed + 1))
     with pytest.raises(StudyError, match=r"drawn\.sample\.seed was 3 and is now 4"):
-        sweep(other, out=small_results.place.address)
+        sweep(other, out=small_results.folder.path)
 
 
 def test_a_foreign_or_newer_manifest_is_refused(small: Any, tmp_path: Path) -> None:
@@ -289,7 +289,7 @@ def test_a_foreign_or_newer_manifest_is_refused(small: Any, tmp_path: Path) -> N
 def test_more_disk_than_there_is_is_refused_before_anything_is_written(
     small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(DiskFolder, "free_bytes", lambda _: 1000)
+    monkeypatch.setattr(StudyFolder, "free_bytes", lambda _: 1000)
     with pytest.raises(StudyError, match=r"32 runs of 'small' need about .* kB, but only 1 kB are free"):
         sweep(small, out=tmp_path / "out", agreed=True)
     assert not (tmp_path / "out").exists()
@@ -339,7 +339,7 @@ def test_a_path_that_varies_in_one_configuration_has_no_value_in_the_others(
 
 def test_without_a_folder_the_results_live_as_long_as_their_object(varying: Callable[..., Any]) -> None:
     results = sweep(varying(AREA, runs=4)).found
-    folder = Path(results.place.address)
+    folder = results.folder.path
     rows = results.table(["run"])["run"].size
     del results
     assert rows == 8
@@ -357,19 +357,9 @@ def test_the_log_has_a_line_for_every_session_and_nothing_else_tells_the_time(sm
     assert all(line["seconds"] >= 0.0 for line in lines)
 
 
-def test_results_go_to_any_address_of_fsspec(small_results: StudyResults, small: Any) -> None:
-    fsspec = pytest.importorskip("fsspec")
-    address = "memory://ppafo-test/study"
-    results = sweep(small, out=address).found
-    try:
-        system = fsspec.filesystem("memory")
-        names = [name for name in system.find("/ppafo-test/study") if not name.endswith(LOG)]
-        found = {name.removeprefix("/ppafo-test/study/"): system.cat_file(name) for name in names}
-        assert found == contents(small_results.place.address)
-        assert load_study_results(address).found.table(["run"])["run"].size == 32
-        assert results.place.address == address
-    finally:
-        system.rm("/ppafo-test", recursive=True)
+def test_results_at_an_address_are_refused(small: Any) -> None:
+    with pytest.raises(DataError, match=r"s3://bucket/study: is an address; results of a study go into a folder"):
+        sweep(small, out="s3://bucket/study")
 
 
 def test_a_seed_takes_the_place_of_that_of_the_file(varying: Callable[..., Any]) -> None:
