@@ -77,7 +77,7 @@ def link_product(leg: LegParameters) -> float:
 def mass_matrix(leg: LegParameters, cosine_theta: float) -> tuple[float, float, float]:
     """Entries of the symmetric inertia matrix M [kg m^2], shank, coupling and foot. Equations (11), (12).
 
-    ``cosine_theta`` is that of the ankle angle.
+    ``cosine_theta`` [-] is the cosine of the ankle angle.
     """
     foot = foot_inertia_about_ankle(leg)
     product = link_product(leg) * cosine_theta

@@ -30,8 +30,6 @@ _MASSES = (("bottle_mass", "total gas", BLUE), ("liquid_mass", "liquid", GREEN))
 """Rows of the supply, with their names in the legend and colours; a gas that has no liquid has no row of it."""
 _LEAST_TORQUE = 0.1
 """Torque [N m] up to which the axis goes at least."""
-_MOST_IN_AXES = 3
-"""Marks of a panel up to which its legend has room above it in the usual form."""
 
 
 def bottle_figure(result: WalkResult) -> "Figure":
@@ -47,16 +45,27 @@ def bottle_figure(result: WalkResult) -> "Figure":
         for name, label, colour in _MASSES
         if name in values
     ]
+    temperatures = [
+        Mark("line", times, values[name], label=label, colour=colour) for name, label, colour in _TEMPERATURES
+    ]
+    if supply.supply.line.freezes > 0.5:
+        dry_ice = supply.supply.line.temperatures[0]
+        temperatures.append(Mark("level", y=dry_ice, label="dry ice", colour=VERMILION, style=_DASHED))
+    regulator = supply.supply.bottle.regulator
+    needed = regulator.set_pressure + regulator.pressure_margin
     panel = partial(_panel, end, Mark("at", supply.ending.time, colour=VERMILION, style={"linewidth": 1.0}))
     return draw_panels(
         [
             panel(Kind("Pressure behind the regulator", "Pa_a", "pressure"), _marks_behind(result, supply)),
             panel(
                 Kind("Pressure in the bottle", "Pa_a", "pressure"),
-                _marks_inside(supply),
+                [
+                    Mark("level", y=needed, label="needed", colour=VERMILION, style=_DASHED),
+                    Mark("line", times, values["bottle_pressure"], label="bottle"),
+                ],
                 largest=float(np.max(values["bottle_pressure"])),
             ),
-            panel(Kind("Temperature", "K", "temperature"), _temperature_marks(supply)),
+            panel(Kind("Temperature", "K", "temperature"), temperatures),
             panel(
                 Kind("Peak torque of each stride", "N m", "torque"),
                 torque,
@@ -86,28 +95,6 @@ def _marks_behind(result: WalkResult, supply: SupplyCourse) -> list[Mark]:
     return marks
 
 
-def _marks_inside(supply: SupplyCourse) -> list[Mark]:
-    """Return the pressure in the bottle, and the one that the regulator needs there."""
-    regulator = supply.supply.bottle.regulator
-    needed = regulator.set_pressure + regulator.pressure_margin
-    return [
-        Mark("level", y=needed, label="needed", colour=VERMILION, style=_DASHED),
-        Mark("line", supply.times, supply.values["bottle_pressure"], label="bottle"),
-    ]
-
-
-def _temperature_marks(supply: SupplyCourse) -> list[Mark]:
-    """Return the temperatures along the gas path, and the temperature of dry ice if the gas may freeze."""
-    marks = [
-        Mark("line", supply.times, supply.values[name], label=label, colour=colour)
-        for name, label, colour in _TEMPERATURES
-    ]
-    if supply.supply.line.freezes > 0.5:
-        dry_ice = supply.supply.line.temperatures[0]
-        marks.append(Mark("level", y=dry_ice, label="dry ice", colour=VERMILION, style=_DASHED))
-    return marks
-
-
 def _panel(end: float, ended: Mark, kind: Kind, marks: Sequence[Mark], largest: float | None = None) -> Panel:
     """Return a panel up to the end of the walk [s] with a line where its bottle ended it.
 
@@ -118,8 +105,6 @@ def _panel(end: float, ended: Mark, kind: Kind, marks: Sequence[Mark], largest: 
     def set_limits(axes: "Axes") -> None:
         axes.set_xlim(0.0, 1.005 * float(axis.values(end)))
         axes.locator_params(axis="y", nbins=5)
-        if len(marks) > _MOST_IN_AXES:
-            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, borderaxespad=0.1, handlelength=1.2)
         if largest is not None:
             axes.set_ylim(0.0, 1.08 * display_value(largest, kind.quantity))
 
