@@ -270,8 +270,8 @@ def rig_rates(given: RigNumbers, state: RigState, inputs: Inputs, direction: flo
     leak = leak_exchange(rig, node_1, node_2, given.leak_orifice)
     torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure, parts=VANE_FUNCTIONS)
     torque = torque + inputs.vane.added_torque
-    pressed = pressed_in_motion(plant.dynamic_torque, speed, node_1.pressure, node_2.pressure, rig.seal_friction)
-    friction = direction * more_near_standstill(pressed, speed, node_1.pressure, node_2.pressure, rig.stribeck)
+    pressed = dynamic_seal_friction(plant.dynamic_torque, speed, node_1.pressure, node_2.pressure, rig.seal_friction)
+    friction = direction * stribeck_friction(pressed, speed, node_1.pressure, node_2.pressure, rig.stribeck)
     acceleration = vane_acceleration(torque, friction, plant.viscous_damping, plant.inertia, angle, speed)
     grows = plant.displacement_per_radian * (speed if direction != 0.0 else inputs.vane.rate)
     heat_1, heat_2 = wall_heat(rig, node_1, volume_1), wall_heat(rig, node_2, volume_2)
