@@ -85,9 +85,7 @@ def audit(
     return _finding_of([AuditedSet(loaded, of_parent, tuple(findings_of(loaded, of_parent)))], True)
 
 
-def audited(
-    names: Sequence[str], parent: str | None, is_whole: bool, overrides: Sequence[str]
-) -> Finding[Any]:
+def audited(names: Sequence[str], parent: str | None, is_whole: bool, overrides: Sequence[str]) -> Finding[Any]:
     """Return changes and findings of one set, or a table of several; it has not passed where one is an error.
 
     Where ``is_whole`` is false, findings that concern no changed value of a set with a parent or overrides are counted.
