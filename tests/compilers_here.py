@@ -40,7 +40,6 @@ class ScriptCompiler:
     says: bool = False
     name: str = "script"
     effort: Effort = Effort.FULL
-    seconds_per_byte: float = 2.5e-4
 
     def with_effort(self, effort: Effort) -> "ScriptCompiler":
         """Return the same compiler with another optimisation of its programs."""

@@ -58,7 +58,7 @@ export class App implements Page {
     this.frame = makeFrame(host, content, this);
     this.controls = new Controls(this.frame.controls, content, { change: (key, text, isDragging) => this.change(key, text, isDragging) });
     this.panels = new Panels(this.frame.panels, content, (time) => time !== null && this.stage.goTo(time, false));
-    this.stage = new Stage(this.frame.stage, (time) => this.panels.point(time));
+    this.stage = new Stage(this.frame.stage, content, (time) => this.panels.point(time));
     this.outcome = new OutcomeTable(this.frame.outcome, content);
     this.extras = new Extras(this.frame, this);
     this.tell(wrong);

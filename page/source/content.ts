@@ -115,12 +115,20 @@ export interface Content {
   readonly bottle: Bottle;
   readonly programs: readonly Program[];
   readonly units: Readonly<Record<string, readonly UnitScale[]>>;
+  /** What a run computes nothing up to, in SI by unit: what is not larger is rounding. */
+  readonly zeros: Readonly<Record<string, number>>;
 }
 
 export function programNamed(content: Content, name: string): Program {
   const found = content.programs.find((program) => program.name === name);
   if (found === undefined) throw new RangeError(`there is no scenario '${name}'`);
   return found;
+}
+
+/** A channel by its name; a plain number where no program has it. */
+export function channelNamed(content: Content, name: string): Channel {
+  const all = content.programs.flatMap(({ channels }) => channels);
+  return all.find((channel) => channel.name === name) ?? { name, unit: "", shown: "", label: name };
 }
 
 export function scalesOf(content: Content, unit: string): readonly UnitScale[] {

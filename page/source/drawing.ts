@@ -3,9 +3,7 @@
 import { colour, shade } from "./colours";
 import { say, shape } from "./dom";
 import type { Run } from "./engine";
-import { plain } from "./units";
 
-const PSI = 6894.757293168361;
 const RADIUS = 62;
 const CENTRE = [92, 92] as const;
 const ANKLE = [292, 118] as const;
@@ -17,6 +15,8 @@ export interface Frame {
   readonly highest: number;
   readonly atmosphere: number;
   readonly supply: number;
+  /** A value of a channel as it is shown, with three digits at most and its unit. */
+  readonly text: (channel: string, value: number) => string;
 }
 
 export class Drawing {
@@ -66,6 +66,7 @@ export class Drawing {
     this.showChambers(angle, pressures, frame);
     this.showValve(value("command"));
     this.showLeg(angle, value("shank_angle"), value("torque"), run.channels.has("shank_angle"));
+    say(this.words, `${frame.text("angle", angle).replace(/ deg$/, "°")} · ${frame.text("torque", value("torque"))}`);
   }
 
   private showChambers(angle: number, pressures: readonly number[], frame: Frame): void {
@@ -82,7 +83,7 @@ export class Drawing {
       this.chambers[place]?.setAttribute("d", sector(from, to));
       this.chambers[place]?.setAttribute("fill", `rgb(${shade(0.12 + 0.8 * share).join()})`);
       const text = this.texts[place];
-      if (text !== undefined) say(text, `${place + 1}: ${plain((pressure - frame.atmosphere) / PSI, 2)} psi`);
+      if (text !== undefined) say(text, `${place + 1}: ${frame.text(`pressure_${place + 1}`, pressure).replace(/\u00a0gauge$| gauge$/, "")}`);
     });
     const [x, y] = onCircle(at(angle), RADIUS + 3);
     for (const [name, given] of [["x1", CENTRE[0]], ["y1", CENTRE[1]], ["x2", x], ["y2", y]] as const) {
@@ -117,7 +118,6 @@ export class Drawing {
       "d",
       `M${x.toFixed(1)} ${y.toFixed(1)}A44 44 0 0 ${torque > 0 ? 1 : 0} ${(ANKLE[0] + 44 * Math.cos(end)).toFixed(1)} ${(ANKLE[1] + 44 * Math.sin(end)).toFixed(1)}`,
     );
-    say(this.words, `${plain(degrees(angle), 3)}° · ${plain(torque, 3)} N\u00a0m`);
   }
 }
 

@@ -2,7 +2,7 @@
 
 import type { Program } from "./content";
 import type { Values } from "./settings";
-import { plain } from "./units";
+import { plain } from "./shown";
 
 /** What a module exports: see `ppafo.page.wasm`. */
 interface Exports extends WebAssembly.Exports {

@@ -5,14 +5,14 @@ import { element, say } from "./dom";
 import type { PageFrame } from "./frame";
 import { refuseFile } from "./jobs";
 import { MapView } from "./map";
-import { shownMetric } from "./outcome";
 import type { Named, Page } from "./page";
 import { agreementTable, askForColumns, columnsOf, type ColumnMap, mapOfHeader } from "./recording";
 import { scenarioFile } from "./scenario_file";
-import { atmosphereOf, type Configuration, shownNumber, valuesOf } from "./settings";
+import { atmosphereOf, type Configuration, valuesOf } from "./settings";
 import { samplesText, savePicture, saveState, saveText } from "./sharing";
 import { addressOf, stateOfFile } from "./state";
-import { InputError, plain, readableUnit, telling } from "./units";
+import { plain, shownText, shownValue } from "./shown";
+import { InputError, readableUnit, telling } from "./units";
 import { type Effect, effectsOf } from "./variation";
 
 const TOLD_METRICS = 3;
@@ -214,7 +214,7 @@ export class Extras {
       return { name, errors: run === null ? [] : await app.workers.agreement(run, valuesOf(app.content, configuration), isHeld) };
     });
     const found = await Promise.all(asked);
-    if (app.overlay === overlay && app.state === state) this.errors.replaceChildren(agreementTable(found));
+    if (app.overlay === overlay && app.state === state) this.errors.replaceChildren(agreementTable(app.content, found));
   }
 
   private makeAssumptions(): void {
@@ -251,7 +251,7 @@ export class Extras {
     const signed = (percent: number) => (Number.isFinite(percent) ? `${percent < 0 ? "−" : "+"}${plain(Math.abs(percent), 2)} %` : "–");
     const atmosphere = atmosphereOf(valuesOf(content, configuration));
     const rows = ranked.map((effect) => {
-      const text = (value: number) => plain(Number(shownNumber(content, effect.setting, value, atmosphere)), 3);
+      const text = (value: number) => plain(shownValue(content, effect.setting, value, atmosphere), 3);
       const words = `${effect.setting.label}: ${text(effect.ends[0])} to ${text(effect.ends[1])} ${readableUnit(effect.setting.shown)}`;
       return element(
         "tr",
@@ -262,7 +262,7 @@ export class Extras {
     });
     const heads = metrics.map((metric) => {
       const value = run?.metrics.get(metric.name);
-      const now = value === undefined ? "" : ` (${`${plain(shownMetric(content, metric, value), 3)} ${readableUnit(metric.shown)}`.trim()})`;
+      const now = value === undefined ? "" : ` (${shownText(content, metric, value, 3)})`;
       return element("th", { scope: "col", class: "number" }, `${metric.label}${now}`);
     });
     const title = element("h3");

@@ -1,9 +1,9 @@
 /** What a tab comes to in a sentence or two: what its task requires of the supply, and how long its gas would last. */
 
-import { type Bottle, type Content, programNamed } from "./content";
+import { type Bottle, channelNamed, type Content, programNamed } from "./content";
 import type { Run } from "./engine";
 import type { Values } from "./settings";
-import { plain } from "./units";
+import { plain, shownText } from "./shown";
 
 interface Simulated {
   readonly name: string;
@@ -44,7 +44,8 @@ function torqueFacts(content: Content, done: readonly Simulated[]): string {
     const [least, most] = [wanted.reduce((a, b) => Math.min(a, b), 0), wanted.reduce((a, b) => Math.max(a, b), 0)];
     const [required, sustained] = -least > most ? [least, limits[0]] : [most, limits[1]];
     const short = Math.abs(required) > Math.abs(sustained) * (1 + 1e-9);
-    const text = `the task requires ${plain(required, 3)} N\u00a0m; the supply sustains ${sustained.toFixed(1)} N\u00a0m${short ? ", so the shaded part is out of reach" : ""}.`;
+    const shown = (torque: number) => shownText(content, channelNamed(content, "reference"), torque, 3);
+    const text = `the task requires ${shown(required)}; the supply sustains ${shown(sustained)}${short ? ", so the shaded part is out of reach" : ""}.`;
     return [[item.name, text] as const];
   });
   const texts = [...new Set(facts.map(([, text]) => text))];

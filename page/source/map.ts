@@ -6,9 +6,9 @@ import { textOnSlider } from "./controls";
 import { element, say } from "./dom";
 import type { Run } from "./engine";
 import type { Workers } from "./jobs";
-import { shownMetric } from "./outcome";
 import { ATMOSPHERE, type Configuration, settingsByKey, shownNumber, valuesOf } from "./settings";
-import { plain, readableUnit, telling } from "./units";
+import { plain, shownValue } from "./shown";
+import { readableUnit, telling } from "./units";
 import { type Axes, type Landscape, landscapeOf, SIDE } from "./variation";
 
 const SIZE = 320;
@@ -177,7 +177,7 @@ export class MapView {
     const ends = ({ label, slider, shown }: Setting) => `${label}: ${plain(slider[0])} to ${plain(slider[1])} ${readableUnit(shown)}`;
     say(this.axes[0], `${ends(across)} →`);
     say(this.axes[1], `${ends(up)} →`);
-    const text = (value: number) => plain(shownMetric(this.content, metric, value), 3);
+    const text = (value: number) => plain(shownValue(this.content, metric, value), 3);
     const unit = readableUnit(metric.shown);
     say(this.scale, `${metric.label}: from ${text(low)} (yellow) to ${text(high)} ${unit} (violet). White line: current value, ${text(level)} ${unit}.`);
     this.canvas.setAttribute(

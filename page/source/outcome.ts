@@ -1,10 +1,11 @@
 /** The table of metrics: one column a configuration, differences from the first one, told to a screen reader too. */
 
-import { type Content, type Metric, programNamed, scalesOf } from "./content";
+import { type Content, type Metric, programNamed } from "./content";
 import { element, say, whenQuiet } from "./dom";
 import type { Run } from "./engine";
 import { minutesOfBottle } from "./facts";
-import { fromSi, plain, readableUnit, scaleOf } from "./units";
+import { plain, shownText, shownValue } from "./shown";
+import { readableUnit } from "./units";
 
 export interface Column {
   readonly name: string;
@@ -20,8 +21,6 @@ interface Row {
   readonly changes: readonly HTMLElement[];
 }
 
-/** Metrics this small in SI are what rounding leaves of a balance. */
-const ROUNDING = 1e-12;
 const GAS = ["gas_supplied", "gas"];
 const MINUTES: Metric = { name: "minutes", unit: "s", shown: "min", label: "How long a full bottle lasts" };
 const TOLD = ["rms_error", "gas_supplied", "switchings", "gas", "positive_push_off_work", "toe_clearance"];
@@ -53,10 +52,11 @@ export class OutcomeTable {
     }
     for (const { metric, row, cells, changes } of this.rows) {
       const values = columns.map(({ run }) => this.valueOf(metric, run));
-      if (values.some((value) => !isNothing(value))) this.seen.add(metric.name);
+      const zero = this.content.zeros[metric.unit] ?? 0;
+      if (values.some((value) => !isNothing(value, zero))) this.seen.add(metric.name);
       row.hidden = !this.seen.has(metric.name);
       cells.forEach((cell, place) => say(cell, this.text(metric, values[place])));
-      changes.forEach((cell, place) => say(cell, changeText(values[0], values[place + 1])));
+      changes.forEach((cell, place) => say(cell, changeText(values[0], values[place + 1], zero)));
     }
     const nothing = this.rows.filter(({ row }) => row.hidden).map(({ metric }) => metric.label);
     say(this.nothing, nothing.length === 0 ? "" : `Zero, or without a value, in all: ${nothing.map((label) => label.slice(0, 1).toLowerCase() + label.slice(1)).join("; ")}.`);
@@ -103,9 +103,7 @@ export class OutcomeTable {
   }
 
   private text(metric: Metric, value: number | undefined): string {
-    if (value === undefined || !Number.isFinite(value)) return "–";
-    if (Math.abs(value) < ROUNDING) return "0";
-    return plain(shownMetric(this.content, metric, value));
+    return plain(shownValue(this.content, metric, value ?? NaN));
   }
 
   private summary(): string {
@@ -113,7 +111,7 @@ export class OutcomeTable {
       .map(({ name, program, run }) => {
         if (run.fault !== "") return `${name}: ${run.fault}.`;
         const metrics = programNamed(this.content, program).metrics.filter((metric) => TOLD.includes(metric.name));
-        const texts = metrics.map((metric) => `${metric.label} ${this.text(metric, run.metrics.get(metric.name))} ${readableUnit(metric.shown)}`.trim());
+        const texts = metrics.map((metric) => `${metric.label} ${shownText(this.content, metric, run.metrics.get(metric.name) ?? NaN)}`);
         return `${name}: ${texts.join(", ")}.`;
       })
       .join(" ");
@@ -121,18 +119,14 @@ export class OutcomeTable {
 }
 
 /** Whether a metric says nothing: there is none, or what rounding leaves of zero. */
-function isNothing(value: number | undefined): boolean {
-  return value === undefined || !Number.isFinite(value) || Math.abs(value) < ROUNDING;
+function isNothing(value: number | undefined, zero: number): boolean {
+  return value === undefined || !Number.isFinite(value) || Math.abs(value) <= zero;
 }
 
-export function shownMetric(content: Content, metric: Metric, value: number): number {
-  return fromSi(value, scaleOf(metric.shown, scalesOf(content, metric.unit)), 101325);
-}
-
-function changeText(first: number | undefined, other: number | undefined): string {
+function changeText(first: number | undefined, other: number | undefined, zero: number): string {
   if (first === undefined || other === undefined || !Number.isFinite(first - other)) return "–";
   if (first === other) return "0";
-  if (Math.max(Math.abs(first), Math.abs(other)) < ROUNDING) return "–";
+  if (isNothing(first, zero) && isNothing(other, zero)) return "–";
   if (first === 0) return "–";
   const percent = ((other - first) / Math.abs(first)) * 100;
   return `${percent > 0 ? "+" : "−"}${plain(Math.abs(percent), 3)}\u00a0%`;

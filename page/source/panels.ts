@@ -4,13 +4,14 @@ import uPlot from "../vendor/uplot/uPlot.esm.js";
 import type { Overlay } from "./agreement";
 import { clockOf, firstAfter, onClock } from "./clock";
 import { colour, DASHES, lineColourOf } from "./colours";
-import { type Content, scalesOf } from "./content";
+import { channelNamed, type Content, scalesOf } from "./content";
 import { element, say, whenQuiet } from "./dom";
 import type { Run } from "./engine";
 import { sustainedTorque } from "./facts";
 import { lineOn, pathsOf } from "./paths";
 import { atmosphereOf, type Values } from "./settings";
-import { fromSi, plain, readableUnit, scaleOf } from "./units";
+import { plain, shownValue } from "./shown";
+import { fromSi, readableUnit, scaleOf } from "./units";
 
 export interface Panel {
   readonly title: string;
@@ -165,13 +166,12 @@ export class Panels {
   private sayStill(panels: readonly Panel[]): void {
     const texts = panels.map((panel) => {
       const channel = panel.channels[0] ?? "";
+      const kind = channelNamed(this.content, channel);
       const values = this.shown.flatMap((item) => {
-        const [factor, offset] = this.lineOf(channel, item);
         const value = item.run.channels.get(channel)?.[0];
-        return value === undefined ? [] : [plain(value * factor + offset, 3)];
+        return value === undefined ? [] : [plain(shownValue(this.content, kind, value, atmosphereOf(item.values)), 3)];
       });
-      const unit = readableUnit(this.unitOf(channel).shown);
-      return `${panel.axis} stays at ${`${[...new Set(values)].join(" and ")} ${unit}`.trim()}.`;
+      return `${panel.axis} stays at ${`${[...new Set(values)].join(" and ")} ${readableUnit(kind.shown)}`.trim()}.`;
     });
     say(this.still, texts.join(" "));
     this.still.hidden = texts.length === 0;
@@ -240,7 +240,7 @@ export class Panels {
   }
 
   private axisOf(panel: Panel): string {
-    const unit = readableUnit(this.unitOf(panel.channels[0] ?? "").shown);
+    const unit = readableUnit(channelNamed(this.content, panel.channels[0] ?? "").shown);
     return `${panel.axis}${unit === "" || unit === "-" ? "" : ` (${unit})`}`;
   }
 
@@ -295,8 +295,8 @@ export class Panels {
         const values = item?.run.channels.get(line.channel);
         if (item === undefined || values === undefined || time === null) return null;
         const at = Math.min(values.length - 1, Math.max(0, firstAfter(item.run.time, time) - 1));
-        const [factor, offset] = this.lineOf(line.channel, item);
-        return { line, text: plain((values[at] ?? NaN) * factor + offset, 3) };
+        const value = shownValue(this.content, channelNamed(this.content, line.channel), values[at] ?? NaN, atmosphereOf(item.values));
+        return { line, text: plain(value, 3) };
       });
       readout.replaceChildren(
         ...values
@@ -327,17 +327,9 @@ export class Panels {
     return [clock, ...columns];
   }
 
-  private unitOf(channel: string): { unit: string; shown: string } {
-    for (const program of this.content.programs) {
-      const found = program.channels.find((item) => item.name === channel);
-      if (found !== undefined) return found;
-    }
-    return { unit: "", shown: "" };
-  }
-
   /** Factor and offset from SI to what is shown of a run. */
   private lineOf(channel: string, { values }: Shown): Scaling {
-    const { unit, shown } = this.unitOf(channel);
+    const { unit, shown } = channelNamed(this.content, channel);
     if (unit === shown) return [1, 0];
     const scale = scaleOf(shown, scalesOf(this.content, unit));
     return [1 / Number(scale.scale), fromSi(0, scale, atmosphereOf(values))];

@@ -1,10 +1,11 @@
 /** A recording of one's own: which channels its columns are, and what is said of the runs beside it. */
 
 import { ACCEPTABLE_FRACTION, type ChannelError, LONGEST_DELAY, type RecordedColumn } from "./agreement";
-import { type Content, scalesOf } from "./content";
+import { channelNamed, type Content, scalesOf } from "./content";
 import { element, say } from "./dom";
 import type { Heads } from "./table";
-import { InputError, plain, scaleOf } from "./units";
+import { plain } from "./shown";
+import { InputError, readableUnit, scaleOf } from "./units";
 import { nearest } from "./state";
 
 /** Channels that a recording may have, with their units in SI; a level of pressure is absolute. */
@@ -76,20 +77,17 @@ function guess(name: string): string {
   return known.find(([pattern]) => pattern.test(plainName))?.[1] ?? "";
 }
 
-const PSI = 6894.757293168361;
-const SHOWN: Readonly<Record<string, readonly [number, string]>> = {
-  angle: [180 / Math.PI, "deg"],
-  pressure_1: [1 / PSI, "psi"],
-  pressure_2: [1 / PSI, "psi"],
-  pressure_difference: [1 / PSI, "psi"],
-  torque: [1, "N m"],
-};
+/** Factor and unit of a difference of two values of a channel: of pressures in psi, neither gauge nor absolute. */
+function differenceOf(content: Content, channel: string): readonly [number, string] {
+  const { unit, shown } = channelNamed(content, channel === "pressure_difference" ? "pressure_1" : channel);
+  return [1 / Number(scaleOf(shown, scalesOf(content, unit)).scale), readableUnit(shown.replace(/_[ga]$/, ""))];
+}
 
 /** The table of errors, as a person reads it. */
-export function agreementTable(found: readonly { readonly name: string; readonly errors: readonly ChannelError[] }[]): HTMLElement {
+export function agreementTable(content: Content, found: readonly { readonly name: string; readonly errors: readonly ChannelError[] }[]): HTMLElement {
   const rows = found.flatMap(({ name, errors }) =>
     errors.map(({ channel, rms, bias, fraction, delay, isAtLimit }) => {
-      const [factor, unit] = SHOWN[channel] ?? [1, ""];
+      const [factor, unit] = differenceOf(content, channel);
       const cells = [`${plain(rms * factor, 3)} ${unit}`, `${plain(bias * factor, 3)} ${unit}`, `${plain(fraction * 100, 3)} %`, isAtLimit ? "none" : `${plain(delay * 1000, 3)} ms`];
       const verdict = fraction <= ACCEPTABLE_FRACTION ? "within 10 %" : "beyond 10 %";
       return element(

@@ -2,10 +2,10 @@
 
 import { type Content, programNamed, type Program, type Relation, scalesOf, type Setting } from "./content";
 import { dividingStep, madeOf } from "./following";
-import { fromSi, InputError, plain, readableUnit, scaleOf, short, splitQuantity, toSi } from "./units";
+import { plain, shownValue, STANDARD_ATMOSPHERE } from "./shown";
+import { fromSi, InputError, readableUnit, scaleOf, short, splitQuantity, toSi } from "./units";
 
 export const ATMOSPHERE = "supply.atmospheric_pressure";
-const STANDARD_ATMOSPHERE = 101325;
 const RELATIVE = 1e-9;
 const MOST_PARTS = 50;
 /** Below this an end of a range is none that anybody has in mind, in the unit that is shown. */
@@ -167,14 +167,14 @@ function written(value: number, isLow: boolean): string {
   const unit = value === 0 ? 1 : 10 ** (Math.floor(Math.log10(Math.abs(value)) + 1e-12) - 2);
   const share = value / unit;
   const whole = isLow ? Math.ceil(share - 1e-6) : Math.floor(share + 1e-6);
-  const text = Math.abs(value) < 1e-4 && value !== 0 ? `${plain(whole / 100, 3)} × 10^${Math.round(Math.log10(unit)) + 2}` : plain(whole * unit, 3, 1e15);
+  const text = Math.abs(value) < 1e-4 && value !== 0 ? `${plain(whole / 100, 3)} × 10^${Math.round(Math.log10(unit)) + 2}` : String(Number((whole * unit).toPrecision(3)));
   return text.replace(/^1 × /, "").replace(/-/g, "−").replace(/\^−?\d+/, (power) => [...power.slice(1)].map((sign) => RAISED[sign] ?? "").join(""))
     .replace(/\B(?=(\d{3})+(?!\d)(?<!\.\d*))/g, ",");
 }
 
 /** A value as a control shows it, without its unit. */
 export function shownNumber(content: Content, setting: Setting, value: number, atmosphere: number): string {
-  return plain(fromSi(value, scaleOf(setting.shown, scalesOf(content, setting.unit)), atmosphere), 6);
+  return plain(shownValue(content, setting, value, atmosphere), 6);
 }
 
 /** The first pair of settings that contradict each other, as one line; empty where there is none. */

@@ -1,11 +1,12 @@
 /** The moving part: a drawing for each configuration, the gait phases where there are any, and the time they show. */
 
 import { colour } from "./colours";
+import { channelNamed, type Content } from "./content";
 import { Drawing } from "./drawing";
 import { element, say } from "./dom";
 import type { Run } from "./engine";
-import { ATMOSPHERE, type Values } from "./settings";
-import { plain } from "./units";
+import { atmosphereOf, type Values } from "./settings";
+import { plain, shownText } from "./shown";
 
 export interface Acted {
   readonly name: string;
@@ -31,6 +32,7 @@ export class Stage {
 
   constructor(
     host: HTMLElement,
+    private readonly content: Content,
     private readonly pointed: (time: number) => void,
   ) {
     host.append(this.drawings, this.strip, this.key, element("div", { class: "transport" }, this.play, this.slider, this.clock));
@@ -67,8 +69,9 @@ export class Stage {
       const frame = {
         lowest: value("actuator.angle_min", 0.35),
         highest: value("actuator.angle_max", 2.27),
-        atmosphere: value(ATMOSPHERE, 101325),
+        atmosphere: atmosphereOf(values),
         supply: Math.max(value("supply.pressure", 446000), value("supply.dorsiflexion_pressure", 0)),
+        text: (name: string, given: number) => shownText(this.content, channelNamed(this.content, name), given, 3, atmosphereOf(values)),
       };
       if (run.time.length > 0) this.drawn[place]?.drawing.show(run, frame, at);
     });

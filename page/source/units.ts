@@ -75,28 +75,6 @@ export function fromSi(value: number, scale: UnitScale, atmosphere: number): num
   return (value - (scale.isGauge ? atmosphere : 0) - Number(scale.offset)) / Number(scale.scale);
 }
 
-/** A number with a few significant digits, without an exponent where that is readable. */
-export function plain(value: number, digits = 4, largest = 1e6): string {
-  if (!Number.isFinite(value)) return "–";
-  if (value === 0) return "0";
-  const size = Math.abs(value);
-  if (size < 1e-4 || size >= largest) return trimmed(value.toExponential(digits - 1));
-  return trimmed(Number(value.toPrecision(digits)).toFixed(decimalsFor(size, digits)));
-}
-
-function decimalsFor(size: number, digits: number): number {
-  let decimals = digits - 1;
-  for (let edge = 10; size >= edge && decimals > 0; edge *= 10) decimals -= 1;
-  for (let edge = 1; size < edge && decimals < 12; edge /= 10) decimals += 1;
-  return decimals;
-}
-
-function trimmed(text: string): string {
-  const [number = "", power] = text.split("e");
-  const short = number.includes(".") ? number.replace(/\.?0+$/, "") : number;
-  return power === undefined ? short : `${short}e${power.replace("+", "")}`;
-}
-
 /** A unit as a person reads it. */
 export function readableUnit(unit: string): string {
   return unit

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Protocol, final
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, final
 
 from ppafo.arguments import Word, number, whole_number
 from ppafo.arguments.door import read_by
@@ -38,13 +38,8 @@ OUT = "out"
 """The parameter of a verb that writes its folder or file itself; every other command has ``--out DIR``."""
 
 
-class _Verb(Protocol):
-    """A function whose signature is the arguments of a command, and whose result is what the command says."""
-
-    __module__: str
-
-    def __call__(self, *arguments: Any, **named: Any) -> Any:
-        """Answer; PpafoError for bad input."""
+_Verb = Callable[..., Any]
+"""A function whose signature is the arguments of a command, and whose result is what the command says."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,18 +136,6 @@ def parameters_of(verb: _Verb) -> Iterator[tuple[inspect.Parameter, _OptionType]
             yield parameter, reading_of(parameter.annotation)
 
 
-def argparse_reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
-    """Return what reads a text for argparse, which prints the message of no error but its own."""
-
-    def reader(text: str) -> Any:
-        try:
-            return read(text)
-        except ArgumentError as error:
-            raise argparse.ArgumentTypeError(str(error)) from error
-
-    return reader
-
-
 def option_of(parameter: inspect.Parameter, reading: _OptionType) -> str:
     """Return the option that fills a parameter, empty where its place in the line does; a flag has no place."""
     if reading.word.option or not (reading.is_flag or parameter.kind is inspect.Parameter.KEYWORD_ONLY):
@@ -229,7 +212,15 @@ def _add_parameter(
                 word.off, action="store_false", dest=parameter.name, default=default, help=word.help.replace("%", "%%")
             )
         return
-    options |= {"metavar": word.metavar, "type": argparse_reader(word.read), "choices": reading.choices}
+
+    def read(text: str) -> Any:
+        try:
+            return word.read(text)
+        except ArgumentError as error:
+            # argparse prints the message of no error but its own.
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    options |= {"metavar": word.metavar, "type": read, "choices": reading.choices}
     if not option:
         if reading.is_repeated:
             options["nargs"] = "+" if is_required and not is_listing else "*"
@@ -357,15 +348,13 @@ def check_options(words: Sequence[str], parser: CommandParser) -> None:
         name = word.partition("=")[0]
         # As argparse has it: a dash alone, numbers and words with a space are values.
         is_value = not word.startswith("-") or len(word) == 1 or " " in word or _NEGATIVE_NUMBER.fullmatch(word)
-        if not is_value and not any(_stands_for(name, option) for option in known):
+        # An option stands for the beginning of a long one, or is a short one with its value behind it.
+        is_known = name in known or any(
+            option.startswith(name) if name.startswith("--") else len(option) == 2 and name.startswith(option)
+            for option in known
+        )
+        if not is_value and not is_known:
             # Without the dashes, which all have in common and which would make strangers look alike.
             bare = [option.removeprefix("--") for option in known if option.startswith("--")]
             hint = nearest_name(name.strip("-"), bare).replace("'", "'--", 1)
             raise UsageError(f"there is no option '{name}'{hint}; available: {', '.join(known)}")
-
-
-def _stands_for(name: str, option: str) -> bool:
-    """Tell whether a name is an option, the beginning of a long one, or a short one with its value behind it."""
-    if name.startswith("--"):
-        return option.startswith(name)
-    return name == option or (len(option) == 2 and name.startswith(option))

@@ -158,9 +158,6 @@ COMMANDS: dict[str, Command | CommandGroup] = {name: one for group in HEADINGS.v
 OTHERS: Kinds[FunctionType] = Kinds("ppafo.commands", "command", FunctionType, {})
 """The commands of other packages: functions, found when a word names none of ours."""
 
-OF_OTHERS = "of other packages"
-"""The heading of the help for them."""
-
 
 def check_words(words: list[str]) -> None:
     """Refuse words that begin as no command does, with the nearest name.
@@ -202,7 +199,7 @@ def list_commands() -> str:
     groups = {heading: {name: one.summary for name, one in group.items()} for heading, group in HEADINGS.items()}
     others = {name: Command("", found=verb).summary for name, verb in OTHERS.loaded().items()}
     if others:
-        groups[OF_OTHERS] = others
+        groups["of other packages"] = others
     width = max(len(name) for group in groups.values() for name in group)
     return "\n\n".join(
         "\n".join([f"{heading}:", *(f"  {name:<{width}}  {summary}" for name, summary in group.items())])

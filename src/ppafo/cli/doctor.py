@@ -32,9 +32,6 @@ FORMATS: dict[str, str] = {
 
 _DAY = 86400.0
 
-JOINED: dict[str, str] = {"size": "design"}
-"""Formats that are now part of another one."""
-
 
 def doctor(
     *,
@@ -66,8 +63,6 @@ def doctor(
     if len(given) > 1:
         raise DataError(f"{given[1]}: not allowed with {given[0]}")
     if schema is not None:
-        if schema in JOINED:
-            raise DataError(f"the format '{schema}' is now part of '{JOINED[schema]}'; print that one")
         if schema not in FORMATS:
             hint = nearest_name(schema, FORMATS)
             raise DataError(f"there is no file format '{schema}'{hint}; available: {', '.join(FORMATS)}")
@@ -97,14 +92,10 @@ def _bits() -> CommandOutput:
     found = dict(found_bits())
     others = [name for name, is_equal in found.items() if not is_equal]
     by = compilers_to_try()[0].name
-    text = f"bits: {len(found) - len(others)} of {len(found)} runs have the recorded bits ({by})"
-    lines = [
-        text,
-        *(f"  {name}: other bits; give its scenario, this computer and compiler in a report" for name in others),
-    ]
-    return CommandOutput(
-        "\n".join(lines), {"compiler": by, "same_bits": found}, "bits", EXIT_CHECK_FAILED if others else EXIT_GOOD
-    )
+    lines = [f"bits: {len(found) - len(others)} of {len(found)} runs have the recorded bits ({by})"]
+    lines += [f"  {name}: other bits; give its scenario, this computer and compiler in a report" for name in others]
+    code = EXIT_CHECK_FAILED if others else EXIT_GOOD
+    return CommandOutput("\n".join(lines), {"compiler": by, "same_bits": found}, "bits", code)
 
 
 def models_document(folder: Path | None, why_not: str) -> dict[str, Any]:

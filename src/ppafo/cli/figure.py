@@ -26,11 +26,11 @@ def export_figure(folder: Folder, *, out: File | None = None) -> CommandOutput:
     from ppafo.storage.files import write_file
     from ppafo.storage.result_folder import add_to_folder
 
-    if out is not None and out.suffix.removeprefix(".") not in FIGURE_FORMATS:
-        allowed = ", ".join(f".{name}" for name in FIGURE_FORMATS)
-        raise DataError(f"--out {out}: the name must end in one of {allowed}")
     # Before anything is read or drawn.
     if out is not None:
+        if out.suffix.removeprefix(".") not in FIGURE_FORMATS:
+            allowed = ", ".join(f".{name}" for name in FIGURE_FORMATS)
+            raise DataError(f"--out {out}: the name must end in one of {allowed}")
         output.check_new_file(out)
     from ppafo.analyses.stored_figures import draw_folder, names_in, what_is_there
     from ppafo.report.drawing import load_drawing
@@ -43,12 +43,12 @@ def export_figure(folder: Folder, *, out: File | None = None) -> CommandOutput:
         if out is not None:
             raise DataError(f"--out {out}: there is no figure to draw: {said}")
         return CommandOutput(said, document)
-    if out is not None and len(drawn) > 1:
-        raise DataError(
-            f"--out {out}: {folder} has {len(drawn)} figures, {', '.join(drawn)}; without --out each is "
-            "written beside its recording"
-        )
     if out is not None:
+        if len(drawn) > 1:
+            raise DataError(
+                f"--out {out}: {folder} has {len(drawn)} figures, {', '.join(drawn)}; without --out each is "
+                "written beside its recording"
+            )
         (content,) = render_figure(next(iter(drawn.values())), [out.suffix.removeprefix(".")]).values()
         written = [str(write_file(out, content))]
     else:

@@ -3,7 +3,7 @@
 import argparse
 import gc
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 from ppafo import interrupts
@@ -43,19 +43,15 @@ complete -o default -F _ppafo ppafo
 
 def completion_script(shell: str) -> str:
     """Return the script that completes commands, options and names of the package in a shell of ``SHELLS``."""
-    cases = [f'      "{words}"*) words="{" ".join(found)}" ;;' for words, found in _cases()]
-    head = "autoload -U +X bashcompinit && bashcompinit\n" if shell == "zsh" else ""
-    return _SCRIPT.format(head=head, commands=" ".join(COMMANDS), cases="\n".join(cases))
-
-
-def _cases() -> Iterator[tuple[str, list[str]]]:
-    """Yield the first words of a line, and what may follow them; a group after its actions."""
+    # What may follow the first words of a line; a group after its actions.
+    following: dict[str, list[str]] = {}
     for name, one in COMMANDS.items():
         if isinstance(one, CommandGroup):
-            yield from ((f"{name} {action} ", _words(command)) for action, command in one.actions.items())
-            yield f"{name} ", list(one.actions)
-        else:
-            yield f"{name} ", _words(one)
+            following |= {f"{name} {action} ": _words(command) for action, command in one.actions.items()}
+        following[f"{name} "] = list(one.actions) if isinstance(one, CommandGroup) else _words(one)
+    cases = [f'      "{words}"*) words="{" ".join(found)}" ;;' for words, found in following.items()]
+    head = "autoload -U +X bashcompinit && bashcompinit\n" if shell == "zsh" else ""
+    return _SCRIPT.format(head=head, commands=" ".join(COMMANDS), cases="\n".join(cases))
 
 
 def _words(command: Command) -> list[str]:
@@ -179,15 +175,12 @@ def _run(words: list[str]) -> int:
     except PpafoError as error:
         interrupts.check()  # what an interrupt broke is no mistake of the user's
         lines = [f"{len(error.parts)} things are wrong:", *error.parts] if error.parts else [str(error)]
-        print("ppafo: " + "\n  ".join(_readable(one_line(line)) for line in lines), file=sys.stderr)
+        for number, line in enumerate(map(one_line, lines)):
+            # Without its middle where it repeats far more of the input than anybody reads.
+            is_long, half = len(line) > _LONGEST_MESSAGE, _LONGEST_MESSAGE // 2
+            shown = f"{line[:half]} ... {line[-half:]}" if is_long else line
+            print(f"{'  ' if number else 'ppafo: '}{shown}", file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt as interrupt:
         print(f"ppafo: {str(interrupt) or 'interrupted; nothing is half written'}", file=sys.stderr)
         return EXIT_INTERRUPTED
-
-
-def _readable(message: str) -> str:
-    """Return a message without its middle where it repeats far more of the input than anybody reads."""
-    if len(message) <= _LONGEST_MESSAGE:
-        return message
-    return f"{message[: _LONGEST_MESSAGE // 2]} ... {message[-_LONGEST_MESSAGE // 2 :]}"

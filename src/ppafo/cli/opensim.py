@@ -52,35 +52,21 @@ def export_opensim(
         if value is not None:
             other = "a walk, not a recording" if is_recording else "a recording; a walk knows its wearer"
             raise DataError(f"{option}: is for {other}")
-    if is_recording:
-        return _recorded(path, side, body_mass, out)
-    from ppafo.exports.opensim import files_of_walk
-
-    return output.export(
-        out,
-        COMMAND,
-        lambda: files_of_walk(walk, tuple(overrides), gait, minutes, side, strikes),
-        lambda _: _next(out, "device_torque.sto"),
-    )
-
-
-def _next(out: Path, file: str) -> str:
-    return f"load {shlex.quote(str(out / file))} in OpenSim; its header says units and signs"
-
-
-def _recorded(path: Path, side: Side, mass: float | None, out: Path) -> CommandOutput:
-    from ppafo.exports.opensim import files_of_recording
+    from ppafo.exports.opensim import files_of_recording, files_of_walk
 
     # Known once the files are made, and said after that.
     missing: list[str] = []
 
     def make() -> dict[str, bytes]:
-        files, found = files_of_recording(path, side, mass)
+        if not is_recording:
+            return files_of_walk(walk, tuple(overrides), gait, minutes, side, strikes)
+        files, found = files_of_recording(path, side, body_mass)
         missing.extend(found)
         return files
 
     def following(_: Sequence[str]) -> str:
+        file = shlex.quote(str(out / ("recording.sto" if is_recording else "device_torque.sto")))
         left_out = f"\nleft out: {', '.join(missing)}, which are per body mass: give --body-mass" if missing else ""
-        return f"{_next(out, 'recording.sto')}{left_out}"
+        return f"load {file} in OpenSim; its header says units and signs{left_out}"
 
     return output.export(out, COMMAND, make, following)

@@ -59,10 +59,6 @@ class Compiler(Protocol):
     def with_effort(self, effort: Effort) -> "Compiler":
         """Return the same compiler with another optimisation of its programs."""
 
-    @property
-    def seconds_per_byte(self) -> float:
-        """Compile time per byte of the text on a common computer, until this one has compiled something [s]."""
-
     def identity(self) -> str:
         """Dependencies of a compiled program beside its text: compiler, version, flags, processor."""
 

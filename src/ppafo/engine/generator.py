@@ -7,17 +7,13 @@ from dataclasses import dataclass, field
 from types import FunctionType
 from typing import Any
 
+from ppafo.engine.composer import Composer, RewrittenNames, is_step_function
+from ppafo.engine.definitions import emitted_name
 from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import check_flow, check_grammar, place, refusal
 from ppafo.engine.program import Program
 from ppafo.engine.reduction import HISTORIES, NUMBER, Effects, Reduction, definition_of, names_in, uses_of_group
-from ppafo.engine.source_text import (
-    Composer,
-    RewrittenNames,
-    SourceCollector,
-    emitted_name,
-    is_step_function,
-)
+from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.declaration import PlainFunction
 from ppafo.wording import nearest_name
@@ -36,8 +32,6 @@ class ComposedFunction:
     """Names that it is handed before its own arguments: groups of a lane, and the lane's number."""
     known: Mapping[str, Any]
     """Arguments whose values are known while it is composed; it has no parameters for them."""
-    row: Any
-    """The NamedTuple class of what it returns, None where that is one value."""
     is_phase: bool
     """True where the loop over steps calls it, false where another function of the step does."""
     ending: str
@@ -104,23 +98,13 @@ class StepText:
             return self._composed(called, known, is_phase=False).name
         return self.collector.add_inside(inside, called)
 
-    def effects_of(self, name: str) -> Effects:
-        """Groups that a function of the step reads and sets."""
-        return next(composed.effects for composed in self.composed.values() if composed.name == name)
+    def effects_of(self, called: FunctionType) -> Effects:
+        """Groups that a function of the step, which was added, reads and sets."""
+        return self.composed[called].effects
 
     def handed_to(self, name: str) -> tuple[str, ...]:
         """Names that a function of the module is handed before its own arguments."""
         return self.collector.needs.get(name, ())
-
-    def keep(self, value: Any) -> str:
-        """A name that stands for a value in a reduced function."""
-        name = f"kept_{id(value)}"
-        self.kept[name] = value
-        return name
-
-    def value_kept(self, name: str) -> Any:
-        """The value that such a name stands for; KeyError for any other name."""
-        return self.kept[name]
 
     def note_read(self, scope: Mapping[str, Any], name: str) -> None:
         """Keep that a name was looked up."""
@@ -181,63 +165,52 @@ class StepText:
         """Composer of a reduced function of the step: replaces names that are defined outside it."""
         return Composer(
             function,
-            lambda called: self._name_inside(function, called),
+            lambda called: (
+                self.composed[called].name if called in self.composed else self.collector.add_inside(function, called)
+            ),
             self.collector.note_read,
             self.handed_to,
             self.collector.stands_for,
             names,
         )
 
-    def _name_inside(self, function: FunctionType, called: Any) -> str:
-        """The name in the module of what a function of the step calls."""
-        return self.composed[called].name if called in self.composed else self.collector.add_inside(function, called)
-
     def _composed(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> ComposedFunction:
-        """A function of the step in the module, composed once. ProgramError where it is called in two ways."""
-        composed = self.composed.get(function)
-        if composed is None:
-            composed = self.composed[function] = self._compose(function, known, is_phase)
-        if composed.known != known or composed.is_phase != is_phase:
-            raise ProgramError(f"{function.__name__} is composed in two different forms in one step")
-        return composed
+        """A function of the step in the module, composed once: reduced, it returns what it sets.
 
-    def _compose(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> ComposedFunction:
-        """Reduce a function of the step and put it into the module, where it returns what it sets.
-
-        ProgramError where it gives a value and sets groups of its lane.
+        ProgramError where it is called in two ways, or gives a value and sets groups of its lane.
         """
+        if function in self.composed:
+            composed = self.composed[function]
+            if composed.known != known or composed.is_phase != is_phase:
+                raise ProgramError(f"{function.__name__} is composed in two different forms in one step")
+            return composed
         reduction = Reduction(self, function, known)
         tree, effects = reduction.reduced(), reduction.effects
         if is_phase:
             # What nothing has rows for lives in this phase.
             effects.groups = {name: fields for name, fields in effects.groups.items() if name in self.rows}
-        row = None
         if not any(isinstance(node, ast.Return) for node in ast.walk(tree)):
             # A single result is returned as it is.
-            row = self._result_row(function, tuple(effects.results)) if len(effects.results) > 1 else None
-            tree.body = [*tree.body, ast.copy_location(self._return(effects.results, row), tree)]
+            results: list[ast.expr] = [ast.Name(name, ast.Load()) for name in effects.results]
+            value: ast.expr = results[0] if len(results) == 1 else ast.Tuple(results, ast.Load())
+            if len(results) > 1:
+                value = ast.Call(reduction.kept(self._result_row(function, tuple(effects.results))), results, [])
+            tree.body = [*tree.body, ast.copy_location(ast.Return(value), tree)]
         elif effects.results:
             raise reduction.refuse(tree, f"'{function.__name__}' gives a value and sets groups of its lane")
         parameters = [argument.arg for argument in tree.args.args]
         # The groups that it reads come before its own parameters.
         handed = tuple(name for name in parameters if name in effects.reads or name == NUMBER)
-        return ComposedFunction(
+        self.composed[function] = ComposedFunction(
             function=function,
             name=self._written(function, tree, handed, {*effects.reads, *effects.groups}),
             effects=effects,
             handed=handed,
             known=known,
-            row=row,
             is_phase=is_phase,
             ending=self.ending,
         )
-
-    def _return(self, names: Sequence[str], row: Any) -> ast.Return:
-        """The statement that returns what is set: one value, a ``row`` of several, or an empty tuple."""
-        results: list[ast.expr] = [ast.Name(name, ast.Load()) for name in names]
-        if row is not None:
-            return ast.Return(ast.Call(ast.Name(self.keep(row), ast.Load()), results, []))
-        return ast.Return(results[0] if len(results) == 1 else ast.Tuple(results, ast.Load()))
+        return self.composed[function]
 
     def _written(self, function: FunctionType, tree: ast.FunctionDef, handed: tuple[str, ...], groups: set[str]) -> str:
         """Put the text of a reduced function into the module; return its name there."""
@@ -258,7 +231,7 @@ class StepText:
         if self.ending and text != self.collector.definitions.get(tree.name, ""):
             tree.name += self.ending
             text = self.collector.decorated(tree, file)
-        self.collector.define(tree.name, function, text)
+        self.collector.owners[tree.name], self.collector.definitions[tree.name] = function, text
         if handed:
             self.collector.needs[tree.name] = handed
         return tree.name

@@ -23,11 +23,12 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ppafo.engine.composer import COMPILED_BUILTINS
 from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaves, rebuilt
-from ppafo.engine.source_text import COMPILED_BUILTINS, MadeFrom, Read
+from ppafo.engine.source_text import MadeFrom, Read, SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.binding import is_made_of
 from ppafo.model.declaration import PlainFunction
@@ -113,16 +114,12 @@ class PythonFunctions:
             rows = self._effects.get(function, ())
             self._made[function] = self._law(copied, rows) if rows else copied
             scope |= {name: self.of(value, function) for name, value in read.items()}
-            copied.__kwdefaults__ = self._named_defaults(function)
+            copied.__kwdefaults__ = self.part(function.__kwdefaults__ or {})
             if self._operations is not None:
                 scope |= self._operations.names
             elif not rows and not copied.__kwdefaults__ and all(scope[name] is read[name] for name in read):
                 self._made[function] = function
         return self._made[function]
-
-    def _named_defaults(self, function: FunctionType) -> dict[str, Any]:
-        """Defaults of the parameters by name, and in its parts what the program has in the place of functions."""
-        return {name: self.part(value) for name, value in (function.__kwdefaults__ or {}).items()}
 
     def _law(self, function: FunctionType, rows: tuple[str, ...]) -> PlainFunction:
         """Return the law of an effect, called as its port is, with the present rows of the effect."""
@@ -152,7 +149,7 @@ def functions_of(program: Program, rows: EffectRows, operations: "Operations | N
 @lru_cache(maxsize=64)
 def _links_of(program: Program) -> tuple[dict[Any, Any], dict[Any, tuple[str, ...]]]:
     """Replacements of model functions in a program, and the rows that the laws of its effects take."""
-    collector = SimpleNamespace(links={}, effects={})
+    collector = SourceCollector("")
     link_program(program, collector)
     return collector.links, collector.effects
 
@@ -228,15 +225,16 @@ def over_samples_in(
     program: Program, effects: Sequence[Any], function: PlainFunction, states: Mapping[str, Any], *arguments: Any
 ) -> Any:
     """Value of a function of the model as a program has it, with parameters and states of effects, over samples."""
-    if not _reaches_law(program, function):
+    if _copied(program, function) is function:
+        # No law of an effect acts in it.
         return over_samples(function, *arguments)
     return _over_samples(partial(in_program, function, program, effects), (states, *arguments))
 
 
 @lru_cache(maxsize=256)
-def _reaches_law(program: Program, function: PlainFunction) -> bool:
-    """True where a law of an effect acts in a function."""
-    return functions_of(program, {}).of(function) is not function
+def _copied(program: Program, function: PlainFunction) -> Any:
+    """A function as a program has it."""
+    return functions_of(program, {}).of(function)
 
 
 def _over_samples(make: Callable[[Operations | None], PlainFunction], arguments: Sequence[Any]) -> Any:
@@ -309,15 +307,6 @@ def _extreme(is_beyond: Callable[[Any, Any], Any], first: Any, *others: Any) -> 
     return first
 
 
-def _without_fraction(number: Any) -> Any:
-    # Python has no whole number -0.
-    return np.trunc(number) + 0.0 if isinstance(number, np.ndarray) else int(number)
-
-
-def _as_float(number: Any) -> Any:
-    return number.astype(np.float64) if isinstance(number, np.ndarray) else float(number)
-
-
 _OF_COLUMNS: dict[str, Callable[..., Any]] = {  # of one number, of two, or of any
     "_chosen": _chosen,
     "_all": np.logical_and,
@@ -327,8 +316,9 @@ _OF_COLUMNS: dict[str, Callable[..., Any]] = {  # of one number, of two, or of a
     "_root": np.sqrt,
     "max": partial(_extreme, operator.gt),
     "min": partial(_extreme, operator.lt),
-    "int": _without_fraction,
-    "float": _as_float,
+    # Python has no whole number -0.
+    "int": lambda number: np.trunc(number) + 0.0 if isinstance(number, np.ndarray) else int(number),
+    "float": lambda number: number.astype(np.float64) if isinstance(number, np.ndarray) else float(number),
 }
 _SAME_IN_COLUMNS = frozenset({"abs", "range", *_OF_COLUMNS})
 
@@ -426,16 +416,6 @@ def whole_part(value: float) -> int:
     return int(value) if LOWEST_INTEGER <= value < -LOWEST_INTEGER else LOWEST_INTEGER
 
 
-def _square_root(value: float) -> float:
-    """Return a square root, NaN of a negative number."""
-    return math.nan if value < 0.0 else math.sqrt(value)
-
-
-def _logarithm(value: float) -> float:
-    """Return a natural logarithm: minus infinity of 0, NaN of a negative number."""
-    return math.log(value) if value > 0.0 else (-math.inf if value == 0.0 else math.nan)
-
-
 def _without_errors(function: Callable[..., float]) -> Callable[..., float]:
     """Return a function of ``math`` that is infinite where it overflows, and NaN where it has no value."""
 
@@ -445,20 +425,19 @@ def _without_errors(function: Callable[..., float]) -> Callable[..., float]:
         except OverflowError:
             return math.inf
         except ValueError:
-            return math.nan
+            return -math.inf if function is math.log and arguments[0] == 0.0 else math.nan
 
     return called
 
 
-def _math() -> SimpleNamespace:
-    """Return the module ``math`` with functions that go on."""
-    public = {name: value for name, value in vars(math).items() if not name.startswith("_")}
-    going_on = {name: _without_errors(value) if callable(value) else value for name, value in public.items()}
-    return SimpleNamespace(**going_on | {"sqrt": _square_root, "log": _logarithm})
-
-
-MATH = _math()
-"""The module ``math``: infinite where a function overflows, NaN where it has no value."""
+MATH = SimpleNamespace(
+    **{
+        name: _without_errors(value) if callable(value) else value
+        for name, value in vars(math).items()
+        if not name.startswith("_")
+    }
+)
+"""The module ``math``: infinite where a function overflows or has a pole, NaN where it has no value."""
 
 
 class _GoingOn(ast.NodeTransformer):

@@ -5,7 +5,7 @@ function of ``lanes``.
 """
 
 import ast
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from types import FunctionType
 from typing import NamedTuple, Protocol
@@ -47,13 +47,6 @@ class Call(NamedTuple):
         return f"{slot.history}[{', '.join([*places, number])}]"
 
 
-class Question(NamedTuple):
-    """A question to all runs: the lines before it, and the expression of its answer."""
-
-    lines: list[str]
-    answer: str
-
-
 class Rows(Protocol):
     """Storage of the numbers of a step, as the writer of the loop uses it."""
 
@@ -69,8 +62,8 @@ class Rows(Protocol):
     def with_cells(self, node: ast.expr) -> ast.expr:
         """An expression with the numbers of the present run in the place of ``lane.GROUP.FIELD``."""
 
-    def any_of(self, condition: ast.expr, is_none: bool) -> Question:
-        """The question whether a condition on ``lane`` holds in any run, or with ``is_none`` in none."""
+    def any_of(self, condition: ast.expr, is_none: bool) -> tuple[list[str], str]:
+        """Lines before, and expression of, the answer whether a condition on ``lane`` holds in any run, or in none."""
 
     def action(self, method: str, arguments: Sequence[str]) -> list[str]:
         """Lines for a function of ``lanes`` that does something: ``record``, ``set_aside`` or ``put_back``."""
@@ -133,46 +126,32 @@ class RowsOfLanes:
         written: ast.expr = _Cells(self.cells).visit(deepcopy(node))
         return written
 
-    def any_of(self, condition: ast.expr, is_none: bool) -> Question:
+    def any_of(self, condition: ast.expr, is_none: bool) -> tuple[list[str], str]:
         """A count of lanes: a sum of whole numbers is taken of several at once, a largest float is not."""
         text = ast.unparse(self.with_cells(condition))
         lines = ["counted = 0", "for lane in range(width):", f"    counted += 1 if {text} else 0"]
-        return Question(lines, "counted == 0" if is_none else "counted > 0")
+        return lines, "counted == 0" if is_none else "counted > 0"
 
     def action(self, method: str, arguments: Sequence[str]) -> list[str]:
         """Lines that copy rows: to a sample of the record, aside for lanes that wait, or back again."""
-        actions: dict[str, Callable[..., list[str]]] = {
-            "record": self._record,
-            "set_aside": self._set_aside,
-            "put_back": self._put_back,
-        }
-        return actions[method](*arguments)
-
-    def _record(self, index: str) -> list[str]:
-        lanes = "1" if self.lanes == 1 else "record.shape[2]"
-        return [
-            "for row in range(record.shape[1]):",
-            f"    for lane in range({lanes}):",
-            f"        record[{index}, row, lane] = x[row, lane]",
-        ]
-
-    def _set_aside(self) -> list[str]:
-        copied = over_rows(len(self.state_at), f"x[{self.aside} + row, lane] = x[row, lane]")
-        return [*copied, *_for_each_lane(f"{aside} = {cell}" for cell, aside in self._kept_beside_state())]
-
-    def _put_back(self) -> list[str]:
+        if method == "record":
+            return [
+                "for row in range(record.shape[1]):",
+                f"    for lane in range({'1' if self.lanes == 1 else 'record.shape[2]'}):",
+                f"        record[{arguments[0]}, row, lane] = x[row, lane]",
+            ]
         states = len(self.state_at)
+        cells = [(self.cells[path], f"x[{self.aside + index}, lane]") for index, path in enumerate(self.kept)]
+        # Behind the state: first what was left of the step, then what it was handed.
+        beside = cells[states:]
+        if method == "set_aside":
+            copied = over_rows(states, f"x[{self.aside} + row, lane] = x[row, lane]")
+            return [*copied, *_for_each_lane(f"{aside} = {cell}" for cell, aside in beside)]
         # A lane whose step was done when it was set aside has waited since.
         goes_on = f"x[{self.aside + states}, lane] > 0.0"
         copied = over_rows(states, f"x[row, lane] = x[row, lane] if {goes_on} else x[{self.aside} + row, lane]")
-        _, *handed = self._kept_beside_state()
-        lines = [f"{cell} = {cell} if {goes_on} else {aside}" for cell, aside in handed]
+        lines = [f"{cell} = {cell} if {goes_on} else {aside}" for cell, aside in beside[1:]]
         return [*copied, *(_for_each_lane(lines) if lines else [])]
-
-    def _kept_beside_state(self) -> list[tuple[str, str]]:
-        """Cells of what is kept beside the state, and those aside: first what was left of the step."""
-        cells = [(self.cells[path], f"x[{self.aside + index}, lane]") for index, path in enumerate(self.kept)]
-        return cells[len(self.state_at) :]
 
     def value(self, method: str, arguments: Sequence[str]) -> str:
         """Test whether a sample is traced, or its index in the trace: a ring that keeps the last samples."""
@@ -213,10 +192,10 @@ class RowsOfRun:
         written: ast.expr = _OfRun().visit(deepcopy(node))
         return written
 
-    def any_of(self, condition: ast.expr, is_none: bool) -> Question:
+    def any_of(self, condition: ast.expr, is_none: bool) -> tuple[list[str], str]:
         """The condition of the run itself."""
         text = ast.unparse(self.with_cells(condition))
-        return Question([], f"not {text}" if is_none else text)
+        return [], f"not {text}" if is_none else text
 
     def action(self, method: str, arguments: Sequence[str]) -> list[str]:  # noqa: ARG002 - a protocol
         """Nothing: a single run records nothing, and waits for no other."""

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import FunctionType
 from typing import Any, get_type_hints
 
+from ppafo.engine.composer import RewrittenNames
 from ppafo.engine.entries import ARRAY_2D, ARRAY_3D, FLOAT, HEADER, INT, entry_text, indent, parse_expression
 from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, VECTOR
@@ -18,7 +19,7 @@ from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
 from ppafo.engine.reduction import HISTORIES, Reduction, is_known_part
 from ppafo.engine.rows import leaf_paths, row_numbers
-from ppafo.engine.source_text import RewrittenNames, SourceCollector
+from ppafo.engine.source_text import SourceCollector
 from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Now
 

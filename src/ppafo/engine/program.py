@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ppafo.control.kind import OPEN_LOOP, ControllerKind, ProfileKind
@@ -21,15 +22,15 @@ from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.effects.kind import Effect, State
-from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState
+from ppafo.model.plant import ActuatorFunctions, PlantState
 from ppafo.model.ports import exhaust_path, gas_density, ideal_density, leakage_path, supply_path
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
-from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY, WALK, FootSample, MeterKind, ReferenceSummary
+from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY, WALK, MeterKind, ReferenceSummary
 
 if TYPE_CHECKING:
     from ppafo.engine.scheme.thermal_gas import WarmFunctions
-    from ppafo.engine.step.lane import Lane, Now
+    from ppafo.engine.step.lane import Lane
 
 Rows = Mapping[str, type]
 """Groups of rows by their names."""
@@ -81,99 +82,6 @@ class GasPhases(Protocol):
         """Count what the gas did on the vane."""
 
 
-class FeedPhases(Protocol):
-    """Supply line between constant pressures and the valve, with a state solved together with the gas: protocol."""
-
-    def groups(self, parts: "Program") -> Groups:
-        """Groups of numbers that it has in a lane, the first stage of the gas among them."""
-
-    def source(self, parts: "Program", lane: "Lane") -> PlantParameters:
-        """The plant at the pressures that feed it as a step begins."""
-
-    def source_ahead(self, parts: "Program", lane: "Lane") -> PlantParameters:
-        """The plant at the pressures that feed it after the first stage."""
-
-    def begin(self, parts: "Program", lane: "Lane", next_angle: float, length: float) -> None:
-        """First stage, together with the first stage of the gas."""
-
-    def end(self, parts: "Program", lane: "Lane", length: float) -> None:
-        """State of the feed at the end of a step or part."""
-
-    def error(self, parts: "Program", lane: "Lane") -> float:
-        """Error of the step over its tolerance [-]."""
-
-
-class LegPhases(Protocol):
-    """Leg that walks with the device, in a step: protocol."""
-
-    def groups(self, parts: "Program") -> Groups:
-        """Groups of numbers that it has in a lane."""
-
-    def carry(self, parts: "Program", lane: "Lane") -> None:
-        """Initial load of the foot, which is carried from step to step."""
-
-    def find_place(self, parts: "Program", lane: "Lane", now: "Now") -> None:
-        """Gait phase at the end of the step."""
-
-    def find_measured(self, parts: "Program", lane: "Lane") -> None:
-        """Measured quantities at the end of the step."""
-
-    def find_gait(self, parts: "Program", lane: "Lane") -> None:
-        """Gait at the end of the step."""
-
-    def find_gait_of_task(self, parts: "Program", lane: "Lane", now: "Now") -> None:
-        """Gait at the end of the step, in a task sequence."""
-
-    def begin(self, parts: "Program", lane: "Lane") -> None:
-        """Predicted step of the foot."""
-
-    def assumed_angle(self, parts: "Program", lane: "Lane") -> float:
-        """Angle [rad] at the end of the step that the chamber volumes assume."""
-
-    def hold_ahead(self, parts: "Program", lane: "Lane") -> None:
-        """Chamber factors at the assumed angle."""
-
-    def reach(self, parts: "Program", lane: "Lane") -> None:
-        """End of the step without an event."""
-
-    def depart(self, parts: "Program", lane: "Lane") -> None:
-        """End of a step with an event."""
-
-    def end(self, parts: "Program", lane: "Lane", length: float) -> None:
-        """Set ``lane.after`` and ``lane.walk_after``, state and walk after the step."""
-
-
-class FaultPhases(Protocol):
-    """Faults of the plant in a walk, and a shut-off valve in its line: protocol."""
-
-    def groups(self, parts: "Program") -> Groups:
-        """Groups of numbers that they have in a lane."""
-
-    def failed_plant(self, parts: "Program", lane: "Lane", time: float) -> PlantParameters:
-        """Plant with its faults at a time [s]."""
-
-    def failed_ports(
-        self, parts: "Program", lane: "Lane", source: PlantParameters, port_1: Any, port_2: Any, time: float
-    ) -> tuple[Any, Any]:
-        """Ports of both chambers behind a source, with the faults at a time [s]."""
-
-    def decide(self, parts: "Program", lane: "Lane", now: "Now", ordered: float, after: Any) -> None:
-        """Take a decision of the controller: the command ``ordered``, the state ``after`` it."""
-
-
-class FootPhases(Protocol):
-    """A foot on a prescribed shank, which an unconstrained vane carries."""
-
-    def until_jump(self, parts: "Program", lane: "Lane", time: float) -> float:
-        """Time [s] from one [s] until the acceleration of the shank jumps."""
-
-    def torque(self, parts: "Program", lane: "Lane", time: float, angle: float) -> float:
-        """Torque on the vane [N m] at a time [s] and an angle [rad]."""
-
-    def sample(self, parts: "Program", lane: "Lane", time: float) -> FootSample:
-        """The foot beside the one that was measured, at a time [s] of a gait."""
-
-
 @dataclass(frozen=True, slots=True)
 class Program:
     """Combination of components; each combination is compiled once.
@@ -181,18 +89,20 @@ class Program:
     ``angle`` None leaves the vane unconstrained, otherwise that profile prescribes it. ``controller`` None leaves the
     command to the caller, sample by sample. ``ideal_sensors`` False adds noise and quantisation of the signals,
     ``late_signals`` True a delay. ``late_readings`` True lets sensors of a walk be whole samples late.
-    ``late_commands`` True adds a dead time before the valve. ``gas`` is what the gas keeps or exchanges, ``feed`` what
-    feeds it, None for constant pressures. ``leg`` is a walking one that the device is on, whose foot is free or where
-    the ground and a gait lead it (``angle`` is None then; its sensors are its own); it walks stride after stride, or
-    ``takes_task_sequence``: it stands, starts, changes its speed and stops. ``faults`` are those of the plant, with a
-    shut-off valve, None where a walk has neither. ``is_adaptive`` True divides each
-    step as its error asks, ``rests_whole`` True but one in which a led joint stands still where a locked one takes it
-    whole, ``samples_inside`` True where recorded samples lie between the steps. ``meters`` are updated
-    at every sample that a recording would have, ``traced`` names channels, or paths of the state, that are kept at some
-    of them. ``starts_apart`` True lets the run of each lane begin at a step of its own, while others of the block are
-    under way. ``actuator`` is what stands between the chambers and the joint. ``effects`` act in this order at the
-    ports of their laws. ``shank`` None leaves an unconstrained vane to itself; otherwise it carries a foot on a shank
-    that moves so, and ``foot`` says how that goes through a step. ``controlled`` names what the reference is of.
+    ``late_commands`` True adds a dead time before the valve. ``gas`` is the module of what the gas keeps or exchanges.
+
+    Modules of ``engine.step``, or None: ``feed`` is ``lines``, None for constant pressures; ``leg`` is ``walk``, a leg
+    whose foot is free or where the ground and a gait lead it (``angle`` is None then; its sensors are its own), which
+    walks stride after stride, or ``takes_task_sequence``: it stands, starts, changes its speed and stops; ``faults`` is
+    ``failing``, for faults of the plant or a shut-off valve in a walk; ``foot`` is ``foot``, where an unconstrained
+    vane carries one on a ``shank`` that moves by that profile.
+
+    ``is_adaptive`` True divides each step as its error asks, ``rests_whole`` True but one in which a led joint stands
+    still where a locked one takes it whole, ``samples_inside`` True where recorded samples lie between the steps.
+    ``meters`` are updated at every sample that a recording would have, ``traced`` names channels, or paths of the
+    state, that are kept at some of them. ``starts_apart`` True lets the run of each lane begin at a step of its own,
+    while others of the block are under way. ``actuator`` is what stands between the chambers and the joint.
+    ``effects`` act in this order at the ports of their laws. ``controlled`` names what the reference is of.
     ``has_one_chamber`` True where nothing is measured of chamber 2, which is the dead volume behind a port alone.
     """
 
@@ -205,10 +115,10 @@ class Program:
     gas: GasPhases
     late_signals: bool = False
     late_readings: bool = False
-    leg: LegPhases | None = None
+    leg: ModuleType | None = None
     takes_task_sequence: bool = False
-    faults: FaultPhases | None = None
-    feed: FeedPhases | None = None
+    faults: ModuleType | None = None
+    feed: ModuleType | None = None
     is_adaptive: bool = False
     rests_whole: bool = False
     samples_inside: bool = False
@@ -218,7 +128,7 @@ class Program:
     actuator: ActuatorModel = VANE
     effects: tuple[Effect, ...] = ()
     shank: ProfileKind | None = None
-    foot: FootPhases | None = None
+    foot: ModuleType | None = None
     controlled: str = TORQUE
     has_one_chamber: bool = False
 

@@ -18,9 +18,9 @@ from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any, NamedTuple, Protocol
 
+from ppafo.engine.composer import is_step_function
 from ppafo.engine.plain_python import parse_module, refusal
 from ppafo.engine.rows import is_number, is_row, members, rebuilt
-from ppafo.engine.source_text import is_step_function
 from ppafo.errors import ProgramError
 from ppafo.model.binding import made_of
 
@@ -87,17 +87,15 @@ class FunctionCollector(Protocol):
     def add_called(self, inside: FunctionType, called: FunctionType, known: Mapping[str, Any]) -> str:
         """Add a function that another calls, with what is known of its arguments; return its name in the module."""
 
-    def effects_of(self, name: str) -> Effects:
-        """Groups that a function of the module reads and sets."""
+    @property
+    def kept(self) -> dict[str, Any]:
+        """Values in reduced functions, by the names that stand for them."""
+
+    def effects_of(self, called: FunctionType) -> Effects:
+        """Groups that a function of the step, which was added, reads and sets."""
 
     def handed_to(self, name: str) -> tuple[str, ...]:
         """Names that a function of the module is handed before its own arguments."""
-
-    def keep(self, value: Any) -> str:
-        """A name that stands for a value in a reduced function."""
-
-    def value_kept(self, name: str) -> Any:
-        """The value that such a name stands for; KeyError for any other name."""
 
     def note_read(self, scope: Mapping[str, Any], name: str) -> None:
         """Keep that a name was looked up."""
@@ -255,7 +253,13 @@ class Reduction:
         """An expression for a value that is known."""
         if value is None or type(value) in (bool, int, float):
             return ast.Constant(value)
-        return ast.Name(self.collector.keep(value), ast.Load())
+        return self.kept(value)
+
+    def kept(self, value: Any) -> ast.Name:
+        """A name that stands for a value."""
+        name = f"kept_{id(value)}"
+        self.collector.kept[name] = value
+        return ast.Name(name, ast.Load())
 
     # Expressions.
 
@@ -369,10 +373,10 @@ class Reduction:
         if called is rebuilt:
             return self.row_of(self.outside(node.args[0]), self.arguments(ast.Starred(node.args[1])))
         if is_step_function(called):
-            name, arguments = self.called(called, node)
-            if self.collector.effects_of(name).results:
+            arguments = self.called(called, node)
+            if self.collector.effects_of(called).results:
                 raise self.refuse(node, f"'{called.__name__}' sets groups of its lane, so that it gives no value")
-            return ast.Call(ast.Name(self.collector.keep(called), ast.Load()), arguments, [])
+            return ast.Call(self.kept(called), arguments, [])
         if isinstance(called, FunctionType):
             for row in self.collector.handed_to(self.collector.add_called(self.function, called, {})):
                 self.read(row)
@@ -381,11 +385,7 @@ class Reduction:
         # Arguments that a generator makes are written out.
         arguments = [part for argument in node.args for part in self.arguments(argument)]
         named = [ast.keyword(keyword.arg, self.visit(keyword.value)) for keyword in node.keywords]
-        function = (
-            ast.Name(self.collector.keep(called), ast.Load())
-            if isinstance(called, FunctionType) or is_row(called)
-            else self.visit(node.func)
-        )
+        function = self.kept(called) if isinstance(called, FunctionType) or is_row(called) else self.visit(node.func)
         return ast.Call(function, arguments, named)
 
     def with_parts(self, called: Any, node: ast.Call) -> tuple[Any, ast.Call]:
@@ -397,16 +397,16 @@ class Reduction:
         made = made_of(called, called.__name__, self.value_of(given.value))
         return made, ast.copy_location(ast.Call(node.func, node.args, others), node)
 
-    def called(self, called: FunctionType, node: ast.Call) -> tuple[str, list[ast.expr]]:
-        """Name in the module of a function of the step that is called, and its own arguments."""
+    def called(self, called: FunctionType, node: ast.Call) -> list[ast.expr]:
+        """Own arguments of a function of the step that is called, which is added to the module."""
         own = self.own_arguments(called, node)[2:]
         known = {name: self.value_of(value) for name, value in own}
         known = {name: value for name, value in known.items() if is_known_part(value)}
-        name = self.collector.add_called(self.function, called, known)
-        effects = self.collector.effects_of(name)
+        self.collector.add_called(self.function, called, known)
+        effects = self.collector.effects_of(called)
         for row in effects.reads:
             self.read(row)
-        return name, [self.visit(value) for own_name, value in own if own_name in effects.takes]
+        return [self.visit(value) for name, value in own if name in effects.takes]
 
     def own_arguments(self, called: FunctionType, node: ast.Call) -> list[tuple[str, ast.expr]]:
         """Arguments of a call of a function of the step by name, in its order. ProgramError where they do not fit."""
@@ -587,7 +587,7 @@ class Reduction:
         inner = [self.row_of(inside, numbers) for _, inside in members(kind)]
         if not is_row(kind) or not inner:
             return ast.Tuple([*inner], ast.Load())
-        return ast.Call(ast.Name(self.collector.keep(kind), ast.Load()), inner, [])
+        return ast.Call(self.kept(kind), inner, [])
 
     def numbers_of(self, kind: Any, row: ast.expr) -> Iterator[ast.expr]:
         """Expressions of the numbers of a row, nested or not, in their order."""
@@ -599,13 +599,9 @@ class Reduction:
     def part_of(self, owner: ast.expr, way: str) -> ast.expr:
         """A field or an item of a row; of one that is known it is known."""
         key = int(way[1:-1]) if way[0] == "[" else way[1:]
-        if isinstance(owner, ast.Name):
-            try:
-                value = self.collector.value_kept(owner.id)
-            except KeyError:
-                pass
-            else:
-                return self.written(value[key] if isinstance(key, int) else getattr(value, key))
+        if isinstance(owner, ast.Name) and owner.id in self.collector.kept:
+            value = self.collector.kept[owner.id]
+            return self.written(value[key] if isinstance(key, int) else getattr(value, key))
         if isinstance(key, int):
             return ast.Subscript(owner, ast.Constant(key), ast.Load())
         return ast.Attribute(owner, key, ast.Load())
@@ -615,8 +611,8 @@ class Reduction:
         called = self.outside(node.func)
         if not is_step_function(called):
             raise self.refuse(node, f"'{ast.unparse(node)}' discards its return value")
-        name, arguments = self.called(called, node)
-        effects = self.collector.effects_of(name)
+        arguments = self.called(called, node)
+        effects = self.collector.effects_of(called)
         if not effects.results:
             return []
         for group, fields in effects.groups.items():
@@ -626,7 +622,7 @@ class Reduction:
         for result, slot in effects.slots.items():
             places = tuple(with_arguments(index, given_by_name) for index in slot.places)
             self.note_slot(result, Slot(slot.history, places), node)
-        call = ast.Call(ast.Name(self.collector.keep(called), ast.Load()), arguments, [])
+        call = ast.Call(self.kept(called), arguments, [])
         groups = [ast.Name(_GROUP + result, ast.Store()) for result in effects.results]
         if len(groups) == 1:
             return [ast.Assign([groups[0]], call)]

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from ppafo.engine.groups import Role, filled, rows_of
 from ppafo.engine.in_python import functions_of
 from ppafo.engine.lanes import Batch, BatchResult, Clock, effort_for, load_programs, run_blocks
-from ppafo.engine.program import FaultPhases, LegPhases, Program, place_of_group
+from ppafo.engine.program import Program, place_of_group
 from ppafo.engine.rows import of_each, row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import StepControl
 from ppafo.engine.step.lane import MAXIMUM_PARTS, LaneResult, LaneTiming, NoParameters
+from ppafo.kinds import kind_at
 from ppafo.model.columns import larger, truncated
 from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.orifice import ExactOrifice
@@ -45,16 +46,6 @@ TOO_MANY_PARTS = (
 WHOLE = 1.0e-9
 
 
-class LegGroups(NamedTuple):
-    """Leg of a run: its phases, its groups of parameters, and the initial values of its groups of states, by name."""
-
-    leg: LegPhases
-    takes_task_sequence: bool
-    faults: FaultPhases | None
-    parameters: dict[str, Any]
-    states: dict[str, Any]
-
-
 @dataclass(frozen=True, slots=True)
 class Walk:
     """A leg that a gait leads; ``task_sequence`` None where it walks stride after equal stride.
@@ -71,33 +62,25 @@ class Walk:
     task_sequence: "TimedSequence | None" = None
     failing: "tuple[PlantFaults, ShutOff] | None" = None
 
-    def groups(self) -> LegGroups:
-        """Scheme of the program, and its groups of numbers by name."""
-        from ppafo.engine.step import walk  # most devices walk on no leg
-
-        parameters: dict[str, Any] = {
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Its groups of parameters, by name."""
+        failing = {} if self.failing is None else dict(zip(("plant_faults", "shut_off"), self.failing, strict=True))
+        return {
             "leg": self.leg,
             "share": self.share,
             "gait": self.gait,
             "gait_timing": self.timing,
             "gait_sensors": self.sensors,
+            **({} if self.task_sequence is None else {"task_sequence": self.task_sequence}),
+            **failing,
         }
-        parameters |= {} if self.task_sequence is None else {"task_sequence": self.task_sequence}
-        states: dict[str, Any] = {"walk": self.initial, "gait_seen": NOTHING_SEEN}
-        faults: FaultPhases | None = None
-        if self.failing is not None:
-            from ppafo.engine.step import failing as faults  # most runs have no fault
-            from ppafo.model.shut_off import POWERED
 
-            parameters["plant_faults"], parameters["shut_off"] = self.failing
-            states["unpowered"] = POWERED
-        return LegGroups(
-            leg=walk,
-            takes_task_sequence=self.task_sequence is not None,
-            faults=faults,
-            parameters=parameters,
-            states=states,
-        )
+    @property
+    def states(self) -> dict[str, Any]:
+        """Its groups of states at the start, by name."""
+        powered = {} if self.failing is None else {"unpowered": kind_at("ppafo.model.shut_off:POWERED")}
+        return {"walk": self.initial, "gait_seen": NOTHING_SEEN, **powered}
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +199,7 @@ def _parameters_of(run: Run, timing: LaneTiming) -> dict[str, Any]:
         "reference": run.reference,
         "path": run.path,
         "sensors": run.sensors,
-        **({} if run.walk is None else run.walk.groups().parameters),
+        **({} if run.walk is None else run.walk.parameters),
         **({} if run.lines is None else {"lines": run.lines.parameters}),
         **({} if run.leg is None else {"load": run.leg.load, "shank": run.leg.shank}),
         **{effect.name: row for effect, row in zip(run.program.effects, run.effects, strict=True)},
@@ -234,7 +217,7 @@ def _states_of(run: Run) -> dict[str, Any]:
         "masses": gas_at_start(run),
         "valve_state": program.valve.initial(),
         "controller_state": NoParameters() if program.controller is None else program.controller.initial,
-        **({} if run.walk is None else run.walk.groups().states),
+        **({} if run.walk is None else run.walk.states),
         **({} if run.lines is None else {"line_state": run.lines.initial}),
         **dict(zip(program.effect_states, states_at_start(run), strict=True)),
     }

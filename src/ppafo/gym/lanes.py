@@ -1,8 +1,8 @@
 """Environments of one program side by side: each a lane, with an episode of its own that began at its own step."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,23 +83,14 @@ class BatchStep:
     def then(self, later: "BatchStep") -> "BatchStep":
         """Return what two samples show one after the other; an episode that ended with the first stays as it was."""
         ended = self.terminated | self.truncated
-        pairs = {name: (getattr(self, name), getattr(later, name)) for name in ("errors", "supplied")}
-        chosen = {name: np.where(ended, *pair) for name, pair in pairs.items()}
         return BatchStep(
             observations=np.where(ended[:, None], self.observations, later.observations),
             rewards=self.rewards + np.where(ended, 0.0, later.rewards),
+            errors=np.where(ended, self.errors, later.errors),
+            supplied=np.where(ended, self.supplied, later.supplied),
             terminated=self.terminated | (later.terminated & ~ended),
             truncated=self.truncated | (later.truncated & ~ended),
-            **chosen,
         )
-
-
-class EnvironmentBlock(NamedTuple):
-    """Compiled calls for the environments of a block: commands of the actions, steps, what is observed."""
-
-    command: Callable[..., None]
-    advance: Callable[..., None]
-    judge: Callable[..., None]
 
 
 @final
@@ -131,25 +122,14 @@ class Environments:
         self._now = 0
         module: Any = compiled(kernel_source(program, task)) or PythonKernel(program, task)
         record, trace = np.empty((0, len(state_rows), width)), np.empty((0, 0, width))
-        self._blocks = [
-            EnvironmentBlock(
-                with_arrays(module.command, states, actions, signals),
-                with_arrays(module.advance, states, parameters, signals, commands, record, trace),
-                with_arrays(module.judge, states, parameters, own, chosen, observations, outcomes, signals),
-            )
-            for states, parameters, own, actions, chosen, observations, outcomes, signals, commands in zip(
-                self._states,
-                self._parameters,
-                self._own,
-                self._actions,
-                self._chosen,
-                self._observations,
-                self._outcomes,
-                self._signals,
-                self._commands,
-                strict=True,
-            )
-        ]
+        self._blocks = []
+        for block, (states, signals) in enumerate(zip(self._states, self._signals, strict=True)):
+            parameters, shown = self._parameters[block], (self._observations[block], self._outcomes[block])
+            command = with_arrays(module.command, states, self._actions[block], signals)
+            advance = with_arrays(module.advance, states, parameters, signals, self._commands[block], record, trace)
+            own = self._own[block], self._chosen[block]
+            judge = with_arrays(module.judge, states, parameters, *own, *shown, signals)
+            self._blocks.append((command, advance, judge))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Environments":
         """Return environments that go on from here by themselves; the compiled program is the same."""
@@ -209,12 +189,12 @@ class Environments:
         for number in range(self._actions.shape[1]):
             self._actions[:, number] = self.actions[every, min(number, self.actions.shape[1] - 1)]
         late = clock.signal_delay, clock.command_delay
-        for block in self._blocks:
+        for command, advance, judge in self._blocks:
             # A call with 0 steps senses and observes alone: this is how episodes begin.
             if steps > 0:
-                block.command()
-                block.advance(self._now - steps, steps, -1, clock.steps_per_sample, 1.0, -1, 0, 0, *late)
-            block.judge(
+                command()
+                advance(self._now - steps, steps, -1, clock.steps_per_sample, 1.0, -1, 0, 0, *late)
+            judge(
                 judging.error_weight,
                 judging.gas_weight,
                 self._now,

@@ -23,7 +23,7 @@ from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.numbers import chosen_path, declared_numbers, number_at, with_numbers
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
-from ppafo.studies.varying import VariedPath, in_its_unit, varied_path
+from ppafo.studies.varying import in_its_unit, varied_path
 from ppafo.units import parse_quantity
 
 Ranges = Mapping[str, tuple[str | float, str | float]]
@@ -116,7 +116,17 @@ def scenario_episodes(base: Scenario, randomise: bool, vary: Ranges, targets: tu
         gauge = gauge - set(vary) if varies else set()
         ranges |= {path: (ranges[path][0] - atmosphere, ranges[path][1] - atmosphere) for path in gauge}
         for path, ends in vary.items():
-            varied, ranges[path] = _range(base, path, ends, varies)
+            varied = varied_path(path, base)
+            try:
+                varied = in_its_unit(varied, ends) if varies else varied
+                least, most = (varied.level(end) for end in ends)
+            except (UnitError, ValueError) as error:
+                raise ScenarioError(
+                    f"vary: {path} = {ends!r}: {error}; give the lowest and the highest value"
+                ) from error
+            if least > most:
+                raise ScenarioError(f"vary: {path} = {ends!r}: give the lowest value before the highest")
+            ranges[path] = (least, most)
             gauge |= {path} if varied.is_gauge else set()
         # Each episode has noise of its own, unless the caller says how the seed varies.
         ranges.setdefault(_SEED, (0.0, float(LARGEST_SEED)))
@@ -147,17 +157,3 @@ def intervals_of(base: Scenario) -> tuple[dict[str, tuple[float, float]], set[st
             ranges[own] = (value - half, value + half)
             gauge |= {own} if gauge_link(own, entry.value, entry.unit) else set()
     return ranges, gauge
-
-
-def _range(
-    base: Scenario, path: str, ends: tuple[str | float, str | float], atmosphere_varies: bool
-) -> tuple[VariedPath, tuple[float, float]]:
-    varied = varied_path(path, base)
-    try:
-        varied = in_its_unit(varied, ends) if atmosphere_varies else varied
-        lowest, highest = (varied.level(end) for end in ends)
-    except (UnitError, ValueError) as error:
-        raise ScenarioError(f"vary: {path} = {ends!r}: {error}; give the lowest and the highest value") from error
-    if lowest > highest:
-        raise ScenarioError(f"vary: {path} = {ends!r}: give the lowest value before the highest")
-    return varied, (lowest, highest)

@@ -213,38 +213,9 @@ class Task:
 TASKS = {
     task.name: task
     for task in (
-        Task(
-            "torque",
-            TorqueView,
-            view_torque,
-            torque_error,
-            remember,
-            "N m",
-            1.0,
-            1.0,
-        ),
-        Task(
-            "angle",
-            AngleView,
-            view_angle,
-            angle_error,
-            remember,
-            "rad",
-            10.0,
-            1.0,
-        ),
-        Task(
-            "walk",
-            WalkView,
-            view_walk,
-            stride_error,
-            remember_strike,
-            "N m",
-            1.0,
-            1.0,
-            command=valve_or_vent,
-            actions=2,
-        ),
+        Task("torque", TorqueView, view_torque, torque_error, remember, "N m", 1.0, 1.0),
+        Task("angle", AngleView, view_angle, angle_error, remember, "rad", 10.0, 1.0),
+        Task("walk", WalkView, view_walk, stride_error, remember_strike, "N m", 1.0, 1.0, valve_or_vent, 2),
     )
 }
 """Tasks by the name with which an environment is made."""

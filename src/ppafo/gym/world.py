@@ -1,6 +1,6 @@
 """Common basis of single and vector environments: settings, spaces, episodes and lanes."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -30,8 +30,6 @@ from ppafo.walking.planning import batch_of_many, plan_walk
 from ppafo.walking.walk import lasting
 from ppafo.walking.wearer import draw_builds
 from ppafo.wording import nearest_name
-
-# Episodes of a walk: of its own wearer, or of another one with another gait for each.
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,48 +171,25 @@ def settings_of(arguments: Mapping[str, Any]) -> EnvironmentSettings:
     return EnvironmentSettings(**arguments)
 
 
-def _torque_episodes(
-    file: str | Path, words: Sequence[str], varied: Ranges, settings: EnvironmentSettings
-) -> ScenarioEpisodes:
-    chosen = _scenario(file, words, settings.duration)
-    if chosen.controlled != TORQUE:
+def episodes_of(
+    task: str, file: str | Path, overrides: Sequence[str], varied: Ranges, settings: EnvironmentSettings
+) -> ScenarioEpisodes | _WalkEpisodes:
+    """Return the episodes of a task in a scenario or walk; ScenarioError for one that does not suit the task."""
+    duration = settings.duration
+    if task == "walk":
+        if varied:
+            raise ScenarioError(f"vary: {', '.join(varied)}: a walk varies its wearer and gait only; omit vary")
+        walk = load_walk(file, overrides)
+        seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).run.duration
+        return walk_episodes(walk, settings.randomise, seconds)
+    own = () if duration is None else (f"run.duration={float(duration)!r} s",)
+    scenario = load_scenario(file, over(overrides, own, ScenarioError))
+    if task == "torque" and scenario.controlled != TORQUE:
         raise ScenarioError(
-            f"{chosen.name}: reference.of = '{chosen.controlled}': the task 'torque' follows a torque; take "
+            f"{scenario.name}: reference.of = '{scenario.controlled}': the task 'torque' follows a torque; take "
             "another scenario, or the task 'angle'"
         )
-    return scenario_episodes(chosen, settings.randomise, varied, settings.targets)
-
-
-def _angle_episodes(
-    file: str | Path, words: Sequence[str], varied: Ranges, settings: EnvironmentSettings
-) -> ScenarioEpisodes:
-    chosen = _scenario(file, words, settings.duration)
-    return scenario_episodes(chosen, settings.randomise, varied, settings.targets)
-
-
-def _scenario(file: str | Path, words: Sequence[str], duration: float | None) -> Scenario:
-    own = () if duration is None else (f"run.duration={float(duration)!r} s",)
-    return load_scenario(file, over(words, own, ScenarioError))
-
-
-def _walk_episodes(
-    file: str | Path, words: Sequence[str], varied: Ranges, settings: EnvironmentSettings
-) -> _WalkEpisodes:
-    if varied:
-        raise ScenarioError(f"vary: {', '.join(varied)}: a walk varies its wearer and gait only; omit vary")
-    walk, duration = load_walk(file, words), settings.duration
-    seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).run.duration
-    return walk_episodes(walk, settings.randomise, seconds)
-
-
-_EPISODES: Mapping[
-    str, Callable[[str | Path, Sequence[str], Ranges, EnvironmentSettings], ScenarioEpisodes | _WalkEpisodes]
-] = {
-    "torque": _torque_episodes,
-    "angle": _angle_episodes,
-    "walk": _walk_episodes,
-}
-"""Constructor of the episodes of each task."""
+    return scenario_episodes(scenario, settings.randomise, varied, settings.targets)
 
 
 class World:
@@ -228,7 +203,7 @@ class World:
         file = usual if settings.scenario is None else settings.scenario
         words = over(flaws if is_usual else (), settings.overrides, ScenarioError)
         varied = VARIED.get(task, {}) if settings.vary is None and is_usual else settings.vary or {}
-        self.episodes = _EPISODES[task](file, words, varied, settings)
+        self.episodes = episodes_of(task, file, words, varied, settings)
         bounds = observed_bounds(self.task, self.episodes.base.device)
         self.judging = RewardWeights(
             error_weight=self.task.error_weight if settings.error_weight is None else settings.error_weight,

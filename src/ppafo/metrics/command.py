@@ -4,14 +4,13 @@ A loop that is too fast for the dead time of its valve opens it fully one way an
 command from beyond +0.5 to beyond -0.5 or back; in a walk both belong to one task, without venting in between.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.metrics.metric import Floats, MetricKind, ReadAt
-from ppafo.model.columns import choose, larger, root
+from ppafo.metrics.gas import PEAKS
+from ppafo.metrics.metric import MetricKind, ReadAt, root_mean
 from ppafo.model.helping import MID_STANCE
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.signals import Recording
@@ -64,25 +63,6 @@ def command_reversals(recording: Recording, samples: slice | None = None) -> flo
     open_at = np.flatnonzero(ways)
     turns = np.diff(ways[open_at]) != 0
     return float(np.count_nonzero(turns & (np.diff(number[open_at]) == 0)))
-
-
-class Peak(NamedTuple):
-    """Largest absolute torque [N m] so far."""
-
-    torque: float
-
-
-def start_peak(_course: ReferenceSummary, sample: Sample) -> Peak:
-    """The torque of the first sample."""
-    return Peak(abs(sample.torque))
-
-
-def update_peak(state: Peak, _course: ReferenceSummary, sample: Sample) -> Peak:
-    """Peak after one more sample."""
-    return Peak(max(state.torque, abs(sample.torque)))
-
-
-PEAK = MeterKind("peak", Peak, start_peak, update_peak)
 
 
 def peak_torque(recording: Recording) -> float:
@@ -145,12 +125,6 @@ def requested_torque(recording: Recording) -> float | None:
     return float(np.sqrt(np.mean(recording["reference"][asked] ** 2))) if asked.any() else None
 
 
-def root_mean(squares: Floats, samples: Floats) -> Floats:
-    """Root of a mean of squares; nan for no samples (runs,)."""
-    found: Floats = root(choose(samples > 0.0, squares / larger(samples, 1.0), math.nan))
-    return found
-
-
 METRICS = (
     MetricKind(
         "torque_error",
@@ -178,8 +152,8 @@ METRICS = (
         "largest absolute torque of the actuator",
         ("torque",),
         peak_torque,
-        ReadAt(("meters.peak.torque",)),
-        (PEAK,),
+        ReadAt(("meters.peaks.torque",)),
+        (PEAKS,),
     ),
     MetricKind(
         "command_reversals",

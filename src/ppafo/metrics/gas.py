@@ -122,44 +122,33 @@ def update_energy(state: EnergyGains, course: ReferenceSummary, sample: Sample) 
 ENERGY = MeterKind("energy", EnergyGains, start_energy, update_energy)
 
 
-class LargestPressure(NamedTuple):
-    """Largest pressure in either chamber [Pa absolute]."""
+class Peaks(NamedTuple):
+    """Extremes so far: absolute torque [N m]; pressure [Pa absolute] and lowest temperature [K] in either chamber."""
 
+    torque: float
     pressure: float
-
-
-def start_largest_pressure(course: ReferenceSummary, sample: Sample) -> LargestPressure:
-    """The larger pressure of the first sample."""
-    return LargestPressure(max(sample.pressure_1, sample.pressure_2))
-
-
-def update_largest_pressure(state: LargestPressure, course: ReferenceSummary, sample: Sample) -> LargestPressure:
-    """Largest pressure after one more sample."""
-    return LargestPressure(max(state.pressure, sample.pressure_1, sample.pressure_2))
-
-
-LARGEST_PRESSURE = MeterKind("largest_pressure", LargestPressure, start_largest_pressure, update_largest_pressure)
-
-
-class LowestTemperature(NamedTuple):
-    """Lowest temperature of the gas in either chamber [K]."""
-
     temperature: float
 
 
-def start_lowest_temperature(course: ReferenceSummary, sample: Sample) -> LowestTemperature:
-    """The lower temperature of the first sample."""
-    return LowestTemperature(min(sample.temperature_1, sample.temperature_2))
+def start_peaks(_course: ReferenceSummary, sample: Sample) -> Peaks:
+    """Extremes of the first sample."""
+    return Peaks(
+        torque=abs(sample.torque),
+        pressure=max(sample.pressure_1, sample.pressure_2),
+        temperature=min(sample.temperature_1, sample.temperature_2),
+    )
 
 
-def update_lowest_temperature(state: LowestTemperature, course: ReferenceSummary, sample: Sample) -> LowestTemperature:
-    """Lowest temperature after one more sample."""
-    return LowestTemperature(min(state.temperature, sample.temperature_1, sample.temperature_2))
+def update_peaks(state: Peaks, _course: ReferenceSummary, sample: Sample) -> Peaks:
+    """Extremes after one more sample."""
+    return Peaks(
+        torque=max(state.torque, abs(sample.torque)),
+        pressure=max(state.pressure, sample.pressure_1, sample.pressure_2),
+        temperature=min(state.temperature, sample.temperature_1, sample.temperature_2),
+    )
 
 
-LOWEST_TEMPERATURE = MeterKind(
-    "lowest_temperature", LowestTemperature, start_lowest_temperature, update_lowest_temperature
-)
+PEAKS = MeterKind("peaks", Peaks, start_peaks, update_peaks)
 
 
 class Work(NamedTuple):
@@ -242,8 +231,8 @@ METRICS = (
         "largest chamber pressure",
         ("pressure_1",),
         largest_pressure,
-        ReadAt(("meters.largest_pressure.pressure",)),
-        (LARGEST_PRESSURE,),
+        ReadAt(("meters.peaks.pressure",)),
+        (PEAKS,),
     ),
     MetricKind(
         "lowest_temperature",
@@ -251,8 +240,8 @@ METRICS = (
         "lowest temperature of the gas in a chamber, of a gas with an energy balance",
         ("temperature_1",),
         lowest_temperature,
-        ReadAt(("meters.lowest_temperature.temperature",)),
-        (LOWEST_TEMPERATURE,),
+        ReadAt(("meters.peaks.temperature",)),
+        (PEAKS,),
     ),
     MetricKind(
         "mechanical_work",

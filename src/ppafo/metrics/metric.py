@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError
-from ppafo.model.columns import choose
+from ppafo.model.columns import choose, larger, root
 from ppafo.model.controlled import CONTROLLED, TORQUE, ControlledQuantity
 from ppafo.model.declaration import PlainFunction
 from ppafo.signals import Recording
@@ -99,6 +99,19 @@ def less(number: Floats, other: Floats) -> Floats:
     return number - other
 
 
+def mean_of(total: Floats, count: Floats) -> Floats:
+    """A sum over how many there are, in its unit; nan for none (runs,)."""
+    # Both sides of a choice are computed, in the lanes too: the divisor is never 0.
+    mean: Floats = choose(count > 0.0, total / larger(count, 1.0), math.nan)
+    return mean
+
+
+def root_mean(squares: Floats, count: Floats) -> Floats:
+    """Root of the mean of some squares; nan for none (runs,)."""
+    found: Floats = root(mean_of(squares, count))
+    return found
+
+
 def time_if_any(time: Floats) -> Floats:
     """A time [s] of something; nan below 0, which stands for what has not happened."""
     # The state of a run is floats alone, and a column has no other word for None.
@@ -158,11 +171,6 @@ def for_each_reference(kinds: tuple[MetricKind, ...], rename: Callable[[str, str
 def controlled_in(recording: Recording) -> ControlledQuantity | None:
     """Return what the reference of a recording is of; None where it has none."""
     return next((kind for kind in CONTROLLED.values() if kind.reference in recording), None)
-
-
-def has_reference(recording: Recording) -> bool:
-    """Return whether a recording has a reference of anything."""
-    return controlled_in(recording) is not None
 
 
 def reference_of(recording: Recording) -> Floats:

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.metrics.command import Reversals, start_reversals, update_reversals
-from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, mean_of, root_mean
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, UNDECIDED, Swing, count_of, next_swing
-from ppafo.model.columns import larger, root
+from ppafo.model.columns import larger
 from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
 
 SHORTEST_HOLD = 0.1
@@ -115,16 +115,6 @@ def is_long_enough(hold_start: float, samples: float) -> bool:
 SETTLED = MeterKind("settled", SettledSums, start_settled, update_settled, True)
 
 
-def root_mean(squares: Floats, samples: Floats) -> Floats:
-    """Root mean square of some samples."""
-    return root(squares / samples)
-
-
-def quotient(total: Floats, number: Floats) -> Floats:
-    """Mean of some samples."""
-    return total / number
-
-
 def farther(highest: Floats, lowest: Floats) -> Floats:
     """Larger of how far two numbers are from 0, the one above it and the other below."""
     found: Floats = larger(highest, -lowest)
@@ -148,7 +138,7 @@ def _of_sums(*names: str, by: Callable[..., Floats] | None = None) -> ReadAt:
 
 _NUMBERS: dict[str, Callable[[Readings], Floats]] = {
     "error": _of_sums("squares", "taken", by=root_mean),
-    "missing": _of_sums("total", "taken", by=quotient),
+    "missing": _of_sums("total", "taken", by=mean_of),
     "worst": _of_sums("highest_error", "lowest_error", by=farther),
     "span": _of_sums("highest_error", "lowest_error", by=less),
     "turns": _of_sums("swing.turns", by=count_of),

@@ -3,13 +3,11 @@
 ``walking/strides.py`` counts the same in a recording with its mean curves; tests compare the two.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, time_if_any
-from ppafo.model.columns import choose, larger, root
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, mean_of, root_mean, time_if_any
 from ppafo.model.helping import HELPS, PUSH_OFF
 from ppafo.signals.meter import REQUESTED, STEADY, WALK, MeterKind, ReferenceSummary, Sample, StrideSample
 
@@ -204,34 +202,23 @@ def ended_with_stride(ended: EndedStrides, stride: CurrentStride, sample: Sample
 METER = MeterKind("strides", StrideMeter, _start, _update)
 
 
-def mean_of(total: Floats, count: Floats) -> Floats:
-    """A sum over how many there are, in its unit; nan for none."""
-    # Both sides of a choice are computed, in the lanes too: the divisor is never 0.
-    mean: Floats = choose(count > 0.0, total / larger(count, 1.0), math.nan)
-    return mean
-
-
-def _push_off_error(readings: Readings) -> Floats:
-    """RMS error of the torque [N m] in the push-offs of the averaged strides."""
-    ended = readings.meters["strides"].ended
-    error: Floats = root(mean_of(ended.squared_errors, ended.push_off_samples))
-    return error
-
-
 def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats], *needs: str) -> MetricKind:
     """A metric of a walk; ``needs`` is what it needs beside one."""
     return MetricKind(name, unit, summary, (), None, read, (METER,), needs=(WALK, *needs))
 
 
-def _mean(name: str) -> MetricKind:
-    """A mean over the strides with help, without the first ones; in a task sequence it would be over other strides."""
-    quantity = PER_STRIDE[name]
-    read = ReadAt((f"meters.strides.ended.sums.{name}", "meters.strides.ended.averaged"), mean_of)
-    return _kind(name, quantity.unit, f"{quantity.summary}, mean", read, STEADY)
-
-
 METRICS = (
-    *(_mean(name) for name in PER_STRIDE),
+    *(
+        _kind(
+            name,
+            quantity.unit,
+            f"{quantity.summary}, mean",
+            ReadAt((f"meters.strides.ended.sums.{name}", "meters.strides.ended.averaged"), mean_of),
+            # In a task sequence it would be a mean over other strides.
+            STEADY,
+        )
+        for name, quantity in PER_STRIDE.items()
+    ),
     _kind(
         "counted_strides",
         "-",
@@ -243,7 +230,7 @@ METRICS = (
         "push_off_error",
         "N m",
         "RMS of requested torque less actuator torque in push-off",
-        _push_off_error,
+        ReadAt(("meters.strides.ended.squared_errors", "meters.strides.ended.push_off_samples"), root_mean),
         STEADY,
         REQUESTED,
     ),

@@ -1,23 +1,27 @@
 """Content of a page about its scenarios: settings with units, limits and sliders, relations, channels and metrics."""
 
+import contextlib
 import json
 import math
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib.resources import files
 from typing import Any
 
 from ppafo.errors import ScenarioError, UnitError
-from ppafo.page.motions import shown_motion
+from ppafo.page.motions import declared_content, page_look, relations_in_files, usual_changes, with_limits
 from ppafo.page.wasm import WasmModule
-from ppafo.page.words import words
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import over, read_overrides
+from ppafo.report.display_units import metric_quantity
 from ppafo.report.setting_names import label_of
 from ppafo.simulation.declaration import PRESSURE_WORDS
 from ppafo.simulation.overrides import apply_overrides, is_of_device
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import conversion, from_si, parse_quantity, to_si
+from ppafo.units.shown import QUANTITIES
 from ppafo.version import __version__
 
 Interval = tuple[float, float]
@@ -49,6 +53,12 @@ _ABSOLUTE = ("largest_pressure",)
 _NICE = (1.0, 2.0, 2.5, 5.0, 10.0)
 
 
+@cache
+def words() -> dict[str, Any]:
+    """Return the claims, sliders and questions of pages: ``words.toml``."""
+    return tomllib.loads(files("ppafo.page").joinpath("words.toml").read_text(encoding="utf-8"))
+
+
 @dataclass(frozen=True, slots=True)
 class PageSimulation:
     """A scenario or walk and the module that simulates it; ``label`` distinguishes it from others of its tab."""
@@ -64,27 +74,33 @@ def program_content(simulated: PageSimulation, module: str, intervals: Mapping[s
     gauge = _gauge_texts(simulated.scenario, described["settings"])
     keys = {setting["key"] for setting in described["settings"]}
     # The file of a scenario or walk with the overrides in it; overrides of the device stay overrides.
-    shown = shown_motion(simulated.scenario)
+    scenario, settings = simulated.scenario, []
+    for entry in described["settings"]:
+        display = entry["display"]
+        # Pressures of a controller are absolute, and the file of a walk has limits that its program has not.
+        if entry["group"] == "controller" and display["unit"].endswith("_g"):
+            known = {**entry, "display": {**display, "unit": f"{display['unit'][:-2]}_a", "zero": 0.0}}
+        else:
+            known = with_limits(entry, scenario)
+        settings.append(_setting(known, gauge, intervals))
     overridden = read_overrides(described["overrides"], ScenarioError)
-    changed = apply_overrides(described["document"], overridden, described["name"], shown.declared())
+    changed = apply_overrides(described["document"], overridden, described["name"], declared_content(scenario))
     document, own = changed.document, changed.device
     of_file = document.get("device", {}).get("overrides", ())
-    overrides = list(over(of_file, map(str, own), valve=simulated.scenario.device.valve_name))
+    overrides = list(over(of_file, map(str, own), valve=scenario.device.valve_name))
     document["device"] = {**document.get("device", {}), **({"overrides": overrides} if overrides else {})}
     return {
         "name": described["name"],
         "kind": described["kind"],
         "label": simulated.label,
-        "look": shown.look(simulated.scenario),
+        "look": page_look(scenario),
         "description": " ".join(described["title"].split()),
         "document": document,
-        "usual": shown.usual_changes(simulated.scenario),
+        "usual": usual_changes(scenario),
         "deviceSections": sorted(
             {entry["key"].partition(".")[0] for entry in described["settings"] if is_of_device(entry["key"])}
         ),
-        "settings": [
-            _setting(_as_in_files(entry, simulated.scenario), gauge, intervals) for entry in described["settings"]
-        ],
+        "settings": settings,
         "relations": [
             {
                 "key": relation["key"],
@@ -95,7 +111,7 @@ def program_content(simulated: PageSimulation, module: str, intervals: Mapping[s
             }
             for relation in described["relations"]
         ]
-        + shown.relations(keys),
+        + relations_in_files(keys, scenario),
         "channels": [_shown(entry) for entry in described["channels"] if entry["name"] != "time"],
         "metrics": [_shown(entry) for entry in described["metrics"]],
         # Only of an actuator that makes its torque of a pressure so.
@@ -115,15 +131,7 @@ _SUSTAINED = {
 
 def usual_values(scenario: Scenario) -> dict[str, float]:
     """Return the changes with which a scenario begins as numbers in SI by key: all of them are times."""
-    return {key: parse_quantity(text, "s") for key, text in shown_motion(scenario).usual_changes(scenario).items()}
-
-
-def _as_in_files(entry: Mapping[str, Any], scenario: Scenario) -> dict[str, Any]:
-    """A setting with what only Python knows of it: its limits in a file, and which pressures are absolute."""
-    display = entry["display"]
-    if entry["group"] == "controller" and display["unit"].endswith("_g"):
-        return {**entry, "display": {**display, "unit": f"{display['unit'][:-2]}_a", "zero": 0.0}}
-    return shown_motion(scenario).with_limits(entry, scenario)
+    return {key: parse_quantity(text, "s") for key, text in usual_changes(scenario).items()}
 
 
 def page_content(
@@ -137,6 +145,18 @@ def page_content(
         for entry in program[kind]
     }
     recorded = {("s", "s"), ("N m", "N m"), (_LEVEL, "psi_g"), ("rad", "deg"), ("", ""), ("kg", "g")}
+    wanted: dict[str, dict[str, None]] = {}
+    for si, unit in sorted(shown | recorded):
+        wanted.setdefault(si, {}).update(dict.fromkeys((unit, *_UNITS.get(si, ()), si)))
+    # Conversion of each unit that may be entered into SI: in decimals, as ``ppafo.units`` computes.
+    scales: dict[str, list[dict[str, Any]]] = {}
+    for si, units in wanted.items():
+        scales[si] = []
+        for unit in units:
+            # A unit may be shown that cannot be typed for this quantity.
+            with contextlib.suppress(UnitError):
+                scale, offset, is_gauge = conversion(_typed(unit, si), si)
+                scales[si].append({"unit": unit, "scale": str(scale), "offset": str(offset), "isGauge": is_gauge})
     return {
         "version": __version__,
         "title": title,
@@ -144,7 +164,9 @@ def page_content(
         "tabs": list(tabs),
         "bottle": json.loads(files("ppafo.page").joinpath("minutes.json").read_text(encoding="utf-8")),
         "programs": list(programs),
-        "units": _scales(shown | recorded),
+        "units": scales,
+        # What a run computes nothing up to, by the unit in SI: the page shows it as 0, as all else does.
+        "zeros": {unit: QUANTITIES[kind].zero for unit in wanted if (kind := metric_quantity(unit))},
     }
 
 
@@ -164,7 +186,12 @@ def _setting(entry: Mapping[str, Any], gauge: Mapping[str, str], intervals: Mapp
     if slider is not None:
         begin, end = float(slider[0]), float(slider[1])
     else:
-        end = _nice(2.5 * abs(value)) if value else (high if high is not None and high <= 1.0 else 1.0)
+        end = high if high is not None and high <= 1.0 else 1.0
+        if value:
+            # The next round number that is not smaller.
+            wide = 2.5 * abs(value)
+            decade = 10.0 ** math.floor(math.log10(wide))
+            end = next(step * decade for step in _NICE if step * decade >= wide * (1.0 - 1e-9))
         begin = -end if value < 0.0 else 0.0
     # A slider to a bound that is not allowed ends a hundredth of its way before it.
     is_small = low is not None and (not entry["is_minimum_allowed"] or 0.0 < low < end / 100.0)
@@ -200,12 +227,6 @@ def _bare(unit: str) -> str:
     return "" if unit == "1" else unit
 
 
-def _nice(value: float) -> float:
-    """The next round number that is not smaller."""
-    decade = 10.0 ** math.floor(math.log10(value))
-    return next(step * decade for step in _NICE if step * decade >= value * (1.0 - 1e-9))
-
-
 def _shown(entry: Mapping[str, Any]) -> dict[str, str]:
     unit = _LEVEL if entry["unit"] == "Pa" else _bare(entry["unit"])
     text, shown = entry["description"], entry["display"]["unit"]
@@ -236,24 +257,6 @@ def _gauge_texts(scenario: Scenario, settings: Iterable[Mapping[str, Any]]) -> d
         )
         texts[path] = next(written, "")
     return texts
-
-
-def _scales(shown: Iterable[tuple[str, str]]) -> dict[str, list[dict[str, Any]]]:
-    """Conversion of each unit that may be entered into SI: in decimals, as ``ppafo.units`` computes."""
-    wanted: dict[str, dict[str, None]] = {}
-    for si, unit in sorted(shown):
-        wanted.setdefault(si, {}).update(dict.fromkeys((unit, *_UNITS.get(si, ()), si)))
-    scales: dict[str, list[dict[str, Any]]] = {}
-    for si, units in wanted.items():
-        scales[si] = []
-        for unit in units:
-            try:
-                scale, offset, is_gauge = conversion(_typed(unit, si), si)
-            except UnitError:
-                # A unit that is shown and cannot be typed for this quantity.
-                continue
-            scales[si].append({"unit": unit, "scale": str(scale), "offset": str(offset), "isGauge": is_gauge})
-    return scales
 
 
 def _typed(unit: str, si: str) -> str:

@@ -61,7 +61,11 @@ def still_of(
     if not points:
         return ""
     axes = Axes(_ticks([time for time, _ in points]), _ticks([value for _, value in points]))
-    colours = _colours(programs)
+    # The colours that the page gives to configurations: to a valve its own, once, to others what is left.
+    looks = [program["look"] for program in programs]
+    free = [number for number in range(1, len(PAGE_COLOURS) + 1) if number not in looks]
+    own = [look and looks.index(look) == place for place, look in enumerate(looks)]
+    colours = [PAGE_COLOURS[(look if is_own else free.pop(0)) - 1] for look, is_own in zip(looks, own, strict=True)]
     label = f"{_NAMES[channel]} ({axis_unit(quantity)})"
     parts = _frame(axes, label)
     parts += [
@@ -72,7 +76,12 @@ def still_of(
     if required:
         parts.append(_line(axes, required, f'stroke="{BLACK}" stroke-width="1.5" stroke-dasharray="6 4"'))
         legend.append(("required", BLACK))
-    parts += _legend(legend)
+    # A short line and a name for each curve, side by side above the axes.
+    left = _LEFT
+    for name, colour in legend:
+        parts.append(f'<path stroke="{colour}" stroke-width="3" d="M{left} 14h18"/>')
+        parts.append(_text(name, f'x="{left + 24}" y="18"'))
+        left += 50.0 + 7.0 * len(name)
     described = escape(f"{tab['title']}: {label} over time, as the page opens", quote=True)
     look = f'font-family="sans-serif" font-size="12" fill="{GREY}" role="img" aria-label="{described}"'
     box = f'xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" width="{_WIDTH:g}"'
@@ -102,16 +111,6 @@ def _frame(axes: Axes, label: str) -> list[str]:
     ]
 
 
-def _legend(entries: Sequence[tuple[str, str]]) -> list[str]:
-    """A short line and a name for each curve, of name and colour, side by side above the axes."""
-    parts, left = [], _LEFT
-    for name, colour in entries:
-        parts.append(f'<path stroke="{colour}" stroke-width="3" d="M{left} 14h18"/>')
-        parts.append(_text(name, f'x="{left + 24}" y="18"'))
-        left += 50.0 + 7.0 * len(name)
-    return parts
-
-
 def _line(axes: Axes, curve: Points, look: str) -> str:
     """A curve, of whose level stretches the two ends are enough."""
     places = [(axes.x(time), axes.y(value)) for time, value in curve]
@@ -124,17 +123,6 @@ def _line(axes: Axes, curve: Points, look: str) -> str:
 
 def _text(words: str, attributes: str) -> str:
     return f"<text {attributes}>{escape(words)}</text>"
-
-
-def _colours(programs: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The colours that the page gives to configurations: to a valve its own, once, to others what is left."""
-    looks = [program["look"] for program in programs]
-    free = [number for number in range(1, len(PAGE_COLOURS) + 1) if number not in looks]
-    colours = []
-    for place, look in enumerate(looks):
-        number = look if look and looks.index(look) == place else free.pop(0)
-        colours.append(PAGE_COLOURS[number - 1])
-    return colours
 
 
 def _ticks(values: Sequence[float]) -> list[float]:

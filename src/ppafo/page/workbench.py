@@ -1,22 +1,22 @@
 """A workbench of scenarios and walks: which of them share a tab, what they are called there, what the page gets."""
 
 import json
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ppafo.arguments import Overrides, checked
 from ppafo.errors import PpafoError, ScenarioError
 from ppafo.loading import load_scenario
-from ppafo.page.content import Interval, PageSimulation, page_content, program_content, usual_values
+from ppafo.page.content import Interval, PageSimulation, page_content, program_content, usual_values, words
 from ppafo.page.html import block_of, packed_once, page_of
-from ppafo.page.motions import shown_motion
+from ppafo.page.motions import is_walk, tab_title, usual_changes
 from ppafo.page.opening import computed_opening, first_settings, opening_like, opening_of
 from ppafo.page.still import still_of
 from ppafo.page.wasm import module_of
-from ppafo.page.words import words
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.finding import LivePart
 from ppafo.simulation.scenario import Scenario
@@ -63,8 +63,8 @@ def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides
     b'<!DOCTYPE html>'
     """
     name_plugins(plugins)
-    content = _content([str(scenario) for scenario in scenarios], tuple(overrides), "page")
-    return page_of(TITLE, content.document, content.modules, content.still)
+    content, modules, still = _content([str(scenario) for scenario in scenarios], tuple(overrides), "page")
+    return page_of(TITLE, content, modules, still)
 
 
 def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
@@ -78,7 +78,7 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
         for named_scenario in reversed(scenarios)
     }
     try:
-        content = _content(list(reversed(named.values())), (), "block")
+        content, modules, _ = _content(list(reversed(named.values())), (), "block")
     except PpafoError:
         return None
     remark = ""
@@ -87,21 +87,27 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
         if isinstance(named_scenario, Scenario) and shorter is not None and shorter < named_scenario.run.duration:
             part = f"{shorter:g} s of the {named_scenario.run.duration:g} s above"
             remark = max(remark, f"It begins with {part}: lengthen run.duration to compare the numbers.")
-    html, policy = block_of(content.document, content.modules)
+    html, policy = block_of(content, modules)
     return LivePart(policy, html, remark)
 
 
-class _PageContent(NamedTuple):
-    """Content of a page, its packed modules by name, and the picture of its first tab."""
+def _content(
+    scenarios: "Sequence[str | Scenario]", overrides: Sequence[str], form: str
+) -> tuple[dict[str, Any], dict[str, str], str]:
+    """Content of a ``"page"`` or of a ``"block"`` of one, its packed modules by name, the picture of its first tab.
 
-    document: dict[str, Any]
-    modules: dict[str, str]
-    still: str
-
-
-def _content(scenarios: "Sequence[str | Scenario]", overrides: Sequence[str], form: str) -> _PageContent:
-    """Content of a ``"page"`` or of a ``"block"`` of one; programs that are the same share one module."""
-    simulated = _simulated(scenarios, overrides)
+    Programs that are the same share one module. ScenarioError for no scenario, too many, or two of one name.
+    """
+    if not 1 <= len(scenarios) <= MOST_SCENARIOS:
+        raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(scenarios)}")
+    loaded = [load_scenario(scenario, overrides) if isinstance(scenario, str) else scenario for scenario in scenarios]
+    repeated = [name for name, count in Counter(scenario.name for scenario in loaded).items() if count > 1]
+    if repeated:
+        raise ScenarioError(f"two scenarios are called '{repeated[0]}'; a workbench distinguishes them by name")
+    # A name of one's own stays as it is.
+    simulated = [
+        PageSimulation(scenario, module_of(scenario), _LABELS.get(scenario.name, scenario.name)) for scenario in loaded
+    ]
     intervals = known_intervals()
     names: dict[str, str] = {}
     programs = []
@@ -116,7 +122,13 @@ def _content(scenarios: "Sequence[str | Scenario]", overrides: Sequence[str], fo
     for tab in content["tabs"]:
         started = [by_name[entry["program"]] for entry in tab["start"]]
         shown = [described[entry["program"]] for entry in tab["start"]]
-        openings = [_opening(program, form, tab["claims"]) for program in started]
+        # A report computes nothing: a block opens like the shipped scenario.
+        openings = [
+            opening_like(program.module)
+            if form == "block"
+            else opening_of(program.scenario, program.module, usual_values(program.scenario), tab["claims"])
+            for program in started
+        ]
         tab["first"] = first_settings(openings, shown)
         # A question is asked where one of the programs has all the settings that it changes.
         settings = [{entry["key"] for entry in program["settings"] if entry["kept"] != "zero"} for program in shown]
@@ -125,31 +137,7 @@ def _content(scenarios: "Sequence[str | Scenario]", overrides: Sequence[str], fo
         ]
         with shown_in(started[0].scenario.device.shown):
             stills.append(still_of(tab, openings, shown))
-    return _PageContent(content, {name: text for text, name in names.items()}, stills[0])
-
-
-def _simulated(scenarios: "Sequence[str | Scenario]", overrides: Sequence[str]) -> list[PageSimulation]:
-    """The scenarios with their programs and labels; ScenarioError for none, too many, or two of one name."""
-    if not 1 <= len(scenarios) <= MOST_SCENARIOS:
-        raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(scenarios)}")
-    loaded = [load_scenario(scenario, overrides) if isinstance(scenario, str) else scenario for scenario in scenarios]
-    names = [scenario.name for scenario in loaded]
-    repeated = next((name for place, name in enumerate(names) if name in names[:place]), None)
-    if repeated is not None:
-        raise ScenarioError(f"two scenarios are called '{repeated}'; a workbench distinguishes them by name")
-    simulated = []
-    for scenario in loaded:
-        # A name of one's own stays as it is.
-        label = _LABELS.get(scenario.name, scenario.name)
-        simulated.append(PageSimulation(scenario, module_of(scenario), label))
-    return simulated
-
-
-def _opening(simulated: PageSimulation, form: str, claims: Sequence[str]) -> dict[str, Any]:
-    """Opening state of a program, with the metrics in ``claims``; a block opens like the shipped scenario."""
-    if form == "block":
-        return opening_like(simulated.module)
-    return opening_of(simulated.scenario, simulated.module, usual_values(simulated.scenario), claims)
+    return content, {name: text for text, name in names.items()}, stills[0]
 
 
 def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:
@@ -178,7 +166,7 @@ def known_intervals() -> Mapping[str, Interval]:
 def _tabs(simulated: Sequence[PageSimulation]) -> list[dict[str, Any]]:
     groups: dict[str, list[PageSimulation]] = {}
     for program in simulated:
-        groups.setdefault(shown_motion(program.scenario).tab(program.scenario), []).append(program)
+        groups.setdefault(tab_title(program.scenario), []).append(program)
     tabs = []
     for title, group in groups.items():
         alone = " ".join(group[0].scenario.description.split()).replace("psi_g", "psi") if len(group) == 1 else ""
@@ -189,11 +177,8 @@ def _tabs(simulated: Sequence[PageSimulation]) -> list[dict[str, Any]]:
                 "title": title,
                 "summary": alone or _SUMMARIES.get(title, ""),
                 "programs": [program.scenario.name for program in group],
-                "start": [
-                    {"program": scenario.name, "changes": shown_motion(scenario).usual_changes(scenario)}
-                    for scenario in starts
-                ],
-                "claims": words()[shown_motion(starts[0]).claims],
+                "start": [{"program": scenario.name, "changes": usual_changes(scenario)} for scenario in starts],
+                "claims": words()["claims_of_walks" if is_walk(starts[0]) else "claims"],
                 "questions": [{"text": question["text"], "changes": question["changes"]} for question in asked],
             }
         )

@@ -6,13 +6,14 @@ library has them in C.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
-from ppafo.engine.program import FeedPhases, FootPhases, GasPhases, Program
+from ppafo.engine.program import GasPhases, Program
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
@@ -228,15 +229,20 @@ def _of_error(law: ControllerKind | None, components: Components) -> ControllerK
 
 def _program(components: Components, steps: TimeGrid, walk: Walk | None, has_delay: bool) -> Program:
     """Return what the lanes are composed of."""
-    feed: FeedPhases | None = None
-    foot: FootPhases | None = None
-    # Most runs have neither lines nor a leg.
+    feed: ModuleType | None = None
+    foot: ModuleType | None = None
+    leg: ModuleType | None = None
+    faults: ModuleType | None = None
+    # Most runs have neither lines nor a leg, and most walks no fault.
     if components.supply_lines is not None:
         from ppafo.engine.step import lines as feed
     if components.leg is not None:
         from ppafo.engine.step import foot
+    if walk is not None:
+        from ppafo.engine.step import walk as leg
+    if walk is not None and walk.failing is not None:
+        from ppafo.engine.step import failing as faults
     is_late, effects = first(components.signal_delay) > 0.0, effects_of(components.device, components.sections)
-    worn = None if walk is None else walk.groups()
     return Program(
         actuator=ACTUATORS[components.device.actuator.kind].model,
         valve=components.valve,
@@ -248,9 +254,9 @@ def _program(components: Components, steps: TimeGrid, walk: Walk | None, has_del
         late_signals=walk is None and is_late,
         late_readings=walk is not None and is_late,
         gas=_gas(components, effects),
-        leg=None if worn is None else worn.leg,
-        takes_task_sequence=worn is not None and worn.takes_task_sequence,
-        faults=None if worn is None else worn.faults,
+        leg=leg,
+        takes_task_sequence=walk is not None and walk.task_sequence is not None,
+        faults=faults,
         feed=feed,
         is_adaptive=bool(first(steps.needs_parts)),
         # A broken number of steps to a sample puts samples inside steps.

@@ -49,11 +49,6 @@ class CCompiler:
         return replace(self, effort=effort)
 
     @property
-    def seconds_per_byte(self) -> float:
-        """Compile time per byte of the composed text on a common computer [s]."""
-        return 2.0e-5 if self.effort is Effort.FULL else 1.0e-5
-
-    @property
     def flags(self) -> tuple[str, ...]:
         """Flags for the bits, and for this processor."""
         return (

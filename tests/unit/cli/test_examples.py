@@ -34,7 +34,7 @@ def test_every_folder_is_listed_and_every_entry_has_a_folder() -> None:
 
 @pytest.mark.parametrize("name", [name for name in EXAMPLES if name != SCRIPT])
 def test_the_files_of_an_example_are_what_its_page_shows(name: str) -> None:
-    shown = code_blocks(EXAMPLES[name].page.removeprefix("docs/"), "toml", "python")
+    shown = code_blocks(EXAMPLES[name]["page"].removeprefix("docs/"), "toml", "python")
     for path, content in example_files(name).items():
         text = content.decode("utf-8")
         if path.name == "pyproject.toml":
@@ -49,9 +49,8 @@ def test_the_files_of_an_example_are_what_its_page_shows(name: str) -> None:
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_every_command_is_one_and_every_file_that_it_names_is_there(name: str) -> None:
-    example = EXAMPLES[name]
     known = {str(path) for path in example_files(name)}
-    for command in example.commands:
+    for command in EXAMPLES[name]["commands"]:
         words = shlex.split(command)
         if words[0] == "ppafo" and f'\n{words[1]} = "' not in example_files(name).get(PYPROJECT, b"").decode("utf-8"):
             build_parser(words[1:]).parse_args(words[1:])
@@ -63,7 +62,7 @@ def test_they_are_listed_with_what_they_show(capsys: pytest.CaptureFixture[str])
     assert main(["new", "example"]) == 0
     printed = capsys.readouterr().out
     assert all(
-        re.search(rf"^{name} +{re.escape(item.summary)}$", printed, re.MULTILINE) for name, item in EXAMPLES.items()
+        re.search(rf"^{name} +{re.escape(item['summary'])}$", printed, re.MULTILINE) for name, item in EXAMPLES.items()
     )
 
 

@@ -234,7 +234,7 @@ def test_defaults_of_a_named_tuple_are_written_where_it_is_made(write: Write) ->
 
 ROWS = """
 from typing import NamedTuple
-from ppafo.engine.source_text import each
+from ppafo.engine.composer import each
 
 class Inner(NamedTuple):
     a: float

@@ -379,14 +379,14 @@ def test_a_recording_of_one_s_own_is_compared_as_validate_does(chromium: Any, fi
     full = 2.0 * (supply.supply.pressure - supply.supply.atmospheric_pressure) * supply.actuator.torque_constant
     curve = ComparedCurve("torque", "N m", time, late, recording.time, recording["torque"], full, usual_zero=0.0)
     expected = channel_agreement(curve, estimate_delay([curve], DEFAULT_LIMIT).value)
-    assert f"{expected.rms:.3g} N m" in shown
+    assert f"{expected.rms:.3g} N\u00a0m" in shown
     assert f"{100.0 * expected.fraction:.3g} %" in shown
     # Of two files that are read at once the later one counts, and only what the run has is compared.
     longer = f"time [s],torque [N m]\n{rows}\n3.5,0.0\n"
     page.evaluate("text => Promise.all([workbench.read('b.csv', text), workbench.read('c.csv', text)])", longer)
     assert page.locator(".notice").inner_text().startswith("c.csv is overlaid")
     page.locator(".recording .note", has_text="is compared up to 3 s").wait_for(state="attached")
-    assert f"{expected.rms:.3g} N m" in page.locator(".recording tbody tr").first.inner_text()
+    assert f"{expected.rms:.3g} N\u00a0m" in page.locator(".recording tbody tr").first.inner_text()
 
 
 @has_browser

@@ -1,12 +1,20 @@
-"""Modules of the page's script under node: bands of many runs, and several runs on one clock."""
+"""Modules of the page's script under node: bands of many runs, several runs on one clock, and how numbers are shown."""
 
 import json
+import random
 import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from ppafo.loading import load_scenario
+from ppafo.page.content import page_content
+from ppafo.page.wasm import display_of
+from ppafo.report.display_units import display_value, metric_quantity
+from ppafo.units import without_exponent
+from ppafo.units.shown import QUANTITIES, shown_in
 
 SOURCES = Path(__file__).parents[3] / "page"
 pytestmark = pytest.mark.skipif(
@@ -56,6 +64,15 @@ _CLOCK = """({ clockOf, onClock }) => {
 }"""
 
 
+_SHOWN = """({ plain, shownText }) => {
+    const { numbers, content, values } = GIVEN;
+    return {
+        numbers: numbers.map(([value, digits]) => plain(value, digits)),
+        values: values.map(([unit, shown, value]) => shownText(content, { unit, shown }, value, 4)),
+    };
+}"""
+
+
 def told(module: str, work: str) -> Any:
     """What a function says of a module of the page."""
     script = _BUNDLED.replace("MODULE", module).replace("WORK", work)
@@ -78,3 +95,40 @@ def test_the_bands_of_all_channels_come_from_one_go_of_200_runs() -> None:
 def test_runs_of_different_length_have_the_clock_of_the_longest_and_the_samples_of_the_finest() -> None:
     found = told("clock", _CLOCK)
     assert found == {"clock": [0, 0.1, 0.2, 0.3, 0.45], "values": [1, 2, 3, None, None], "same": 3}
+
+
+@pytest.mark.parametrize("name", ["torque-task-proportional", "pressure-loop"])
+def test_numbers_have_the_digits_the_units_and_the_zero_that_python_shows(name: str) -> None:
+    draw = random.Random(name)
+    sizes = [draw.choice((-1.0, 1.0)) * 10.0 ** draw.uniform(-9.0, 9.0) for _ in range(400)]
+    # Halves, of which the two languages round half by themselves, and edges of the form with an exponent.
+    halves = [draw.randrange(1, 4000) / 2.0 ** draw.randrange(1, 9) for _ in range(400)]
+    edges = [0.0, -0.0, 1e-4, 9.9996e-5, 999999.9, 1e6, 999.5, 9.5, 1e9, 1.5e10, 2.5]
+    numbers = [(value, draw.randrange(1, 8)) for value in (*sizes, *halves, *edges)]
+    device = load_scenario(name).device
+    with shown_in(device.shown):
+        units = [
+            (si, display_of(si, 101325.0, "gas mass")["unit"])
+            for si in ("N m", "Pa_a", "rad", "s", "kg", "m^2", "J/kg", "")
+        ]
+        entries = [{"unit": si, "shown": shown} for si, shown in units]
+        content = page_content("", "page", [], [{"settings": entries, "channels": [], "metrics": []}])
+        values = [(si, shown, value) for si, shown in units for value in _near_zero_and_beyond(si, draw)]
+        expected = [
+            without_exponent(display_value(value, metric_quantity(si), 101325.0, shown), ".4g")
+            for si, shown, value in values
+        ]
+    given = json.dumps({"numbers": numbers, "content": content, "values": values})
+    found = told("shown", _SHOWN.replace("GIVEN", given))
+    assert found["numbers"] == [without_exponent(value, f".{digits}g") for value, digits in numbers]
+    # Units are written for a reader: ``psi gauge`` for psi_g.
+    assert [text.split(" ")[0] for text in found["values"]] == expected
+
+
+def _near_zero_and_beyond(unit: str, draw: random.Random) -> list[float]:
+    """Values in SI about the size that a run computes nothing up to, and of every other size."""
+    kind = metric_quantity(unit)
+    zero = QUANTITIES[kind].zero if kind else 0.0
+    usual = 101325.0 if unit == "Pa_a" else 0.0
+    near = [usual + zero * share for share in (-3.0, -0.9, -0.1, 0.1, 0.9, 3.0)]
+    return [usual, *near, *(usual + draw.uniform(-2.0, 2.0) * 10.0 ** draw.uniform(-6.0, 5.0) for _ in range(40))]

@@ -14,8 +14,8 @@ from ppafo.analyses.endurance.solve import follow_bottle
 from ppafo.loading import load_scenario
 from ppafo.page import html as pages
 from ppafo.page import workbench as workbench_module
+from ppafo.page.content import words
 from ppafo.page.opening import LEAST_CHANGE, MOST_FIRST, _key
-from ppafo.page.words import words
 from ppafo.page.workbench import DEFAULT, openings_of, workbench
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.report.style import PAGE_COLOURS
@@ -39,7 +39,9 @@ def _opening() -> dict[str, Any]:
 # Runs of the last fail at both ends of a setting.
 def test_a_scenario_of_ones_own_is_called_by_its_name_as_it_is() -> None:
     own = replace(load_scenario("step-response"), name="knoechel-bench")
-    labels = [simulated.label for simulated in workbench_module._simulated([own, "step-response"], ())]
+    labels = [
+        program["label"] for program in workbench_module._content([own, "step-response"], (), "page")[0]["programs"]
+    ]
     assert labels == ["knoechel-bench", "Step response"]
 
 
@@ -109,7 +111,7 @@ def test_the_page_says_its_main_fact_and_its_questions_set_the_sliders(chromium:
     page = opened(chromium, file, viewport=LARGE)
     facts = page.locator(".facts")
     said = facts.inner_text().replace("\u00a0", " ")
-    assert "The task requires 6 N m; the supply sustains 5.0 N m, so the shaded part is out of reach." in said
+    assert "The task requires 6 N m; the supply sustains 5 N m, so the shaded part is out of reach." in said
     assert "lasts 9.4 minutes (Solenoid pair), 30 minutes (Proportional valve)" in facts.inner_text()
     assert "shaded" in facts.inner_text()
     page.get_by_role("link", name="What if the task required 4 N m?").click()

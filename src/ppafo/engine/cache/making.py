@@ -7,23 +7,17 @@ import logging
 import os
 import secrets
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial
+from contextvars import ContextVar, copy_context
 from pathlib import Path
 from types import ModuleType
 
 from ppafo.documents.regular_file import read_regular_file
-from ppafo.engine.cache.announcing import (
-    SECONDS_FILE,
-    announce,
-    compile_side_by_side,
-    estimate_seconds,
-    processor_seconds,
-)
 from ppafo.engine.cache.folder import LOCK, cache_folder, refusal
 from ppafo.engine.cache.kept import CHECKSUMS, RequestedProgram, is_kept, load_kept_module, remove
-from ppafo.engine.cache.tidying import PROGRAM, entries_named, evict
+from ppafo.engine.cache.tidying import evict
 from ppafo.engine.compilers import Compiler, Effort
 from ppafo.wording import reason
 
@@ -82,6 +76,35 @@ def _lock(place: Path) -> int | None:
 
 logger = logging.getLogger("ppafo")
 
+QUIET = 2.0
+"""Seconds of compiling that nobody has to hear of."""
+_models: ContextVar[int] = ContextVar("models that are compiled together", default=0)
+
+
+@contextlib.contextmanager
+def announce(where: str, models: int = 1) -> Iterator[None]:
+    """Say, once it takes longer than ``QUIET``, that models are compiled, and how it ended.
+
+    Nothing is said of one of several models that are announced together.
+    """
+    if _models.get():
+        yield
+        return
+    what = "a model" if models == 1 else f"{models} models"
+    timer = threading.Timer(QUIET, logger.warning, (f"ppafo: compiling {what} for this computer ...",))
+    # A program that ends while it compiles does not wait for the message.
+    timer.daemon = True
+    start = time.perf_counter()
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
+    seconds = time.perf_counter() - start
+    if seconds >= QUIET:
+        logger.warning("ppafo: compiled in %.1f s and %s", seconds, where)
+
 
 def make(wanted: RequestedProgram, kept: Path | None) -> ModuleType:
     """Compile a program and keep it at its place, or in memory alone where there is none or it cannot be kept."""
@@ -92,7 +115,7 @@ def make(wanted: RequestedProgram, kept: Path | None) -> ModuleType:
                 return load_kept_module(kept, wanted) or _compile_and_keep(kept, wanted)
         except OSError as error:
             logger.warning("ppafo: the compiled model is not kept in %s: %s", kept.parent, reason(error))
-    with announce(_estimate(wanted, ()), "not kept"):
+    with announce("not kept"):
         return wanted.compile(Path(f"<{wanted.name}>"))
 
 
@@ -106,13 +129,20 @@ def load_all(programs: Iterable[tuple[str, Effort]], compiler: Compiler, load: C
     # One alone is compiled where it is needed, with its own message.
     if len(missing) < 2:
         return
+    from concurrent.futures import ThreadPoolExecutor
+
     folder = cache_folder()
-    kept = [] if folder is None else entries_named(folder, PROGRAM)
-    expected = sum(
-        _estimate(RequestedProgram(source, compiler.with_effort(effort)), kept) for source, effort in missing
-    )
     where = "not kept" if folder is None or refusal(folder) else f"kept in {folder}"
-    compile_side_by_side([partial(load, source, effort) for source, effort in missing], expected, where)
+    workers = min(len(missing), os.cpu_count() or 1)
+    with announce(where, len(missing)), ThreadPoolExecutor(workers) as pool:
+        # A context variable, not a global: two threads may compile different sets at once.
+        known = _models.set(len(missing))
+        try:
+            started = [pool.submit(copy_context().run, load, source, effort) for source, effort in missing]
+        finally:
+            _models.reset(known)
+        for task in started:
+            task.result()
 
 
 def _compile_and_keep(kept: Path, wanted: RequestedProgram) -> ModuleType:
@@ -123,13 +153,13 @@ def _compile_and_keep(kept: Path, wanted: RequestedProgram) -> ModuleType:
         aside.mkdir(mode=0o700)
         path = aside / f"{wanted.name}.py"
         path.write_text(wanted.source, encoding="utf-8")
-        start, worked = time.perf_counter(), processor_seconds()
-        with announce(_estimate(wanted, entries_named(kept.parent, PROGRAM)), f"kept in {kept.parent}"):
+        with announce(f"kept in {kept.parent}"):
             module = wanted.compile(path)
-        # Others work on this computer meanwhile, and compilers of other threads count as this process's.
-        seconds = min(time.perf_counter() - start, processor_seconds() - worked)
-        (aside / SECONDS_FILE).write_text(f"{seconds:.2f}", encoding="ascii")
-        (aside / CHECKSUMS).write_text(json.dumps(_checksums(aside), indent=2), encoding="utf-8")
+        files = sorted(file for file in aside.rglob("*") if not file.is_dir())
+        hashes = {
+            file.relative_to(aside).as_posix(): hashlib.sha256(read_regular_file(file)).hexdigest() for file in files
+        }
+        (aside / CHECKSUMS).write_text(json.dumps(hashes, indent=2), encoding="utf-8")
         for entry in aside.rglob("*"):  # compilers let a group write where the user's habits (umask) do
             entry.chmod(0o700 if entry.is_dir() else 0o600)
         with contextlib.suppress(OSError):  # another process was quicker, with the same program
@@ -141,16 +171,3 @@ def _compile_and_keep(kept: Path, wanted: RequestedProgram) -> ModuleType:
     finally:
         remove(aside)
     return module
-
-
-def _estimate(wanted: RequestedProgram, kept: Iterable[Path]) -> float:
-    """About how long a program takes to compile [s]."""
-    kind = wanted.name.rpartition("_")[0]
-    alike = [entry for entry in kept if entry.name.startswith(f"{kind}_")]
-    return estimate_seconds(wanted.source, alike, wanted.compiler.seconds_per_byte)
-
-
-def _checksums(folder: Path) -> dict[str, str]:
-    """Return the hash of every file of a program but the list of them itself."""
-    files = sorted(path for path in folder.rglob("*") if not path.is_dir() and path.name != CHECKSUMS)
-    return {path.relative_to(folder).as_posix(): hashlib.sha256(read_regular_file(path)).hexdigest() for path in files}

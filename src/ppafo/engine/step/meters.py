@@ -97,7 +97,8 @@ def wanted_at(parts: Program, lane: Lane, time: float) -> float:
 def foot_of(parts: Program, lane: Lane, time: float) -> FootSample:
     """The foot on the shank of a gait at a time [s]; zeros where there is none."""
     if parts.foot is not None and parts.is_on_gait:
-        return parts.foot.sample(parts, lane, time)
+        sample: FootSample = parts.foot.sample(parts, lane, time)
+        return sample
     return NO_FOOT
 
 

@@ -120,7 +120,8 @@ def ports_behind(parts: Program, lane: Lane, now: Now, source: PlantParameters) 
     """The ports of both chambers behind a source, as the valve and faults leave them."""
     port_1, port_2 = parts.valve.connect(source, lane.shown)
     if parts.faults is not None:
-        return parts.faults.failed_ports(parts, lane, source, port_1, port_2, time_of(parts, lane, now))
+        time = time_of(parts, lane, now)
+        port_1, port_2 = parts.faults.failed_ports(parts, lane, source, port_1, port_2, time)
     return port_1, port_2
 
 
@@ -169,7 +170,8 @@ def begin_gas(parts: Program, lane: Lane, now: Now) -> None:
 def angle_ahead(parts: Program, lane: Lane) -> float:
     """Angle of the joint [rad] to which the volumes run in the step."""
     if parts.leg is not None:
-        return parts.leg.assumed_angle(parts, lane)
+        angle: float = parts.leg.assumed_angle(parts, lane)
+        return angle
     if parts.angle is None:
         return lane.begun.next_angle
     return lane.state.angle if parts.is_locked else lane.prescribed.next_angle
@@ -214,7 +216,8 @@ def torque_of_leg(parts: Program, lane: Lane, time: float, angle: float) -> floa
     """Torque of a leg on the vane [N m] at a time [s] and an angle [rad]."""
     if parts.foot is None:
         return 0.0
-    return parts.foot.torque(parts, lane, time, angle)
+    torque: float = parts.foot.torque(parts, lane, time, angle)
+    return torque
 
 
 def slide(parts: Program, lane: Lane, now: Now) -> None:

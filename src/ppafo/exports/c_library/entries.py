@@ -3,11 +3,12 @@
 import ast
 from collections.abc import Sequence
 
+from ppafo.engine.definitions import place_of
 from ppafo.engine.entries import indent, parse_expression
 from ppafo.engine.generator import StepText
 from ppafo.engine.reduction import names_in
 from ppafo.engine.rows import leaf_paths
-from ppafo.engine.source_text import SourceCollector, place_of
+from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.exported import COUNTS

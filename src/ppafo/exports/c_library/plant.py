@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import singledispatch
-from typing import NamedTuple
 
 from ppafo.control.controllers import switching
 from ppafo.exports.c_library import library_of
@@ -56,14 +55,8 @@ SAFE_STATE = Input(
 )
 
 
-class Assignment(NamedTuple):
-    """A field in C and what it becomes: an expression in which ``{angle}`` stands for the input of that name.
-
-    ``{settings}`` stands for the pointer to the settings.
-    """
-
-    field: str
-    expression: str
+Assignment = tuple[str, str]
+"""Field in C and the expression that it becomes: ``{angle}`` is the input of that name, ``{settings}`` the pointer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +109,12 @@ def plant_of(scenario: Scenario) -> PlantAlone:
 
     A joint on a path of the scenario's own takes the command alone, and so does the device on a leg that walks.
     """
-    plant = _led(_commanded(scenario.motion, scenario))
+    plant = _commanded(scenario.motion, scenario)
+    # An ankle that is locked is on a ramp that inputs can turn: one that is level.
+    angle = plant.motion.locked_angle if isinstance(plant.motion, PrescribedMotion) else None
+    if angle is not None:
+        settings = {"start_level": angle, "level": angle, "ramp_start": 0.0, "ramp_time": 2.0}
+        plant = replace(plant, motion=PrescribedMotion(ProfileChoice("ramp_hold", settings)))
     library = library_of(plant)
     drive = _drive_of(scenario.motion, {setting.path: setting for setting in library.settings})
     taken = {variable.name for variable in (drive.command, *drive.inputs)}
@@ -145,7 +143,7 @@ def _drive_of(motion: Motion, _settings: Mapping[str, ExportParameter]) -> Drive
     walks = Drive(motion="The leg walks on by its gait.", command=WALKING_COMMAND)
     if not (isinstance(motion, WalkMotion) and motion.shut_off):
         return walks
-    safe_state = Assignment("controller.safe_state", "{safe_state}")
+    safe_state = ("controller.safe_state", "{safe_state}")
     return replace(walks, inputs=(SAFE_STATE,), parameters=(safe_state,))
 
 
@@ -173,16 +171,16 @@ def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParamete
             Input("angular_velocity", "rad/s", "its rate", 0.0, -fastest, fastest),
         ),
         settings=(
-            Assignment("motion_profile_start_level", "{angle}"),
-            Assignment("motion_profile_level", f"{{angle}} + {{angular_velocity}} * {_FIRST_RAMP}"),
-            Assignment("motion_profile_ramp_start", "0.0"),
-            Assignment("motion_profile_ramp_time", f"{_FIRST_RAMP}"),
+            ("motion_profile_start_level", "{angle}"),
+            ("motion_profile_level", f"{{angle}} + {{angular_velocity}} * {_FIRST_RAMP}"),
+            ("motion_profile_ramp_start", "0.0"),
+            ("motion_profile_ramp_time", f"{_FIRST_RAMP}"),
         ),
         parameters=(
-            Assignment("path.start_level", "{angle}"),
-            Assignment("path.level", "{angle} + {angular_velocity} * (2.0 * length)"),
-            Assignment("path.ramp_start", "time"),
-            Assignment("path.ramp_time", "2.0 * length"),
+            ("path.start_level", "{angle}"),
+            ("path.level", "{angle} + {angular_velocity} * (2.0 * length)"),
+            ("path.ramp_start", "time"),
+            ("path.ramp_time", "2.0 * length"),
         ),
     )
 
@@ -204,8 +202,8 @@ def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -
     return Drive(
         motion="The torque is constant until the next one.",
         inputs=(torque,),
-        settings=(Assignment(c_identifier(f"motion.{name}"), f"{{{name}}}"),),
-        parameters=(Assignment("plant.external_torque", f"{load}{{{name}}}"),),
+        settings=((c_identifier(f"motion.{name}"), f"{{{name}}}"),),
+        parameters=(("plant.external_torque", f"{load}{{{name}}}"),),
     )
 
 
@@ -235,6 +233,15 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
     example = [EXAMPLE if variable.name == "command" else variable.start for variable in alone.inputs]
     comments = [f" * {variable.name}, {variable.summary} [{variable.unit}]" for variable in alone.inputs]
     entries = [f"- `{variable.name}` [{variable.unit}]: {variable.summary}." for variable in alone.inputs]
+    are_numbers = [f"{name} - {name} == 0.0" for name in names]
+    if "angle" in names and alone.library.program.program.actuator.shape is None:
+        # Both chambers of a prescribed vane have a volume, now and at the end of the step: beyond where
+        # V = V_dead + B (angle - stop) is 0 a chamber would have none.
+        plant = "run->parameters.plant"
+        low = f"{plant}.angle_min - {plant}.dead_volume_1 / {plant}.displacement_per_radian"
+        high = f"{plant}.angle_max + {plant}.dead_volume_2 / {plant}.displacement_per_radian"
+        ends = ("angle", "angle + angular_velocity * run->parameters.timing.step")
+        are_numbers += [f"({low} < {end} && {end} < {high})" for end in ends]
     words = {
         "arguments": ", ".join(f"double {name}" for name in names),
         "inputs": ", ".join(names),
@@ -242,7 +249,7 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
         "check_inputs": "".join(f", {value!r}" for value in example),
         "check_first": "",
         "check_metrics": "",
-        "are_numbers": " && ".join([*(f"{name} - {name} == 0.0" for name in names), *_volume_conditions(alone)]),
+        "are_numbers": " && ".join(are_numbers),
         "said_inputs": ";\n".join(comments) + ".",
         "listed_inputs": "\n".join(entries),
         "motion": alone.drive.motion,
@@ -281,28 +288,6 @@ def follow_lines(alone: PlantAlone, settings: str, inputs: Mapping[str, str]) ->
             *alone.drive.settings,
         )
     )
-
-
-def _volume_conditions(alone: PlantAlone) -> list[str]:
-    """Return conditions in C that both chambers of a prescribed vane have a volume, now and at the end of the step."""
-    names = [variable.name for variable in alone.inputs]
-    if "angle" not in names or alone.library.program.program.actuator.shape is not None:
-        return []
-    plant = "run->parameters.plant"
-    # Where V = V_dead + B (angle - stop) is 0: beyond it a chamber would have no volume.
-    low = f"{plant}.angle_min - {plant}.dead_volume_1 / {plant}.displacement_per_radian"
-    high = f"{plant}.angle_max + {plant}.dead_volume_2 / {plant}.displacement_per_radian"
-    ends = ("angle", "angle + angular_velocity * run->parameters.timing.step")
-    return [f"({low} < {end} && {end} < {high})" for end in ends]
-
-
-def _led(plant: Scenario) -> Scenario:
-    """Return a plant whose ankle, where it is locked, is on a ramp that inputs can turn: one that is level."""
-    angle = plant.motion.locked_angle if isinstance(plant.motion, PrescribedMotion) else None
-    if angle is None:
-        return plant
-    settings = {"start_level": angle, "level": angle, "ramp_start": 0.0, "ramp_time": 2.0}
-    return replace(plant, motion=PrescribedMotion(ProfileChoice("ramp_hold", settings)))
 
 
 @singledispatch

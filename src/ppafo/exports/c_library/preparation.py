@@ -108,11 +108,6 @@ class Preparation:
         return [*found, "relieving"]
 
     @property
-    def line_volumes(self) -> list[str]:
-        """Names of the volumes of the supply lines."""
-        return [c_identifier(f"{SUPPLY_LINE}.{line}.volume") for line in SUPPLY_LINES]
-
-    @property
     def wall_settings(self) -> list[str]:
         """Names of the settings of a gas with an energy balance."""
         return [quantity.name for quantity in gas_settings(THERMAL)]

@@ -28,7 +28,7 @@ from ppafo.model.sensors import NOTHING_SEEN
 from ppafo.model.shut_off import NEVER, POWERED
 from ppafo.parameters.building import consistency
 from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction, holding
-from ppafo.simulation.declaration import RUN
+from ppafo.simulation.declaration import RUN, SUPPLY_LINE, SUPPLY_LINES
 from ppafo.simulation.numbers import device_numbers, number_at
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Scenario
@@ -212,7 +212,9 @@ def count_walk_steps(parts: Preparation, lane: PreparedLane, settings: Any) -> N
         parts.program.actuator.chambers(lane.plant, HIGHEST_ANGLE, lane["room"], lane["room"]),
     )
     if parts.scenario.supply_lines is not None:
-        lane["volume"] = min(lane["volume"], *(getattr(settings, name) for name in parts.line_volumes))
+        lane["volume"] = min(
+            lane["volume"], *(getattr(settings, c_identifier(f"{SUPPLY_LINE}.{line}.volume")) for line in SUPPLY_LINES)
+        )
     lane.counts_of_steps = walk_step_counts(
         settings.run_duration,
         settings.run_step,

@@ -62,6 +62,7 @@ long as it is not changed itself; what is ``made`` of others is the sum of a gap
 ``kept`` says that a setting must stay 0, or above 0, as another program would be needed.
 """
 
+import contextlib
 import hashlib
 import importlib.util
 import json
@@ -225,7 +226,11 @@ def display_of(unit: str, atmosphere: float, kilograms: str = "mass", is_absolut
 
 def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
     """Origin of the value of each setting, by path."""
-    origin, device, parameter_set = scenario.origin, scenario.device, _parameter_set(scenario)
+    origin, device = scenario.origin, scenario.device
+    # None where the set cannot be read any more.
+    parameter_set: ParameterSet | None = None
+    with contextlib.suppress(PpafoError):
+        parameter_set = parameter_set_of(origin)
     assumed = {assumption.path: assumption.note for assumption in scenario.assumptions}
     changed = {
         c_identifier(one_path(override.typed, device.valve_name)) for override in read_overrides(origin.overrides)
@@ -268,14 +273,6 @@ def _of_set(
     if entry.uncertainty is not None:
         half = to_si(entry.uncertainty, unit, si)
     return {"origin": entry.origin, "source": entry.source, "note": entry.note, "half_width": half}
-
-
-def _parameter_set(scenario: Scenario) -> ParameterSet | None:
-    """The set of the device with all overrides; None where it cannot be read any more."""
-    try:
-        return parameter_set_of(scenario.origin)
-    except PpafoError:
-        return None
 
 
 LANES = 8

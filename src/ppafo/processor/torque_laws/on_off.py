@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from ppafo.control.controllers.switching import ON_OFF as FLOAT_ON_OFF
 from ppafo.control.controllers.switching import ON_OFF_DEAD_ZONE as FLOAT_DEAD_ZONE
-from ppafo.engine.source_text import each
+from ppafo.engine.composer import each
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
 from ppafo.processor.fixed_point import (

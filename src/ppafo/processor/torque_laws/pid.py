@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ppafo.control.controllers.feedback import PID as FLOAT_PID
-from ppafo.engine.source_text import each
+from ppafo.engine.composer import each
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
 from ppafo.processor.fixed_point import (

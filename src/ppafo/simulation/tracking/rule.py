@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ppafo.control.kind import ControllerKind
 from ppafo.metrics.command import asked_samples, command_reversals
-from ppafo.metrics.metric import Floats, extent, followed, has_reference, hold_start
+from ppafo.metrics.metric import Floats, controlled_in, extent, followed, hold_start
 from ppafo.metrics.settled import is_long_enough
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
 from ppafo.metrics.tracking import SUSTAINED
@@ -134,7 +134,7 @@ def settled_walk(recording: Recording, limit: float) -> SettledPart | None:
 
     A law that requests none but opens its valves up to a torque ``limit`` [N m] has a peak alone, 0 for no limit.
     """
-    if not has_reference(recording):
+    if controlled_in(recording) is None:
         peak = float(np.max(np.abs(recording["torque"])))
         numbers: dict[str, Any] = dict.fromkeys(("duration", "error", "missing", "swing", "turns", "moved"), 0.0)
         return (

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from ppafo.metrics.metric import has_reference
+from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.causes import CAUSES_OF_TASK
@@ -152,7 +152,7 @@ def following_text(result: "RecordedResult") -> str:
     """Sentence on a result that follows its reference, with its RMS error; "" where it does not, or is not judged."""
     judged, controlled = _judged(result), CONTROLLED[result.scenario.controlled]
     # On a ramp every loop is behind, and a walk whose law requests no torque has a peak alone.
-    if judged is None or judged[0].failure is not None or not has_reference(result.recording):
+    if judged is None or judged[0].failure is not None or controlled_in(result.recording) is None:
         return ""
     settled = judged[0].settled
     if settled.ends_on_ramp:
@@ -177,7 +177,7 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None
     if (
         len(recording) < _FEWEST_SAMPLES
         or scenario.controller.is_open_loop
-        or (is_task and not has_reference(recording))
+        or (is_task and controlled_in(recording) is None)
     ):
         return None
     limit = 0.0 if is_task else torque_limit(scenario.controller.settings)

@@ -1,0 +1,116 @@
+"""Definition of a function as its file has it, refused where that is not what Python runs."""
+
+import ast
+import inspect
+import re
+import textwrap
+from collections.abc import Callable, Iterator
+from copy import deepcopy
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
+from ppafo.errors import ProgramError
+
+Adaptation = Callable[[FunctionType, ast.FunctionDef], ast.FunctionDef]
+"""Makes a definition one of the part of Python that is compiled; it is handed a copy of its own."""
+
+
+def emitted_name(item: Any) -> str:
+    """Name that a function or NamedTuple class gets in the generated module: its module path and its own name."""
+    module = item.__module__ or ""
+    path = module.removeprefix("ppafo.") if module.startswith("ppafo.") else f"foreign.{module}"
+    return re.sub(r"\W", "_", f"{path}_{item.__qualname__}")
+
+
+def check_is_plain(function: Any) -> None:
+    """Refuse what is no plain function: its source text would not be what Python runs. ProgramError says why."""
+    name = getattr(function, "__qualname__", None) or repr(function)
+    if type(function) is not FunctionType:
+        if not callable(function):
+            raise ProgramError(f"cannot compile {name}: it is not a function")
+        if type(function).__module__ == "builtins" and type(function).__name__ == "builtin_function_or_method":
+            raise ProgramError(f"cannot compile {name}: its source text is not available")
+        raise ProgramError(f"cannot compile {name}: it must be a plain function defined with 'def'")
+    if hasattr(function, "__wrapped__"):
+        raise ProgramError(
+            f"{place_of(function)}: '{name}' is wrapped by a decorator, which cannot be compiled; remove it"
+        )
+    if function.__closure__:
+        # A closure's value may change without a change of the function, and no text would show it.
+        names = ", ".join(f"'{name}'" for name in function.__code__.co_freevars)
+        raise ProgramError(
+            f"{place_of(function)}: '{name}' uses {names} of the function around it, which cannot be compiled; "
+            "make it a parameter"
+        )
+
+
+def place_of(item: Any) -> str:
+    """File and line of a function, the module of anything else."""
+    code = getattr(item, "__code__", None)
+    return f"module {item.__module__}" if code is None else place(code.co_filename, code.co_firstlineno)
+
+
+def parse_definition(function: FunctionType, adapt: Adaptation | None = None) -> ast.FunctionDef:
+    """The definition of a plain function with the lines of its file; refused where it is not what Python runs.
+
+    ProgramError where the definition cannot be read or is not what Python runs.
+    """
+    code = function.__code__
+    file, name = code.co_filename, function.__qualname__
+    try:
+        text = textwrap.dedent(inspect.getsource(function))
+    except (OSError, TypeError) as error:
+        reason = f"its source text is not available ({error})"
+        raise ProgramError(f"cannot compile {name}: {reason}") from error
+    try:
+        tree = parse_module("\n" * (code.co_firstlineno - 1) + text).body[0]
+    except SyntaxError as error:
+        raise refusal(file, code.co_firstlineno, f"the source text of '{name}' cannot be read alone") from error
+    if not isinstance(tree, ast.FunctionDef) or tree.name != code.co_name:
+        raise refusal(file, code.co_firstlineno, f"'{name}' must be a plain function defined with 'def'")
+    if tree.decorator_list:
+        raise refusal(file, tree, f"'{name}' is decorated, which cannot be compiled; remove the decorator")
+    # A copy, since the tree is compared with what Python runs below.
+    adapted = tree if adapt is None else adapt(function, deepcopy(tree))
+    check_grammar(adapted, file)
+    if _shape(code) not in (_shape(other) for other in _code_of(tree, function)):
+        changed = "is not what its source text says; the file has changed since it was loaded: start again"
+        raise refusal(file, tree, f"'{name}' {changed}")
+    check_flow(adapted, file, code.co_varnames)
+    return adapted
+
+
+def _code_of(tree: ast.FunctionDef, function: FunctionType) -> Iterator[CodeType]:
+    """The code that Python makes of a definition: it calls what is in a module otherwise where it sees the import."""
+    names = function.__code__.co_names
+    modules = [name for name in names if isinstance(function.__globals__.get(name), ModuleType)]
+    imports = [parse_module(f"import {name}").body[0] for name in modules]
+    # Python compiles a call through a module name otherwise where it has seen the import.
+    for before in (imports, []):
+        module = compile(ast.Module([*before, tree], []), "<source>", "exec", dont_inherit=True)
+        yield next(
+            constant
+            for constant in module.co_consts
+            if isinstance(constant, CodeType) and constant.co_name == tree.name
+        )
+
+
+def _shape(code: CodeType) -> tuple[Any, ...]:
+    """Instructions of a code object, without line numbers and docstring."""
+    # Texts are left out: a docstring may have changed without a change of what runs.
+    constants = [(type(constant), repr(constant)) for constant in code.co_consts if not isinstance(constant, str)]
+    return code.co_code, code.co_names, code.co_varnames, code.co_argcount, code.co_kwonlyargcount, constants
+
+
+def source_lines(body: list[ast.stmt]) -> Iterator[int]:
+    """Line in its file of each line that ``ast.unparse`` writes for some statements."""
+    for statement in body:
+        yield statement.lineno
+        if isinstance(statement, ast.If | ast.For | ast.While):
+            yield from source_lines(statement.body)
+            otherwise = statement.orelse
+            is_elif = isinstance(statement, ast.If) and len(otherwise) == 1 and isinstance(otherwise[0], ast.If)
+            if otherwise and not is_elif:
+                yield otherwise[0].lineno
+            yield from source_lines(otherwise)
