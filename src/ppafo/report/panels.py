@@ -56,7 +56,9 @@ class Panel:
 _TOP = 0.28
 """Inches above the panels, in which the figure says that it is simulated."""
 _LINE = 0.17
-"""Inches of a line of the note."""
+"""Inches of a line of the note, and of names above all panels."""
+_UNDER_NAMES = 0.08
+"""Inches from these names to the panels."""
 _LETTERS, _FEWEST_LETTERS, _KIND = 11.0, 24, 1.0
 """Letters of a title on an inch, the fewest on a line, and inches that its kind of numbers takes beside it."""
 _ENTRY, _ENTRY_LETTERS = 0.53, 14.5
@@ -156,10 +158,10 @@ def draw_panels(
     lines = textwrap.wrap(title, max(_FEWEST_LETTERS, round(_LETTERS * (width - _KIND))))
     shared = next((panel for panel in panels if panel.legend == "figure"), None)
     names, rows_of_names = (0, 0) if shared is None else _legend_rows(shared, "", width if title else width - _KIND)
-    rows_of_names = 0 if shared is None else max(1, rows_of_names)
+    room_of_names = 0.0 if shared is None else _LINE * max(1, rows_of_names) + _UNDER_NAMES
     # A title makes its own room.
-    above = _LINE * rows_of_names if title else max(_TOP, _LINE * rows_of_names)
-    height = size[1] * sum(heights) + 0.4 + below + _LINE * rows_of_names
+    above = room_of_names if title else max(_TOP, room_of_names)
+    height = size[1] * sum(heights) + 0.4 + below + room_of_names
     with house_style():
         rect = (0.0, below / height, 1.0, 1.0 - (above + below) / height)
         figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, rect=rect))
