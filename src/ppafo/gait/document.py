@@ -99,7 +99,7 @@ def gait_of(document: dict[str, Any], file: str) -> Gait:
     """
     validate(gait_file(), document, file, DataError)
     numbers = {path: _number(document, path, file) for path in _LIMITS}
-    curves = {name: _curve(document[name], name, file) for name in CURVES if name in document}
+    curves: dict[str, Any] = {name: _curve(document[name], name, file) for name in CURVES if name in document}
     # Required by the schema already: this tells the type checker.
     if numbers["stride.time"] is None or numbers["stride.stance_share"] is None or numbers["subject.body_mass"] is None:
         raise DataError(f"{file}: [subject] and [stride] are not complete")
@@ -118,13 +118,7 @@ def gait_of(document: dict[str, Any], file: str) -> Gait:
         stance_share_deviation=numbers["stride.stance_share_deviation"] or 0.0,
         strides=document["stride"].get("count", 0),
         notes=document.get("notes", ""),
-        shank_angle=curves["shank_angle"],
-        ankle_angle=curves["ankle_angle"],
-        ankle_moment=curves.get("ankle_moment"),
-        vertical_force=curves.get("vertical_force"),
-        centre_of_pressure=curves.get("centre_of_pressure"),
-        knee_forward=curves.get("knee_forward"),
-        knee_up=curves.get("knee_up"),
+        **curves,
     )
 
 

@@ -4,7 +4,6 @@ The figure has the curves over the stride, in the units of the field, with band,
 """
 
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -123,7 +122,7 @@ def gait_finding(gait: Gait, imported: ImportedGait | None = None) -> Finding[Ga
             Section(remarks=[f"remark: {text}" for text in imported.remarks] if imported else ()),
             Section(
                 "Stride",
-                panels=partial(gait_panels, gait, imported),
+                panels=lambda: [_panel(gait, name, imported, number == 0) for number, name in enumerate(gait.curves)],
                 name="gait",
                 caption=_CAPTION,
                 size=(5.4, 1.6),
@@ -171,12 +170,8 @@ _PANELS: dict[str, Kind] = {
 }
 
 
-def gait_panels(gait: Gait, imported: ImportedGait | None = None) -> list[Panel]:
-    """Return the curves of a gait over the stride; with the strides behind it where it was just imported."""
-    return [_panel(gait, name, imported, number == 0) for number, name in enumerate(gait.curves)]
-
-
 def _panel(gait: Gait, name: str, imported: ImportedGait | None, is_first: bool) -> Panel:
+    """Return a curve of a gait over the stride, with the strides behind it where it was just imported."""
     sign = clinical_angle if name == "ankle_angle" else np.asarray
     curve, percent, toe_off = gait.curves[name], 100.0 * PHASES, 100.0 * gait.stance_share
     series = sign(curve.values_at(PHASES))

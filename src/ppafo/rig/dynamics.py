@@ -121,11 +121,29 @@ class ChamberFlows(NamedTuple):
     line_heat: float
 
 
-class Observables(NamedTuple):
-    """Observable quantities of a bench: both nodes, driving torque [N m] and static limit of friction [N m] now."""
+class VaneInputs(NamedTuple):
+    """Inputs of the equations for the vane: angle [rad], prescribed rate [rad/s] and torque of a leg [N m].
 
-    node_1: Node
-    node_2: Node
+    The rate of an unconstrained vane is one of the unknowns; ``rate`` is 0 then.
+    """
+
+    angle: float
+    rate: float
+    added_torque: float
+
+
+class Inputs(NamedTuple):
+    """Numbers that come from outside with each call, in the order of their array."""
+
+    openings: Openings
+    vane: VaneInputs
+
+
+class Observables(NamedTuple):
+    """Observable quantities of a bench: pressures [Pa, absolute], driving torque and static limit of friction [N m]."""
+
+    pressure_1: float
+    pressure_2: float
     torque: float
     static_limit: float
 
@@ -187,15 +205,15 @@ def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angl
     return node_1, node_2
 
 
-def observables(given: RigNumbers, state: RigState, angle: float, added_torque: float) -> Observables:
-    """Observable quantities of a bench at an angle [rad]; ``added_torque`` [N m] comes from a leg."""
-    plant, rig = given.plant, given.rig
-    node_1, node_2 = chamber_nodes(plant, rig, state, angle)
-    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure, parts=VANE_FUNCTIONS) + added_torque
+def observables(given: RigNumbers, state: RigState, inputs: Inputs) -> Observables:
+    """Observable quantities of a bench in a state."""
+    plant, rig, vane = given.plant, given.rig, inputs.vane
+    node_1, node_2 = chamber_nodes(plant, rig, state, vane.angle)
+    torque = driving_torque(plant, vane.angle, node_1.pressure, node_2.pressure, parts=VANE_FUNCTIONS)
     return Observables(
-        node_1=node_1,
-        node_2=node_2,
-        torque=torque,
+        pressure_1=node_1.pressure,
+        pressure_2=node_2.pressure,
+        torque=torque + vane.added_torque,
         static_limit=pressed_at_rest(plant.static_torque, node_1.pressure, node_2.pressure, rig.seal_friction),
     )
 
@@ -232,21 +250,13 @@ def side(
     )
 
 
-def rig_rates(
-    given: RigNumbers,
-    openings: Openings,
-    state: RigState,
-    angle: float,
-    rate: float,
-    added_torque: float,
-    direction: float,
-) -> RigState:
+def rig_rates(given: RigNumbers, state: RigState, inputs: Inputs, direction: float) -> RigState:
     """Time derivatives of all unknowns [SI]; the vane slides towards ``direction`` (0: it is held or prescribed).
 
-    ``added_torque`` [N m] comes from a leg. Equations (1), (10): friction in motion is dynamic, and more near
-    standstill (Stribeck).
+    Equations (1), (10): friction in motion is dynamic, and more near standstill (Stribeck).
     """
     plant, rig, speed = given.plant, given.rig, state.angular_velocity
+    openings, angle = inputs.openings, inputs.vane.angle
     node_1, node_2 = chamber_nodes(plant, rig, state, angle)
     volume_1, volume_2 = chamber_volumes(plant, angle)
     regulated_1 = plant.supply_pressure - state.supply_drop_1
@@ -258,11 +268,12 @@ def rig_rates(
         given, node_2, regulated_2, state.line_mass_2, state.line_energy_2, openings.source_2, openings.vent_2
     )
     leak = leak_exchange(rig, node_1, node_2, given.leak_orifice)
-    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure, parts=VANE_FUNCTIONS) + added_torque
+    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure, parts=VANE_FUNCTIONS)
+    torque = torque + inputs.vane.added_torque
     pressed = pressed_in_motion(plant.dynamic_torque, speed, node_1.pressure, node_2.pressure, rig.seal_friction)
     friction = direction * more_near_standstill(pressed, speed, node_1.pressure, node_2.pressure, rig.stribeck)
     acceleration = vane_acceleration(torque, friction, plant.viscous_damping, plant.inertia, angle, speed)
-    grows = plant.displacement_per_radian * (speed if direction != 0.0 else rate)
+    grows = plant.displacement_per_radian * (speed if direction != 0.0 else inputs.vane.rate)
     heat_1, heat_2 = wall_heat(rig, node_1, volume_1), wall_heat(rig, node_2, volume_2)
     # Chambers that are open to the room take part in nothing, and their gas stays as it was.
     gas = 1.0 - rig.chambers_open

@@ -387,35 +387,22 @@ def _device_table(request: ExperimentRequest) -> dict[str, str]:
     return table if request.valve is None else {**table, "valve": request.valve}
 
 
-@dataclass(frozen=True, slots=True)
-class _BenchExperiment:
-    """An experiment: name, what is done, and the function that does it."""
-
-    name: str
-    summary: str
-    record: Callable[[ExperimentRequest], ExperimentResult]
-
-
-EXPERIMENTS: dict[str, _BenchExperiment] = {
-    experiment.name: experiment
-    for experiment in (
-        _BenchExperiment(
-            "static-torque", "torque on a scale over pressure, three times up and down", record_static_torque
-        ),
-        _BenchExperiment("free-decay", "angle after an impulse, chambers open to the room", record_free_decay),
-        _BenchExperiment("open-valve-flow", "flow of the open valve at many pressures", record_open_valve),
-        _BenchExperiment("vane-leak", "pressures of plugged chambers as gas leaks across the vane", record_vane_leak),
-        _BenchExperiment("vane-leak-steady", "flow that maintains the pressure in chamber 1", record_steady_leak),
-        _BenchExperiment("valve-map", "flow of the valve over its command, up and down", record_valve_map),
-        _BenchExperiment("step-response", "figure 7: valve opened fully, vane from stop to stop", record_step_response),
-        _BenchExperiment("torque-task", "figure 8: torque ramp and hold under control", record_torque_task),
-    )
+EXPERIMENTS: dict[str, tuple[str, Callable[[ExperimentRequest], ExperimentResult]]] = {
+    "static-torque": ("torque on a scale over pressure, three times up and down", record_static_torque),
+    "free-decay": ("angle after an impulse, chambers open to the room", record_free_decay),
+    "open-valve-flow": ("flow of the open valve at many pressures", record_open_valve),
+    "vane-leak": ("pressures of plugged chambers as gas leaks across the vane", record_vane_leak),
+    "vane-leak-steady": ("flow that maintains the pressure in chamber 1", record_steady_leak),
+    "valve-map": ("flow of the valve over its command, up and down", record_valve_map),
+    "step-response": ("figure 7: valve opened fully, vane from stop to stop", record_step_response),
+    "torque-task": ("figure 8: torque ramp and hold under control", record_torque_task),
 }
+"""Experiments by name: their summary, and the function that records them."""
 
 
 def overview() -> tuple[str, dict[str, Any]]:
     """Return the experiments and the presets with what they are, as text and as plain data."""
-    experiments = {experiment.name: experiment.summary for experiment in EXPERIMENTS.values()}
+    experiments = {name: summary for name, (summary, _) in EXPERIMENTS.items()}
     presets = {name: load_preset(name).title for name in list_presets()}
     width = max(map(len, [*experiments, *presets]))
     lines = ["experiments (recordings are synthetic):"]
@@ -457,7 +444,7 @@ def record(
     ``overrides`` are texts such as ``friction.static_torque=0.5 N m`` (device), ``run.duration=1 s`` (experiments in
     time) or ``rig.pressure_sensor.noise=0 Pa_d`` (preset). SimulationError where the solver gives up.
     """
-    chosen = find_experiment(experiment)
+    summary, run = find_experiment(experiment)
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= LARGEST_SEED:
         raise ParameterError(f"seed = {seed} must be a whole number from 0 to {LARGEST_SEED}")
     words = tuple(overrides)
@@ -472,13 +459,13 @@ def record(
         raise ParameterError(
             f"the simulated test bench supports vane actuators only, and '{one_line(device)}' has an actuator '{kind}'"
         )
-    outcome = chosen.record(ExperimentRequest(preset, seed, device, valve, others))
+    outcome = run(ExperimentRequest(preset, seed, device, valve, others))
     truth = {
         "notice": NOTICE,
         "units": UNITS,
         "version": __version__,
-        "experiment": chosen.name,
-        "summary": chosen.summary,
+        "experiment": experiment,
+        "summary": summary,
         "seed": seed,
         "parameter_set": device,
         "overrides": list(words),
@@ -498,8 +485,8 @@ def record(
     return RigRecording(outcome.recording, outcome.device, truth)
 
 
-def find_experiment(name: str) -> _BenchExperiment:
-    """Return the experiment of this name. ParameterError where there is none."""
+def find_experiment(name: str) -> tuple[str, Callable[[ExperimentRequest], ExperimentResult]]:
+    """Return summary and function of the experiment of this name. ParameterError where there is none."""
     if name not in EXPERIMENTS:
         hint = nearest_name(name, EXPERIMENTS)
         raise ParameterError(f"there is no experiment '{one_line(name)}'{hint}; available: {', '.join(EXPERIMENTS)}")

@@ -225,9 +225,6 @@ class ExperimentResult:
     settings: Mapping[str, Any]
 
 
-TWO_PI = 6.283185307179586
-
-
 def real_device(device: Device, preset: Preset) -> Device:
     """Return the device as it stands on the rig: the valve with its dynamics, the leak of its seals.
 
@@ -287,8 +284,8 @@ def rig_physics(device: Device, preset: Preset) -> RigPhysics:
         laminar_conductance=values["leak.laminar_conductance"],
         seal_friction=SealFriction(values["friction.static_per_pressure"], values["friction.dynamic_per_pressure"]),
         stribeck=stribeck.prepare(stribeck.StribeckSettings(velocity, share), device),
-        angle_follow_rate=TWO_PI * values["angle_sensor.bandwidth"],
-        pressure_follow_rate=TWO_PI * values["pressure_sensor.bandwidth"],
+        angle_follow_rate=math.tau * values["angle_sensor.bandwidth"],
+        pressure_follow_rate=math.tau * values["pressure_sensor.bandwidth"],
         chambers_open=0.0,
         ports_open=1.0,
     )

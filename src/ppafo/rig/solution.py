@@ -7,15 +7,17 @@ reversal; with modes no kink lies inside a step, and without the extra terms the
 """
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.kind import ControllerKind
 from ppafo.engine.continuous_time import SAME_TIME, Roots, after_stop, mode_at_rest, roots_at_rest, roots_sliding
+from ppafo.engine.entries import with_arrays
 from ppafo.engine.led_leg import torque_of_leg
-from ppafo.engine.rows import numbers, rebuilt
+from ppafo.engine.row_functions import row_functions
+from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.run import Run
 from ppafo.errors import SimulationError
 from ppafo.model.effects.spool_play import spool_position
@@ -23,19 +25,11 @@ from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import Openings, PlantParameters, actuator_torque
 from ppafo.model.sensors import Measurement
 from ppafo.parameters.device import Device
-from ppafo.rig.dynamics import RigNumbers, RigPhysics, RigState
+from ppafo.rig.dynamics import Inputs, Observables, RigNumbers, RigPhysics, RigState, VaneInputs, observables, rig_rates
 from ppafo.rig.preset import SimulatedSensor
-from ppafo.rig.right_hand_side import CompiledRig, Observed, VaneInputs
-from ppafo.rig.stretches import Distances, RigInterval, Slopes, absolute_tolerances, solve_stretch
+from ppafo.rig.stretches import Distances, Slopes, solve_stretch
 
 # The controller of a run on the rig: what it decides sample by sample, and its commands on the way to the valve.
-
-
-class PendingCommand(NamedTuple):
-    """A command [-] and the time [s] at which the valve gets it."""
-
-    arrival: float
-    command: float
 
 
 class Commands:
@@ -52,9 +46,9 @@ class Commands:
         self._run, self._period, self._delay, self._hysteresis = run, period, delay, hysteresis
         self._controller_state = self._controller.initial
         self._spool = 0.0
-        self._under_way: list[PendingCommand] = []
-        self.decided = 0.0
-        self.at_valve = 0.0
+        # Time [s] at which the valve gets a command [-].
+        self._under_way: list[tuple[float, float]] = []
+        self.decided = self.at_valve = 0.0
 
     def decide(self, sample: int, time: float, measurement: Measurement) -> None:
         """Let the controller see a measurement at a time [s], and send its command on its way."""
@@ -65,16 +59,16 @@ class Commands:
             run.controller, self._controller_state, reference, measurement, run.period
         )
         self._spool = spool_position(self._spool, self.decided, self._hysteresis)
-        self._under_way.append(PendingCommand(time + self._delay, self._spool))
+        self._under_way.append((time + self._delay, self._spool))
 
     def arrive(self, time: float) -> None:
         """Hand over to the valve what has arrived by a time [s]."""
-        while self._under_way and self._under_way[0].arrival <= time + SAME_TIME:
-            self.at_valve = self._under_way.pop(0).command
+        while self._under_way and self._under_way[0][0] <= time + SAME_TIME:
+            _, self.at_valve = self._under_way.pop(0)
 
     def next_arrival(self, end: float) -> float:
         """Return the time [s] at which the next command arrives, ``end`` [s] where none does before."""
-        return min(end, self._under_way[0].arrival) if self._under_way else end
+        return min(end, self._under_way[0][0]) if self._under_way else end
 
 
 Floats = NDArray[np.float64]
@@ -136,7 +130,40 @@ def solve_rig(rig_run: RigRun) -> RigSolution:
 
     SimulationError where the solver gives up, and for a controller in Python, which the rig cannot ask.
     """
-    return _Course(rig_run).solve()
+    return _Solver(rig_run).solve()
+
+
+class CompiledRig:
+    """The compiled equations with the numbers of one run. A call leaves nothing behind that a later one reads.
+
+    The valve and a prescribed angle of the vane stay outside, in Python: what they ask for comes in as numbers. So
+    there is one program for all devices and experiments, and a new computer compiles once.
+    """
+
+    def __init__(self, given: RigNumbers) -> None:
+        parameters = np.array(numbers(given))
+        self._state, self._rates = np.empty(len(RigState._fields)), np.empty(len(RigState._fields))
+        self._observed, self._inputs = np.empty(len(Observables._fields)), np.zeros(len(leaf_paths(Inputs, "inputs")))
+        slopes, observed = row_functions(rig_rates, observables)
+        self._fill = with_arrays(slopes, parameters, self._state, self._inputs, self._rates)
+        self._show = with_arrays(observed, parameters, self._state, self._inputs, self._observed)
+
+    def rates(self, state: Floats, openings: Openings, vane: VaneInputs, direction: float) -> Floats:
+        """Return the slopes of the unknowns of ``RigState`` (unknowns,) [SI]; the array is written anew by each call.
+
+        ``openings`` of the valve [-]; the vane slides towards ``direction`` (1 or -1), or is held or prescribed (0).
+        """
+        self._state[:] = state
+        self._inputs[:] = (*openings, *vane)
+        self._fill(direction)
+        return self._rates
+
+    def observe(self, state: Floats, vane: VaneInputs) -> Observables:
+        """Return what a bench could observe in a state, the unknowns of ``RigState`` (unknowns,) [SI]."""
+        self._state[:] = state
+        self._inputs[len(Openings._fields) :] = vane
+        self._show()
+        return Observables._make(self._observed.tolist())
 
 
 class _Equations:
@@ -200,7 +227,7 @@ class _Equations:
 
         return slopes
 
-    def observe(self, time: float, unknowns: Floats) -> Observed:
+    def observe(self, time: float, unknowns: Floats) -> Observables:
         """Pressures, driving torque and static limit of friction."""
         return self.compiled.observe(unknowns[:UNKNOWNS], self.vane(time, unknowns))
 
@@ -221,7 +248,7 @@ class _Equations:
         observed = self.observe(time, unknowns)
         return mode_at_rest(self._gripping(observed), float(unknowns[ANGLE]), observed.torque)
 
-    def _gripping(self, observed: Observed) -> PlantParameters:
+    def _gripping(self, observed: Observables) -> PlantParameters:
         """The plant with the static friction of the pressures that are observed."""
         return self.plant._replace(static_torque=observed.static_limit)
 
@@ -234,14 +261,13 @@ class _Equations:
         return state
 
 
-class _Course:
-    """A solution while it is being made: time [s], unknowns and mode, which go on from event to event."""
+class _Solver:
+    """Solution under way: time [s], unknowns and mode, which go on from event to event."""
 
     def __init__(self, rig_run: RigRun) -> None:
         self.rig_run, self.equations = rig_run, _Equations(rig_run)
         self.commands = Commands(rig_run.run, rig_run.control_period, rig_run.command_delay, rig_run.hysteresis)
         self.time, self.unknowns, self.direction = 0.0, self.equations.initial, 0.0
-        self.tolerances = absolute_tolerances(self.unknowns.size - UNKNOWNS)
         samples = rig_run.sample_times.size
         self.solution = RigSolution(
             states=np.empty((samples, UNKNOWNS)), pressures=np.empty((samples, 2)), commands=np.zeros(samples)
@@ -301,28 +327,23 @@ class _Course:
             self.direction = self.equations.rest_direction(self.time, self.unknowns)
             if self.direction != 0.0:
                 self.solution.breakaways.append(self.time)
-        stretch = solve_stretch(
+        samples = self.rig_run.sample_times
+        times, unknowns = solve_stretch(
             self.equations.slopes(self.direction, self.commands.at_valve, self.unknowns),
-            self.tolerances,
             self.equations.distances(self.direction) if self.equations.is_free else None,
             self.unknowns,
             self.time,
             end,
-            self.rig_run.sample_times[self.recorded :],
+            samples[self.recorded :],
         )
-        self.record_stretch(stretch)
-        self.time, self.unknowns = float(stretch.times[-1]), np.array(stretch.unknowns[-1])
+        # A sample at the end of a stretch belongs to the next.
+        while self.recorded < samples.size and samples[self.recorded] < float(times[-1]) - SAME_TIME:
+            self.record(unknowns[np.argmin(np.abs(times - samples[self.recorded]))])
+        self.time, self.unknowns = float(times[-1]), np.array(unknowns[-1])
         if self.time < end - SAME_TIME:
             self.change_mode()
         else:
             self.time = end
-
-    def record_stretch(self, stretch: RigInterval) -> None:
-        """Keep the samples that lie before the end of a stretch; one at its end belongs to the next."""
-        times, end = self.rig_run.sample_times, float(stretch.times[-1]) - SAME_TIME
-        while self.recorded < times.size and times[self.recorded] < end:
-            nearest = np.argmin(np.abs(stretch.times - times[self.recorded]))
-            self.record(stretch.unknowns[nearest])
 
     def record(self, unknowns: Floats) -> None:
         """Keep these unknowns as those of the next sample."""

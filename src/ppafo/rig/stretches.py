@@ -1,7 +1,6 @@
 """A stretch of time between two events, solved by LSODA: to its end, or to where a root function falls to 0."""
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,34 +54,18 @@ _ROOT_TOLERANCE = 4.0 * float(np.finfo(np.float64).eps)
 """Least relative tolerance [-] that ``scipy.optimize.brentq`` takes."""
 
 
-def absolute_tolerances(valve_unknowns: int) -> Floats:
-    """Return the absolute tolerances [SI] of all unknowns (unknowns,): those of ``RigState``, then the valve's."""
-    return np.array([*ABSOLUTE_TOLERANCES, *[VALVE_TOLERANCE] * valve_unknowns])
-
-
-class RigInterval(NamedTuple):
-    """Unknowns (times, unknowns) at times [s]: the start, those wanted, and the last one, where the stretch ended."""
-
-    times: Floats
-    unknowns: Floats
-
-
 def solve_stretch(
-    slopes: Slopes,
-    tolerances: Floats,
-    distances: Distances | None,
-    unknowns: Floats,
-    start: float,
-    end: float,
-    wanted: Floats,
-) -> RigInterval:
-    """Return the unknowns from ``start`` to ``end`` [s], or to where one of the distances falls to 0.
+    slopes: Slopes, distances: Distances | None, unknowns: Floats, start: float, end: float, wanted: Floats
+) -> tuple[Floats, Floats]:
+    """Return times [s] and unknowns (times, unknowns) from ``start`` to ``end``, or to where a distance falls to 0.
 
-    They are given at the ``wanted`` times [s] in between, too. A distance that is 0 at the start ends nothing.
-    SimulationError where the solver gives up.
+    Those of ``RigState`` come first, then the valve's; they are given at the ``wanted`` times [s] in between, too. A
+    distance that is 0 at the start ends nothing. SimulationError where the solver gives up.
     """
     from scipy.integrate import LSODA
 
+    of_valve = [VALVE_TOLERANCE] * (unknowns.size - len(ABSOLUTE_TOLERANCES))
+    tolerances = np.array([*ABSOLUTE_TOLERANCES, *of_valve])
     solver = LSODA(slopes, start, unknowns, end, rtol=RELATIVE_TOLERANCE, atol=tolerances)
     times, states = [start], [np.array(unknowns)]
     before = None if distances is None else distances(start, unknowns)
@@ -109,7 +92,7 @@ def solve_stretch(
         if event is not None or solver.status == "finished":
             times.append(last)
             states.append(interpolant(last) if event is not None else np.array(solver.y))
-            return RigInterval(np.array(times), np.array(states))
+            return np.array(times), np.array(states)
     raise SimulationError(f"the rig's solver took {MAXIMUM_STEPS} steps up to t = {solver.t:.6g} s")
 
 

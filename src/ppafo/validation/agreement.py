@@ -4,7 +4,7 @@ How much later the measurement is than the model is the shift in time that leave
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -34,12 +34,15 @@ from ppafo.validation.compared import (
     Thresholds,
     parse_thresholds,
 )
-from ppafo.validation.initial import initial_remedies
+from ppafo.validation.initial import initial_remedies, parse_initial
 from ppafo.validation.measured import MeasuredRecording, supply_gauge
-from ppafo.validation.replay import Motion, Replay, Replayed, replay_recording
+from ppafo.validation.replay import MOTIONS, Motion, Replay, Replayed, replay_recording
+from ppafo.wording import nearest_name, one_line
 
 DEFAULT_LIMIT = 0.02
 """Largest delay [s] that is looked for; sensors, filters and valves are late by less, and a model by more is wrong."""
+LARGEST_DELAY = 1.0
+"""Delay [s] that may be looked for at most; a recording that is later was not recorded with its command."""
 
 ENGINE_ERROR = 3.0e-5
 """Error of the engine over the full range [-] (tests/convergence)."""
@@ -151,6 +154,31 @@ class ReplaySettings:
     thresholds: Thresholds = field(default_factory=parse_thresholds)
     volume: float | None = None
     leg: Leg | None = None
+
+
+def replay_settings(
+    device: Device,
+    motion: str,
+    volume: float | None,
+    initial: Sequence[str],
+    thresholds: Sequence[str],
+    longest_delay: float,
+) -> ReplaySettings:
+    """Return the settings of a validation from its arguments; DataError for those that contradict each other."""
+    if volume is not None and not volume > 0.0:
+        raise DataError(f"volume of {volume:g} m^3: must be above 0")
+    if not 0.0 <= longest_delay <= LARGEST_DELAY:
+        raise DataError(f"longest delay of {longest_delay:g} s: must be from 0 to {LARGEST_DELAY:g} s")
+    chosen = next((known for known in MOTIONS if known == motion), None)
+    if chosen is None:
+        near = nearest_name(motion, MOTIONS)
+        raise DataError(f"motion '{one_line(motion)}' is not one of {', '.join(MOTIONS)}{near}")
+    if volume is not None and chosen != "free":
+        raise DataError(
+            f"motion '{chosen}': a fixed volume has no vane that could move; give motion or volume, not both"
+        )
+    states = parse_initial(initial, device.supply.atmospheric_pressure)
+    return ReplaySettings(chosen, states, longest_delay, parse_thresholds(thresholds), volume)
 
 
 @dataclass(frozen=True, slots=True)

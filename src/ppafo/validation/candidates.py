@@ -50,16 +50,11 @@ _CONVERTED = "", "Pa", "Pa_a", "Pa_g"
 """Declared units of pressures that were converted before, from a unit of which a file says nothing."""
 
 
-class _Group(NamedTuple):
-    """Pressure sensors that may be wrong together: by channel, in words, and the verb that goes with these."""
+def _groups(names: Collection[str]) -> Iterator[tuple[tuple[str, ...], str, str]]:
+    """Yield pressure sensors that may be wrong together: by channel, in words, and the verb that goes with these.
 
-    channels: tuple[str, ...]
-    words: str
-    verb: str
-
-
-def _groups(names: Collection[str]) -> Iterator[_Group]:
-    """Yield each pressure sensor of a recording, both chambers, both supplies, and all of them; the largest first."""
+    Each sensor of a recording, both chambers, both supplies, and all of them; the largest group first.
+    """
     chambers = tuple(name for name in (PRESSURE_1, PRESSURE_2) if name in names)
     supplies = tuple(name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in names)
     pressures = (*chambers, *supplies)
@@ -67,7 +62,7 @@ def _groups(names: Collection[str]) -> Iterator[_Group]:
     for channels in sorted(groups - {()}, key=lambda group: (-len(group), group)):
         has_several = len(channels) > 1
         words = "all pressures" if has_several and len(channels) == len(pressures) else " and ".join(channels)
-        yield _Group(channels, words, "seem" if has_several else "seems")
+        yield channels, words, "seem" if has_several else "seems"
 
 
 def exchanges(
@@ -131,72 +126,33 @@ _EXACT = SensorErrors(zero=0.0, gain=0.0, delay=0.0)
 """Usual errors of a command, which no sensor reads."""
 
 
-class _Reading(NamedTuple):
-    """Channels that are read by sensors of one kind: the point [SI] about which a gain turns, and a size of 1 [SI].
-
-    Their zeros are shown in ``unit``, ``shown`` of which are a size of 1; ``usual`` are the errors of any bench.
-    """
-
-    group: _Group
-    about: float
-    size: float
-    unit: str
-    shown: float
-    usual: SensorErrors
-
-
-def _readings(device: Device, names: Collection[str]) -> Iterator[_Reading]:
-    """Yield what may be read with a wrong gain or zero: pressures, one by one and together, angle, and command."""
-    supply = device.supply
-    gauge = max(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
-    unit, per_pascal = _unit_of_pressure(device)
-    for group in _groups(names):
-        yield _Reading(
-            group=group,
-            about=supply.atmospheric_pressure,
-            size=gauge,
-            unit=unit,
-            shown=per_pascal,
-            usual=PRESSURE_ERRORS,
-        )
-    if ANGLE in names:
-        yield _Reading(
-            group=_Group((ANGLE,), ANGLE, "seems"),
-            about=0.0,
-            size=1.0,
-            unit="deg",
-            shown=math.degrees(1.0),
-            usual=ANGLE_ERRORS,
-        )
-    yield _Reading(
-        group=_Group((COMMAND,), COMMAND, "seems"),
-        about=0.0,
-        size=1.0,
-        unit="of full opening",
-        shown=1.0,
-        usual=_EXACT,
-    )
-
-
 def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
     """Yield gain and zero of one sensor, of all pressures, of command and supply; delays and the rate of the clock."""
-    for reading in _readings(device, names):
-        channels, words, verb = reading.group
+    atmosphere = device.supply.atmospheric_pressure
+    gauge = max(device.supply.pressure, device.supply.dorsiflexion_pressure) - atmosphere
+    unit, per_pascal = _unit_of_pressure(device)
+    # Sensors of one kind: the point [SI] about which a gain turns, the size of a zero of 1 [SI], its unit and how many
+    # of that are 1 in SI, and the errors of any bench.
+    sensed = [(group, atmosphere, gauge, unit, per_pascal, PRESSURE_ERRORS) for group in _groups(names)]
+    if ANGLE in names:
+        sensed.append((((ANGLE,), ANGLE, "seems"), 0.0, 1.0, "deg", math.degrees(1.0), ANGLE_ERRORS))
+    sensed.append((((COMMAND,), COMMAND, "seems"), 0.0, 1.0, "of full opening", 1.0, _EXACT))
+    for (channels, words, verb), about, size, unit, shown, usual in sensed:
         yield CandidateCause(
             f"zero of {words}",
-            f"the zero of {words} seems to be off by {{:+.3g}} {reading.unit}",
+            f"the zero of {words} seems to be off by {{:+.3g}} {unit}",
             partial(_sensed, channels, "zero", 0.0),
-            tuple(reading.size * part for part in _ZEROS),
-            shown=reading.shown,
-            usual=reading.usual.zero,
+            tuple(size * part for part in _ZEROS),
+            shown=shown,
+            usual=usual.zero,
         )
         yield CandidateCause(
             f"gain of {words}",
             f"{words} {verb} to be read {{:.4g}} times too large",
-            partial(_sensed, channels, "gain", reading.about),
+            partial(_sensed, channels, "gain", about),
             _GAINS,
             is_ratio=True,
-            usual=reading.usual.gain,
+            usual=usual.gain,
         )
     sensors = tuple(name for name in SENSORS if name in names)
     # Of one sensor alone the delay is the one of all, which is taken out.
@@ -240,7 +196,10 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
     """Yield each number of the set, and another atmosphere under sensors of gauge pressure."""
     request = replay_of(measured, device, settings)
     scenario = replace(replayed_scenario(request), device=request.device)
-    followed = _followed_by(measured, request.device)
+    # Supply pressures that a replay follows in the recording, whatever the set has.
+    followed = {path for path, channel in _OF_SUPPLY.items() if measured.has(channel)}
+    if measured.has(SUPPLY) and request.device.supply.has_one_pressure:
+        followed = set(_OF_SUPPLY)
     declared = declared_numbers(scenario)
     other_forms = {f"{part}.{name}" for part in ("actuator.leak", "valve") for name in other_form(request.device, part)}
     left_out = {*_NOT_TRIED, *other_forms, *followed}
@@ -250,18 +209,11 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
         factors = tuple(factor for factor in _FACTORS if quantity.minimum <= factor * value <= quantity.maximum)
         if value > 0.0 and len(factors) > 2:
             words = f"{path} seems to be {{:.3g}} times the model's value"
-            change = partial(_numbered, path, value)
+            change = partial(_scaled, path, value)
             usual = math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0
             yield CandidateCause(path, words, change, factors, is_ratio=True, usual=usual, unit=quantity.unit or "-")
     pressures = {path: number_at(scenario, path) for path in _OF_SUPPLY if path not in followed}
     yield _other_atmosphere(request.device, pressures)
-
-
-def _followed_by(measured: MeasuredRecording, device: Device) -> set[str]:
-    """Return the paths of supply pressures that a replay follows in the recording, whatever the set has."""
-    if measured.has(SUPPLY) and device.supply.has_one_pressure:
-        return set(_OF_SUPPLY)
-    return {path for path, channel in _OF_SUPPLY.items() if measured.has(channel)}
 
 
 def _other_atmosphere(device: Device, pressures: Mapping[str, float]) -> CandidateCause:
@@ -285,7 +237,7 @@ def _unit_of_pressure(device: Device) -> tuple[str, float]:
         return shown_unit("Pa_d").removesuffix("_d"), shown_value(1.0, "Pa_d")
 
 
-def _numbered(path: str, value: float, factor: float) -> ModelChange:
+def _scaled(path: str, value: float, factor: float) -> ModelChange:
     """Return a number of the set as a multiple of its value [SI]."""
     return ModelChange(numbers={path: factor * value})
 

@@ -262,7 +262,10 @@ def _samples(records: Sequence[Record]) -> list[CandidateCause]:
         f"{words} ({record.measured.file})" if has_several else words for record in faulty for words in record.words
     ]
     channels = dict.fromkeys(words.split()[0] for record in faulty for words in record.words)
-    has_start = all(_has_start(record) for record in faulty)
+    # Every channel has a sample that a sensor made among those of the start.
+    has_start = all(
+        bool(record.good[:, : samples_at_rest(record.measured.recording)].any(axis=1).all()) for record in faulty
+    )
     return [
         CandidateCause(
             f"samples of {' and '.join(channels)}",
@@ -274,12 +277,6 @@ def _samples(records: Sequence[Record]) -> list[CandidateCause]:
             is_of_samples=True,
         )
     ]
-
-
-def _has_start(record: Record) -> bool:
-    """Tell whether every channel has a sample that a sensor made among those of the start."""
-    at_start = record.good[:, : samples_at_rest(record.measured.recording)]
-    return bool(at_start.any(axis=1).all())
 
 
 def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[CandidateCause]:
@@ -304,19 +301,18 @@ def _cause_of(named: Sequence[SizedCause], penalty: float, others: Sequence[Size
         (tried for tried in [*named, *others] if tried.gain > best - penalty),
         key=lambda tried: (tried.candidate.name not in alone, not tried.change.numbers, -tried.gain),
     )
-    first, *rest = map(_as_cause, alike)
-    return replace(first, same=tuple(rest))
-
-
-def _as_cause(tried: SizedCause) -> ResidualCause:
-    """Return a candidate at its size as a cause."""
-    candidate = tried.candidate
-    return ResidualCause(
-        name=candidate.name,
-        in_words=candidate.in_words(tried.size),
-        gain=tried.gain,
-        left=math.sqrt(float(tried.left.squares.max())),
-        numbers={path: (value, candidate.unit) for path, value in tried.change.numbers.items() if candidate.unit},
-        is_usual=tried.is_usual,
-        is_of_samples=candidate.is_of_samples,
+    first, *rest = (
+        ResidualCause(
+            name=each.candidate.name,
+            in_words=each.candidate.in_words(each.size),
+            gain=each.gain,
+            left=math.sqrt(float(each.left.squares.max())),
+            numbers={
+                path: (value, unit) for path, value in each.change.numbers.items() if (unit := each.candidate.unit)
+            },
+            is_usual=each.is_usual,
+            is_of_samples=each.candidate.is_of_samples,
+        )
+        for each in alike
     )
+    return replace(first, same=tuple(rest))

@@ -1,6 +1,7 @@
 """A recording as evidence: read from its file, and refused or remarked on where it cannot carry a comparison."""
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,7 +25,7 @@ from ppafo.simulation.recorded.channels import (
 )
 from ppafo.simulation.recorded.clock import usual_interval
 from ppafo.storage import read_recording
-from ppafo.storage.column_map import ColumnMap
+from ppafo.storage.column_map import ColumnMap, column_map_of
 from ppafo.storage.files import read_bytes
 from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import NETCDF_FILE
@@ -95,6 +96,26 @@ def read_measured(
         recording = read_foreign(place, columns, atmosphere=atmosphere, map_name=map_name, gas=gas)
     content = read_bytes(place / NETCDF_FILE if place.is_dir() else place)
     return check_recording(recording, device, str(source), hashlib.sha256(content).hexdigest())
+
+
+def read_all(
+    sources: "Sequence[Recording | DataFrame | Dataset | str | Path]",
+    device: Device,
+    columns: "ColumnMap | str | Path | None",
+) -> list[MeasuredRecording]:
+    """Return all recordings of a validation; DataError for none, and for one that is given twice."""
+    if not sources:
+        raise DataError("no recording was given; name at least one .csv or .nc file or result folder")
+    column_map, map_name = (None, "") if columns is None else column_map_of(columns)
+    read: dict[str, MeasuredRecording] = {}
+    for source in sources:
+        measured = read_measured(source, device, column_map, map_name)
+        # Given twice, under two names too, a recording would count twice as evidence.
+        if measured.sha256 in read:
+            same = read[measured.sha256].file
+            raise DataError(f"{measured.file}: the same recording as {same}; give each once")
+        read[measured.sha256] = measured
+    return list(read.values())
 
 
 @in_units(lambda _recording, device, *_: device.shown)

@@ -79,29 +79,32 @@ def record_of(
     measured: MeasuredRecording, agreement: RecordingAgreement, device: Device, settings: ReplaySettings
 ) -> Record:
     """Return a recording with its samples that no sensor made, and how readings change with each start."""
-    compared = [channel for channel in agreement.channels if channel.channel in SENSORS]
-    channels = [_channel_of(channel, agreement) for channel in compared or agreement.channels[:1]]
-    noise = np.array([channel.noise for channel in channels])
-    full_ranges = np.array([channel.agreement.full_range for channel in channels])
-    wrong = [channel for channel in channels if channel.wrong is not None]
+    of_sensors = [channel for channel in agreement.channels if channel.channel in SENSORS]
+    compared = of_sensors or agreement.channels[:1]
+    values, noises, faults = zip(*(_samples_of(channel, agreement) for channel in compared), strict=True)
+    noise, full_ranges = np.array(noises), np.array([channel.full_range for channel in compared])
+    wrong = [(channel.channel, fault) for channel, fault in zip(compared, faults, strict=True) if fault is not None]
+    good = [
+        np.ones(len(own)) if fault is None else 1.0 - fault.samples for own, fault in zip(values, faults, strict=True)
+    ]
     record = Record(
         measured=measured,
-        channels=tuple(channel.agreement.channel for channel in channels),
-        values=np.stack([channel.values for channel in channels]) / noise[:, None],
+        channels=tuple(channel.channel for channel in compared),
+        values=np.stack(values) / noise[:, None],
         noise=noise,
         engine=ENGINE_ERROR * full_ranges / noise,
-        good=np.stack([channel.is_good for channel in channels]).astype(np.float64),
-        words=tuple(channel.words for channel in wrong),
-        has_few=all(channel.has_few for channel in wrong),
+        good=np.stack(good),
+        words=tuple(f"{name} {fault.words}" for name, fault in wrong),
+        has_few=all(fault.is_isolated and float(fault.samples.mean()) < _FEW_OUTLIERS for _, fault in wrong),
         delay=agreement.delay.correction,
     )
-    request = replay_of(record.measured, device, settings)
-    count = samples_at_rest(record.measured.recording)
-    moved = [
-        _with_moved_start(request, name, noise / math.sqrt(count), device)
-        for name, noise in zip(record.channels, record.noise.tolist(), strict=True)
-        if name in SENSORS and name not in settings.initial
-    ]
+    request, moved = replay_of(record.measured, device, settings), list[Replay]()
+    for name, error in zip(record.channels, noise / math.sqrt(samples_at_rest(measured.recording)), strict=True):
+        if name in SENSORS and name not in settings.initial:
+            # A vane at its upper stop can only move down.
+            is_at_stop = name == ANGLE and request.start.angle > device.actuator.angle_max - error
+            start = getattr(request.start, name) + float(-error if is_at_stop else error)
+            moved.append(replace(request, start=replace(request.start, **{name: start})))
     unmoved, *others = replay_together([request, *moved])
     return record._replace(
         starts=tuple(
@@ -112,33 +115,8 @@ def record_of(
     )
 
 
-class _Channel(NamedTuple):
-    """A channel of a recording: its agreement, its values and their noise [SI], and which samples no sensor made."""
-
-    agreement: ChannelAgreement
-    values: Floats
-    noise: float
-    wrong: "_Wrong | None"
-
-    @property
-    def is_good(self) -> Flags:
-        """True for samples that a sensor made."""
-        return np.ones(len(self.values), dtype=bool) if self.wrong is None else np.logical_not(self.wrong.samples)
-
-    @property
-    def words(self) -> str:
-        """Description of its fault; empty without one."""
-        return "" if self.wrong is None else f"{self.agreement.channel} {self.wrong.words}"
-
-    @property
-    def has_few(self) -> bool:
-        """True where wrong samples are isolated and so few that any logger has them."""
-        wrong = self.wrong
-        return wrong is None or (wrong.is_isolated and float(wrong.samples.mean()) < _FEW_OUTLIERS)
-
-
-def _channel_of(channel: ChannelAgreement, agreement: RecordingAgreement) -> _Channel:
-    """Return a channel with the fault of its samples; its noise is estimated from the other samples."""
+def _samples_of(channel: ChannelAgreement, agreement: RecordingAgreement) -> "tuple[Floats, float, _Wrong | None]":
+    """Return values and noise [SI] of a channel, and the fault of its samples; others give the noise."""
     recording, model = agreement.measured, agreement.model
     values = measured_values(recording, channel.channel)
     assert values is not None
@@ -149,10 +127,10 @@ def _channel_of(channel: ChannelAgreement, agreement: RecordingAgreement) -> _Ch
     is_right = stands_still or channel.in_noise**2 < ONLY_NOISE
     wrong = None if is_right else _wrong_samples(values, residuals, channel, recording.time)
     if wrong is None:
-        return _Channel(agreement=channel, values=values, noise=channel.noise, wrong=None)
+        return values, channel.noise, None
     is_good = np.logical_not(wrong.samples)
     noise = max(noise_in(values[is_good], channel.full_range), correlated_noise_of(residuals[is_good]))
-    return _Channel(agreement=channel, values=values, noise=noise, wrong=wrong)
+    return values, noise, wrong
 
 
 class _Wrong(NamedTuple):
@@ -206,14 +184,6 @@ def _clipped_samples(values: Floats) -> _Wrong | None:
         f"{int((values == limit).sum())} samples are exactly its {word} value" for limit, word in limits
     )
     return _Wrong(f"is clipped: {said}", np.isin(values, [limit for limit, _ in limits]))
-
-
-def _with_moved_start(request: Replay, name: str, error: float, device: Device) -> Replay:
-    """Return a replay that starts higher by an error in one channel; a vane at its upper stop can only move down."""
-    start = request.start
-    is_at_stop = name == ANGLE and start.angle > device.actuator.angle_max - error
-    moved = getattr(start, name) + (-error if is_at_stop else error)
-    return replace(request, start=replace(start, **{name: moved}))
 
 
 def starts_without_wrong(record: Record, device: Device, share: float) -> dict[str, float]:

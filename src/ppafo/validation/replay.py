@@ -88,8 +88,16 @@ def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
             ended[number] = error
             continue
         alike.setdefault(planned[number].kind(), []).append(number)
-    for numbers in alike.values():
-        ended.update(zip(numbers, _run_together([planned[number] for number in numbers]), strict=True))
+    for together in alike.values():
+        first = planned[together[0]]
+        batch = replace(
+            first.batch,
+            parameters=np.concatenate([planned[number].batch.parameters for number in together], axis=1),
+            states=np.concatenate([planned[number].batch.states for number in together], axis=1),
+        )
+        result, rows = replay(batch, first.inputs), state_row_numbers(first.run)
+        for lane, number in enumerate(together):
+            ended[number] = _replayed(planned[number], rows, result.record[:, :, lane], result.states[:, lane])
     return [ended[number] for number in range(len(requests))]
 
 
@@ -107,22 +115,6 @@ class _Planned:
         command = None if self.inputs.command is None else self.inputs.command.tobytes()
         parameters = tuple((path, series.tobytes()) for path, series in self.inputs.parameters.items())
         return self.batch.program, self.batch.clock, command, parameters
-
-
-def _run_together(together: Sequence[_Planned]) -> list[Replayed | SimulationError]:
-    """Return replays of one kind, run side by side."""
-    first = together[0]
-    batch = replace(
-        first.batch,
-        parameters=np.concatenate([planned.batch.parameters for planned in together], axis=1),
-        states=np.concatenate([planned.batch.states for planned in together], axis=1),
-    )
-    result = replay(batch, first.inputs)
-    rows = state_row_numbers(first.run)
-    return [
-        _replayed(planned, rows, result.record[:, :, lane], result.states[:, lane])
-        for lane, planned in enumerate(together)
-    ]
 
 
 def _replayed(planned: _Planned, rows: Mapping[str, int], record: Floats, ends: Floats) -> Replayed | SimulationError:

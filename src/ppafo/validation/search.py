@@ -108,27 +108,21 @@ class CauseSearch:
         left: list[Left | None] = []
         for first in range(0, len(changes), _TOGETHER):
             self.report(Progress("searching for causes", first, len(changes), noun="changes"))
-            left += self._evaluated_together(changes[first : first + _TOGETHER])
-        return left
-
-    def _evaluated_together(self, changes: Sequence[ModelChange]) -> list[Left | None]:
-        """Return what each of some changes leaves, all replayed at once."""
-        requests = [[self._request(record, change) for record in self.records] for change in changes]
-        possible = [request for of_change in requests for request in of_change if request is not None]
-        replayed = iter(replay_together(possible))
-        left: list[Left | None] = []
-        for change, of_change in zip(changes, requests, strict=True):
-            results = [None if request is None else next(replayed) for request in of_change]
-            parts = [
-                left_of(record, result, change, self.settings.longest_delay)
-                for record, result in zip(self.records, results, strict=True)
-                if isinstance(result, Replayed)
-            ]
-            if len(parts) < len(self.records):
-                left.append(None)
-                continue
-            squares = np.concatenate([part.squares for part in parts])
-            left.append(Left(squares, np.concatenate([part.errors for part in parts])))
+            together = changes[first : first + _TOGETHER]
+            requests = [[self._request(record, change) for record in self.records] for change in together]
+            replayed = iter(replay_together([one for of_change in requests for one in of_change if one is not None]))
+            for change, of_change in zip(together, requests, strict=True):
+                results = [None if request is None else next(replayed) for request in of_change]
+                parts = [
+                    left_of(record, result, change, self.settings.longest_delay)
+                    for record, result in zip(self.records, results, strict=True)
+                    if isinstance(result, Replayed)
+                ]
+                if len(parts) < len(self.records):
+                    left.append(None)
+                    continue
+                squares = np.concatenate([part.squares for part in parts])
+                left.append(Left(squares, np.concatenate([part.errors for part in parts])))
         return left
 
     def _request(self, record: Record, change: ModelChange) -> Replay | None:
@@ -171,10 +165,8 @@ class CauseSearch:
             for (candidate, size), left in zip(trials, self.evaluated(changes), strict=True):
                 if left is not None:
                     gain = self._gain(left, none) - self.penalty * candidate.has_size
-                    now, before = (
-                        SizedCause(candidate=candidate, size=size, left=left, gain=gain),
-                        best.get(candidate.name),
-                    )
+                    now = SizedCause(candidate=candidate, size=size, left=left, gain=gain)
+                    before = best.get(candidate.name)
                     # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
                     if before is None or (gain, now.is_inside) > (before.gain, before.is_inside):
                         best[candidate.name] = now
@@ -189,7 +181,11 @@ class CauseSearch:
 
     def _improved(self, tried: Sequence[SizedCause]) -> list[tuple[CandidateCause, float]]:
         """Return the size of each candidate after a Gauss-Newton step, no further than its neighbours in the grid."""
-        ends = [_neighbours(each) for each in tried]
+        ends = []
+        for each in tried:
+            grid = sorted(each.candidate.grid)
+            nearest = int(np.argmin(np.abs(np.array(grid) - each.size)))
+            ends.append((grid[max(0, nearest - 1)], grid[min(len(grid) - 1, nearest + 1)]))
         lengths = [_DIFFERENCE * (high - low) for low, high in ends]
         moved = [each.candidate.at(each.size + length) for each, length in zip(tried, lengths, strict=True)]
         improved = []
@@ -294,13 +290,6 @@ class CauseSearch:
                 if is_larger and explained > of_engine + threshold * noise * noise:
                     return True
         return False
-
-
-def _neighbours(tried: SizedCause) -> tuple[float, float]:
-    """Return the sizes of the grid below and above the one that is nearest; its own ends at an end."""
-    grid = sorted(tried.candidate.grid)
-    nearest = int(np.argmin(np.abs(np.array(grid) - tried.size)))
-    return grid[max(0, nearest - 1)], grid[min(len(grid) - 1, nearest + 1)]
 
 
 def _bounded(slopes: Sequence[Slope], errors: Floats) -> list[_Sized]:

@@ -6,6 +6,7 @@ Any number may be an array (runs,), one for each run of an ensemble.
 import math
 import operator
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +31,8 @@ _IN_FILES = {"m": "m"}
 """Units in which files of walks have segments of a leg, which everything else has in millimetres."""
 
 
-class _Pair(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class _Pair:
     """Two numbers of a walk: the one at ``path`` must be below, above, at most or at least the ``other``.
 
     ``unit`` is the SI unit of both, ``words`` what is wrong where the bare relation would not say it.

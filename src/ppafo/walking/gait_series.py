@@ -56,16 +56,20 @@ LONGER_THAN_A_FOOT = 1.0e3
 """Lever [m] where nothing was measured: the lever of the heel bounds it."""
 
 
+SERIES = {
+    "shank": "shank_angle",
+    "ankle": "ankle_angle",
+    "moment": "ankle_moment",
+    "force": "vertical_force",
+    "knee_forward": "knee_forward",
+    "knee_up": "knee_up",
+}
+"""Curves that the engine takes, and that vary between people, by their field of ``GaitSeries``."""
+
+
 def gait_series(gait: Gait) -> GaitSeries:
     """The curves of a gait for the engine; a moment, force or knee motion that was not measured is 0."""
-    return GaitSeries(
-        shank=series_of(gait, "shank_angle"),
-        ankle=series_of(gait, "ankle_angle"),
-        moment=series_of(gait, "ankle_moment"),
-        force=series_of(gait, "vertical_force"),
-        knee_forward=series_of(gait, "knee_forward"),
-        knee_up=series_of(gait, "knee_up"),
-    )
+    return GaitSeries(**{field: series_of(gait, name) for field, name in SERIES.items()})
 
 
 def truncate(curve: GaitCurve) -> GaitCurve:

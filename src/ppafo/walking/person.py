@@ -20,19 +20,9 @@ from ppafo.model.leg import LegParameters
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.declaration import LARGEST_SEED
-from ppafo.walking.gait_series import EVENT_PHASES, gait_events, gait_series, gait_timing, strike_angle
+from ppafo.walking.gait_series import EVENT_PHASES, SERIES, gait_events, gait_series, gait_timing, strike_angle
 from ppafo.walking.motion import walk_of
 from ppafo.walking.wearer import BodyScale, Wearer, draw_bounded_normal, draw_builds, scaled
-
-SERIES = {
-    "shank": "shank_angle",
-    "ankle": "ankle_angle",
-    "moment": "ankle_moment",
-    "force": "vertical_force",
-    "knee_forward": "knee_forward",
-    "knee_up": "knee_up",
-}
-"""Curves that vary, by their field of ``GaitSeries``."""
 
 LEVEL_FRACTION = 0.5
 """Fraction of a curve's variance that moves it as a whole; the rest goes to the harmonics by their power. Assumed: a
@@ -171,9 +161,9 @@ def drawn_people(build: BodyScale, gaits: VariedGaits, generator: np.random.Gene
     shank, ankle = (of.mean + of.cosines.sum(axis=1) for of in (gaits.series["shank"], gaits.series["ankle"]))
     strike: Any = shank - ankle + 0.5 * np.pi - gaits.timing["ground_angle"]
     thresholds: Any = 1.0 + THRESHOLD_VARIATION * scale
-    mass: Any = build.mass
-    stature: Any = build.stature
-    start: Any = START_VARIATION * shift
+    # Numbers of many people are arrays where a person has floats.
+    many: tuple[Any, Any, Any] = (build.mass, build.stature, START_VARIATION * shift)
+    mass, stature, start = many
     series: dict[str, Any] = {}
     for name, curves in gaits.series.items():
         pairs: Any = zip(curves.cosines.T, curves.sines.T, strict=True)

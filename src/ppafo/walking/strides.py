@@ -161,23 +161,20 @@ def stride_metrics(
         metrics["healthy_positive_work"] = Metric(healthy, "J", "positive work of the healthy ankle in one stride")
         if "positive_push_off_work" in metrics:
             fraction = metrics["positive_push_off_work"].value / healthy
-            metrics["push_off_share"] = Metric(
-                fraction, "-", "positive work of T_ex in push-off over the healthy ankle's positive work"
-            )
+            summary = "positive work of T_ex in push-off over the healthy ankle's positive work"
+            metrics["push_off_share"] = Metric(fraction, "-", summary)
     if "dorsiflexor_moment" in averages:
         # Phase 1 is phase 0 of the next stride, and counts once.
         moment = float(averages["dorsiflexor_moment"].mean[:-1].mean())
-        metrics["dorsiflexor_moment"] = Metric(
-            moment, "N m", "moment of the wearer's dorsiflexors, mean over the stride"
-        )
+        summary = "moment of the wearer's dorsiflexors, mean over the stride"
+        metrics["dorsiflexor_moment"] = Metric(moment, "N m", summary)
     if "toe_height" in averages:
         metrics["lowest_toes"] = lowest_toes(configuration, averages["toe_height"].mean)
     if "angle" in averages:
         # Of the mean curves: what differs from stride to stride is in their deviation.
         away = averages["angle"].mean - averages["healthy_angle"].mean
-        metrics["angle_difference"] = Metric(
-            float(np.sqrt(np.mean(away**2))), "rad", "RMS difference of the mean ankle angle to the healthy one"
-        )
+        summary = "RMS difference of the mean ankle angle to the healthy one"
+        metrics["angle_difference"] = Metric(float(np.sqrt(np.mean(away**2))), "rad", summary)
     return metrics
 
 
@@ -185,11 +182,8 @@ def lowest_toes(configuration: Scenario, height: Floats) -> Metric:
     """Lowest toes in mid-swing, where they must clear the ground, from their height [m] at ``PHASES``."""
     timing = gait_timing(walk_of(configuration).gait)
     first, last = np.searchsorted(PHASES, [timing.clearance_from, timing.clearance_to])
-    return Metric(
-        float(height[first:last].min()),
-        "m",
-        "lowest toe height above ground in mid-swing of the mean stride; below 0 they would drag",
-    )
+    summary = "lowest toe height above ground in mid-swing of the mean stride; below 0 they would drag"
+    return Metric(float(height[first:last].min()), "m", summary)
 
 
 def healthy_positive_work(configuration: Scenario) -> float:
@@ -314,29 +308,21 @@ def task_sequence_metrics(
     # A walk may go on after its task sequence.
     end = min(float(recording.time[-1]), float(planned.duration))
     gas = float(np.interp(end, recording.time, recording["supplied_mass"]))
+    strides = float(sum(segment.strides for segment in segments))
+    work = sum(segment.net_push_off_work for segment in segments)
+    push = max((segment.flat_push for segment in segments), default=0.0)
     metrics = {
         "task_sequence_time": Metric(end, "s", "length of the task sequence, as far as it was walked"),
         "task_sequence_planned_time": Metric(float(planned.duration), "s", "length of the whole task sequence"),
         "steady_strides": Metric(float(steady), "-", "whole strides at an even speed on level ground"),
-        "task_sequence_strides": Metric(
-            float(sum(segment.strides for segment in segments)), "-", "strides of the task sequence"
-        ),
+        "task_sequence_strides": Metric(strides, "-", "strides of the task sequence"),
         "task_sequence_gas": Metric(gas, "kg", "gas taken from the supply over the task sequence"),
-        "task_sequence_work": Metric(
-            sum(segment.net_push_off_work for segment in segments),
-            "J",
-            "net work of T_ex while the foot rolls over the toes",
-        ),
-        "task_sequence_flat_push": Metric(
-            max((segment.flat_push for segment in segments), default=0.0),
-            "N m",
-            "largest torque in plantarflexion with a loaded heel",
-        ),
+        "task_sequence_work": Metric(work, "J", "net work of T_ex while the foot rolls over the toes"),
+        "task_sequence_flat_push": Metric(push, "N m", "largest torque in plantarflexion with a loaded heel"),
     }
     if toes:
-        metrics["task_sequence_lowest_toes"] = Metric(
-            min(toes), "m", "lowest toes over the ground in the middle of a swing"
-        )
+        summary = "lowest toes over the ground in the middle of a swing"
+        metrics["task_sequence_lowest_toes"] = Metric(min(toes), "m", summary)
     if "walking_speed" in recording:
         way = float(np.trapezoid(recording["walking_speed"], recording.time))
         metrics["task_sequence_length"] = Metric(way, "m", "distance walked in the task sequence")

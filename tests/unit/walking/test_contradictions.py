@@ -25,7 +25,7 @@ MISTAKES = {
     "controller.frozen_time=10 ms; controller.rate=100 Hz": "than two sample periods of the controller, 0.01 s each",
     "controller.lowest_angle=100 deg; controller.highest_angle=90 deg": "must be below controller.highest_angle",
     "controller.push_off_end=0.39": "must be above controller.push_off_start, which is 0.4",
-    "controller.highest_angle=90 deg": r"its default, 96.2569 deg: .* 90 deg; give it .* overrides='controller.swing_angle=",
+    "controller.highest_angle=90 deg": r"its default, 96.2569 deg: .* 90 deg; give it .*'controller.swing_angle=",
     "actuator.angle_max=90 deg": "the gait needs 76 to 109 deg, this joint ends at 90 deg",
     "controller.swing_angle=135 deg": "lies outside the range of sensor and device, 20 deg to 130 deg",
     "wearer.shank_mass_centre=0.5 m": "lies beyond the ankle: wearer.shank_length is 0.46 m",

@@ -2,17 +2,19 @@
 
 import io
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from ppafo.analyses.walk.answer import comparison_table
 from ppafo.analyses.walk.wearers import wearers_finding
 from ppafo.report.finding import Section, text_of
 from ppafo.signals import Channel, Recording
 from ppafo.walking import WalkComparison, WalkResult, compare_walks, load_walk, walk, walk_population
-from ppafo.walking.figures import whole_walk
+from ppafo.walking.figures import task_sequence, whole_walk
 from ppafo.walking.figures.legs import animation, drags, frames_figure, last_phases, legs_of, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.population import population_figure
@@ -20,9 +22,6 @@ from ppafo.walking.figures.whole_walk import whole_walk_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.safety_events import acting_phase, failure_times
 from ppafo.walking.strides import settled
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 CONFIGURATIONS = ("solenoid", "proportional")
 
@@ -171,11 +170,21 @@ def test_histograms_hold_every_wearer() -> None:
     figure = population_figure(people)
     filled = next(patch for patch in figure.axes[0].patches if patch.get_fill())
     assert filled.get_data().values.sum() == 60  # type: ignore[attr-defined]
+    dashes = [line.get_linestyle() for line in figure.axes[0].lines[:3]]
+    assert dashes == ["--", "-", "--"], "percentiles and median differ in grey too"
     lines = text_of(wearers_finding(people)).splitlines()
     assert lines[0] == "proportional: 60 wearers, 0.1 min each"
     gas = [float(cell) for cell in next(line for line in lines if line.startswith("Gas")).split()[4:]]
     assert gas == sorted(gas)
     assert len(gas) == 5
+
+
+def test_the_name_of_a_segment_stands_upright_where_it_would_run_into_the_next() -> None:
+    segments = [SimpleNamespace(kind="walk", start=0.0, end=94.0), SimpleNamespace(kind="stand", start=94.0, end=100.0)]
+    worn: Any = SimpleNamespace(recording=SimpleNamespace(time=np.array([0.0, 100.0])), segments=segments)
+    axes = Figure().subplots()
+    task_sequence._name_segments(worn, np.array([0.0, 1.0]), axes)
+    assert [text.get_rotation() for text in axes.texts] == [0.0, 90.0]
 
 
 def test_the_walk_over_time_shows_no_push_off_where_the_device_did_not_push() -> None:

@@ -27,7 +27,7 @@ from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 from ppafo.walking.bottle.coupling import BottleLife, Schedule
-from ppafo.walking.bottle.course import WALKED, SupplyBalance, SupplyCourse
+from ppafo.walking.bottle.course import WALKED, SupplyBalance
 
 TIME_IS_UP = "time is up"
 Stop = Literal["supply", "frozen", "time"]
@@ -234,16 +234,8 @@ def discharge_of_life(life: BottleLife, draw: GasDemand) -> Discharge:
             TIME_IS_UP if ended.kind == WALKED else ended.kind, ended.message, course.last.mass, usable
         ),
         balance=course.balance,
-        record=partial(_recording_of_course, course),
+        record=lambda: course.recording,
     )
-
-
-def _recording_of_course(course: SupplyCourse) -> Recording:
-    return course.recording
-
-
-def _unchanged(values: Floats, _times: Floats) -> Floats:
-    return values
 
 
 def _recording(bottle: Bottle, stretches: Sequence[DischargeInterval]) -> Recording:
@@ -305,7 +297,7 @@ def solve_stretch(
 
     # A stretch may begin without a reserve, and the solver finds crossings only.
     if walking and to_spare(start, values) <= 0.0:
-        return DischargeInterval(start, start, flow, partial(_unchanged, values), values, "supply")
+        return DischargeInterval(start, start, flow, lambda _times: values, values, "supply")
     events: list[Any] = [kelvins_above_freezing, *([to_spare] if walking else [])]
     for event in events:
         # It ends the stretch where it falls through 0.

@@ -70,7 +70,14 @@ def demand_of_walk(walk: WalkGas) -> GasDemand:
 
 def read_walk_gas(folder: Path) -> WalkGas:
     """Return the gas of a walk from the folder that ``ppafo walk`` wrote; DataError where it says too little."""
-    file = _read_walk_file(folder / WALK_FILE)
+    path = folder / WALK_FILE
+    document = read_json(path)
+    if not isinstance(document, dict) or document.get("format") != WALK_FORMAT:
+        raise DataError(f"{path}: is not the result of a ppafo walk (its 'format' is not '{WALK_FORMAT}')")
+    file = _WalkFile(path, document)
+    status = file.table("status").get("kind", "completed")
+    if status != "completed":
+        raise DataError(f"{path}: the walk {status}, so it cannot be repeated")
     configuration = file.table("configuration")
     sequence = None if configuration.get("task_sequence") is None else file.table("configuration.task_sequence")
     metric = "gas" if sequence is None else "task_sequence_gas"
@@ -122,18 +129,6 @@ class _WalkFile:
                 f"{self.path}: '{name}' is {node:g}, which is impossible for a walk; repeat the walk with 'ppafo walk'"
             )
         return float(node)
-
-
-def _read_walk_file(path: Path) -> _WalkFile:
-    """Return the file of a walk; DataError for one that is none, or of a walk that failed."""
-    document = read_json(path)
-    if not isinstance(document, dict) or document.get("format") != WALK_FORMAT:
-        raise DataError(f"{path}: is not the result of a ppafo walk (its 'format' is not '{WALK_FORMAT}')")
-    file = _WalkFile(path, document)
-    status = file.table("status").get("kind", "completed")
-    if status != "completed":
-        raise DataError(f"{path}: the walk {status}, so it cannot be repeated")
-    return file
 
 
 def _walked(configuration: Mapping[str, Any], file: Path) -> Scenario | None:

@@ -234,32 +234,27 @@ def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> lis
     shown = sorted(
         (number for number in known if number.share >= _SHOWN or is_far[number.name]), key=lambda number: -number.share
     )
-    rows = [_tolerance_text(tolerance, before) for tolerance in shown]
+    rows = []
+    for tolerance in shown:
+        # With its own error, as stated and as fitted.
+        pairs = ((tolerance.before, tolerance.before_error), (tolerance.after, tolerance.after_error))
+        texts = []
+        for value, error in pairs:
+            # A unit with an offset, such as degC, has none in a difference.
+            (level, unit), (upper, _), (zero, _) = (
+                _shown(number, tolerance.name.partition(" of ")[0], tolerance.unit, before)
+                for number in (value, error, 0.0)
+            )
+            texts.append(f"{with_error(level, upper - zero)} {unit}".rstrip(" -"))
+        text = f"tolerance: {tolerance.name}: stated {texts[0]}, fitted {texts[1]}"
+        if tolerance.share >= _SHOWN:
+            text += f"; {percentage(tolerance.share, 2)} of the variance of {tolerance.widens}"
+        rows.append(text)
     rest = len(known) - len(shown)
     if rest:
         do = "does" if rest == 1 else "do"
         rows.append(f"{count_of(rest, 'other tolerance')} {do} not affect the intervals")
     return rows
-
-
-def _tolerance_text(tolerance: NuisanceParameter, before: ParameterSet) -> str:
-    """Return a tolerance as stated and as fitted, each with its error, and what it contributes to an interval."""
-    quantity, unit = tolerance.name.partition(" of ")[0], tolerance.unit
-
-    def with_its_error(value: float, error: float) -> str:
-        """Return a value and its error [SI] as text with the unit in which they are shown."""
-        # A unit with an offset, such as degC, has none in a difference.
-        (level, shown_unit), (upper, _), (zero, _) = (
-            _shown(number, quantity, unit, before) for number in (value, error, 0.0)
-        )
-        return f"{with_error(level, upper - zero)} {shown_unit}".rstrip(" -")
-
-    stated = with_its_error(tolerance.before, tolerance.before_error)
-    fitted = with_its_error(tolerance.after, tolerance.after_error)
-    text = f"tolerance: {tolerance.name}: stated {stated}, fitted {fitted}"
-    if tolerance.share < _SHOWN:
-        return text
-    return f"{text}; {percentage(tolerance.share, 2)} of the variance of {tolerance.widens}"
 
 
 def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[float, str]:

@@ -18,6 +18,7 @@ from ppafo.identification.problem import (
 )
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, source_of
 from ppafo.identification.tolerances import tolerances_of
+from ppafo.identification.trajectory.layout import ExperimentSection
 from ppafo.identification.trajectory.section import SectionContext, solve_section
 from ppafo.parameters.audit import findings_of
 from ppafo.parameters.loading import list_sets, load_parameter_set
@@ -35,7 +36,6 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     The procedures go first, in the order in which each leans on those before it, then the section [trajectory]. Raises
     the errors of ``identify``.
     """
-    given = _Given(problem, folder, file)
     name = problem.device.set
     beside = folder / name
     base = load_parameter_set(beside if beside.suffix == ".toml" else name)
@@ -44,7 +44,20 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     before = with_overrides(base, overrides, valve)
     with shown_in(counted_from(before.shown, atmospheric_pressure(before))):
         valve = chosen_valve(before, problem.device.valve)
-        tasks = _tasks(given, before)
+        tasks = [
+            _Task(
+                procedure,
+                tuple(
+                    one
+                    for recording in procedure.recordings
+                    for one in _sources(problem, folder / recording, file, procedure.columns, before)
+                ),
+                f"{file}: procedure {number}, {procedure.kind}",
+            )
+            for number, procedure in enumerate(problem.procedure, start=1)
+        ]
+        # In the order in which they are applied.
+        tasks.sort(key=lambda task: PROCEDURES.index(task.procedure.kind))
         used = _uses(tasks, before, valve, file)
         tolerances = tolerances_of(problem.bench, file)
         current, results = before, list[BenchResult]()
@@ -58,8 +71,19 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         estimates = [estimate for result in results for estimate in result.estimates]
         fitted = None
         if problem.trajectory is not None:
+
+            def read(experiment: ExperimentSection) -> RecordingSource:
+                recording, columns = experiment.recording, experiment.columns
+                source, *others = _sources(problem, folder / recording, file, columns, current)
+                if others:
+                    raise IdentificationError(
+                        f"{recording}: columns.{columns}.trial: an experiment has one recording, not "
+                        f"{1 + len(others)}: name one trial"
+                    )
+                return source
+
             setting = SectionContext(
-                read=lambda experiment: given.source(experiment.recording, experiment.columns, current),
+                read=read,
                 folder=folder,
                 file=f"{file}: trajectory",
                 parameter_set=current,
@@ -76,39 +100,22 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         return replace(identification, new_set=named)
 
 
-@dataclass(frozen=True, slots=True)
-class _Given:
-    """A problem as it was given: where its paths begin, and what messages call its file."""
+def _sources(
+    problem: ProblemFile, path: Path, file: str, columns: str | None, parameter_set: ParameterSet
+) -> tuple[RecordingSource, ...]:
+    """Return the recordings in a file that a problem names, read through one of its column maps if it says one.
 
-    problem: ProblemFile
-    folder: Path
-    file: str
-
-    def source(self, name: str, columns: str | None, parameter_set: ParameterSet) -> RecordingSource:
-        """Return the only recording in a file; IdentificationError where a map takes several trials of it."""
-        found = self.sources(name, columns, parameter_set)
-        if len(found) > 1:
-            raise IdentificationError(
-                f"{name}: columns.{columns}.trial: an experiment has one recording, not {len(found)}: name one trial"
-            )
-        return found[0]
-
-    def sources(self, name: str, columns: str | None, parameter_set: ParameterSet) -> tuple[RecordingSource, ...]:
-        """Return the recordings in a file that the problem names, read through one of its column maps if it says one.
-
-        The set has the atmosphere from which gauge pressures count, and the gas of volume flows.
-        """
-        path = self.folder / name
-        atmosphere = atmospheric_pressure(parameter_set)
-        if path.is_dir():
-            raise IdentificationError(f"{path}: is a folder, which has no hash; name the recording in it")
-        if columns is None:
-            return (source_of(path, read_recording(path, atmosphere=atmosphere)),)
-        molar_mass = number_in_si(parameter_set, "gas.molar_mass")
-        gas = "" if molar_mass is None else f"{molar_mass!r} kg/mol"
-        column_map, map_name = self.problem.columns[columns], f"{self.file}:{columns}"
-        recordings = read_trials(path, column_map, None, atmosphere, map_name, gas)
-        return tuple(source_of(path, one, one.label.removeprefix(path.stem)) for one in recordings)
+    The set has the atmosphere from which gauge pressures count, and the gas of volume flows.
+    """
+    atmosphere = atmospheric_pressure(parameter_set)
+    if path.is_dir():
+        raise IdentificationError(f"{path}: is a folder, which has no hash; name the recording in it")
+    if columns is None:
+        return (source_of(path, read_recording(path, atmosphere=atmosphere)),)
+    molar_mass = number_in_si(parameter_set, "gas.molar_mass")
+    gas = "" if molar_mass is None else f"{molar_mass!r} kg/mol"
+    recordings = read_trials(path, problem.columns[columns], None, atmosphere, f"{file}:{columns}", gas)
+    return tuple(source_of(path, one, one.label.removeprefix(path.stem)) for one in recordings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,46 +127,26 @@ class _Task:
     place: str
 
 
-def _tasks(given: _Given, before: ParameterSet) -> list[_Task]:
-    """Return the procedures in the order in which they are applied, each with its recordings."""
-    numbered = enumerate(given.problem.procedure, start=1)
-    return [
-        _Task(
-            procedure,
-            tuple(one for name in procedure.recordings for one in given.sources(name, procedure.columns, before)),
-            f"{given.file}: procedure {number}, {procedure.kind}",
-        )
-        for number, procedure in sorted(numbered, key=lambda pair: PROCEDURES.index(pair[1].kind))
-    ]
-
-
 def _uses(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -> tuple[UsedRecording, ...]:
     """Return what the procedures use of which recording.
 
     One recording may serve two procedures, which ask it other things; IdentificationError where it serves one twice.
     """
-    uses: list[UsedRecording] = []
-    for kind in PROCEDURES:
-        of_kind: list[UsedRecording] = []
-        for task in tasks:
-            if task.procedure.kind == kind:
-                first, last = window_of(task.procedure, ProcedureContext(before, valve, task.place))
-                of_kind += [
-                    UsedRecording(
-                        by=f"recording {number} of procedure {kind}",
-                        trace=source.trace,
-                        recording=source.recording,
-                        channels=frozenset(),
-                        first=first,
-                        last=last,
-                    )
-                    for number, source in enumerate(task.sources, start=1)
-                ]
+    uses: dict[str, list[UsedRecording]] = {}
+    for task in tasks:
+        kind = task.procedure.kind
+        window = window_of(task.procedure, ProcedureContext(before, valve, task.place))
+        uses.setdefault(kind, []).extend(
+            UsedRecording(
+                f"recording {number} of procedure {kind}", source.trace, source.recording, frozenset(), *window
+            )
+            for number, source in enumerate(task.sources, start=1)
+        )
+    for of_kind in uses.values():
         used_twice = double_use(of_kind)
         if used_twice:
             raise IdentificationError(f"{file}: {used_twice}")
-        uses += of_kind
-    return tuple(uses)
+    return tuple(use for of_kind in uses.values() for use in of_kind)
 
 
 _FILES_IN_TITLE = 4

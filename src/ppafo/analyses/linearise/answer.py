@@ -132,6 +132,13 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     when = "in its steady state" if model.time is None else f"at {model.time:g} s"
     steps, caption = partial(steps_panels, model), _STEPS_CAPTION
     far = Section("How far it holds", panels=steps, name="steps", caption=caption, across=2, size=(3.0, 2.8))
+    remarks = []
+    for edge in model.edges:
+        side, other = ("above", "below") if edge.is_above else ("below", "above")
+        remarks.append(
+            f"the plant has a kink at this point: the column of `{edge.name}` is valid {side} "
+            f"{_value_at_point(model, edge.name):.5g} only; its slope differs {other} it"
+        )
     return Finding(
         name="linearise",
         kicker="Linear model",
@@ -139,7 +146,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         said=_sentences(model),
         parts=[
             _point(model),
-            Section("Which side was taken", facts(model.sides.items()), remarks=_edges(model)),
+            Section("Which side was taken", facts(model.sides.items()), remarks=remarks),
             _poles(model),
             *_matrices(model),
             *([far] if can_step(model) else []),
@@ -178,19 +185,6 @@ def _point(model: LinearModel) -> Section:
             value = Kind("", unit, quantity_of_unit(variable.unit), ".5g").text(variable.value)
             rows.append((role, variable.name, variable.unit, value))
     return Section("The point", columns_of(("", "name", "unit in the model", "at the point"), rows), left=3)
-
-
-def _edges(model: LinearModel) -> list[str]:
-    """Return a remark on each kink of the plant that lies at the point."""
-    remarks = []
-    for edge in model.edges:
-        side, other = ("above", "below") if edge.is_above else ("below", "above")
-        value = _value_at_point(model, edge.name)
-        remarks.append(
-            f"the plant has a kink at this point: the column of `{edge.name}` is valid {side} {value:.5g} only; its "
-            f"slope differs {other} it"
-        )
-    return remarks
 
 
 def _poles(model: LinearModel) -> Section:

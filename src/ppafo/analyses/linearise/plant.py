@@ -171,7 +171,7 @@ def opens_in_proportion(run: Run) -> bool:
         valve = valve_at(limitless, functions, start | {"command": command})
         return np.array([*valve.openings, *valve.rates.values()])
 
-    return any(bool(np.any(one_sided_slopes(moved, value, 1.0, 1.0).values)) for value in (-0.5, 0.5))
+    return any(bool(np.any(one_sided_slopes(moved, value, 1.0, 1.0)[0])) for value in (-0.5, 0.5))
 
 
 # Slopes by differences: towards one side of a point, where the model may have a kink.
@@ -184,15 +184,8 @@ ORDERS = 5
 """Powers of the length of a difference that are taken out of its error."""
 
 
-class Slopes(NamedTuple):
-    """Slopes of some numbers (rows,), and estimates of their errors."""
-
-    values: Floats
-    errors: Floats
-
-
-def one_sided_slopes(function: Callable[[float], Floats], at: float, side: float, size: float) -> Slopes:
-    """Slopes of a function (rows,) at a number, towards one ``side`` (1 or -1).
+def one_sided_slopes(function: Callable[[float], Floats], at: float, side: float, size: float) -> tuple[Floats, Floats]:
+    """Slopes of a function (rows,) at a number, towards one ``side`` (1 or -1), and estimates of their errors.
 
     Differences of values on that side, from a hundredth of ``size`` to a millionth, extrapolated to none by
     Ridders' method (Adv. Eng. Softw. 4, 1982): of each row the slope whose two neighbours are nearest to it. The value
@@ -209,7 +202,7 @@ def one_sided_slopes(function: Callable[[float], Floats], at: float, side: float
         is_better = apart[nearest] < errors
         best, errors = np.where(is_better, better[nearest], best), np.where(is_better, apart[nearest], errors)
         slopes = better
-    return Slopes(best, errors)
+    return best, errors
 
 
 def side_of(name: str, values: Mapping[str, float], way: float | None) -> float:

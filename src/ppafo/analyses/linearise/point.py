@@ -2,13 +2,11 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from ppafo.analyses.linearise.plant import (
     VALVE,
-    LinearisedPlant,
     functions_in,
     one_sided_slopes,
     plant_of,
@@ -165,33 +163,21 @@ def _steady(run: Run, held: float | None, values: Mapping[str, float], wanted: f
     plant = plant_of(run, held, values)
     # The unknowns are all states, and the command where a torque is wanted.
     names = [*plant.at(values).rates, *([] if wanted is None else ["command"])]
-    reached = (_newton(partial(_imbalance, plant, wanted), names, start) for start in starts)
+
+    def imbalance(values: Mapping[str, float]) -> Floats:
+        """All rates over the sizes of their states [1/s], and the torque less the one that is wanted [N m]."""
+        found = plant.at(values)
+        # So that pascals and openings count alike.
+        rates = [rate / size_of(name) for name, rate in found.rates.items()]
+        return np.array([*rates, *([] if wanted is None else [found.outputs["torque"] - wanted])])
+
+    reached = (_newton(imbalance, names, start) for start in starts)
     return next((steady for steady in reached if steady is not None), None)
-
-
-def _imbalance(plant: LinearisedPlant, wanted: float | None, values: Mapping[str, float]) -> Floats:
-    """All rates over the sizes of their states [1/s], and the torque less the one that is wanted [N m]."""
-    found = plant.at(values)
-    # So that pascals and openings count alike.
-    rates = [rate / size_of(name) for name, rate in found.rates.items()]
-    return np.array([*rates, *([] if wanted is None else [found.outputs["torque"] - wanted])])
 
 
 def opening_names(values: Mapping[str, float]) -> list[str]:
     """Names of the openings of the valve among some values."""
     return [name for name in values if name in (f"{VALVE}requested", f"{VALVE}opening")]
-
-
-def _slopes(
-    function: Callable[[Mapping[str, float]], Floats], names: Sequence[str], values: Mapping[str, float]
-) -> Floats:
-    """Slopes of a function of named values (rows, names)."""
-
-    def along(name: str) -> Floats:
-        side, size = side_of(name, values, None), size_of(name)
-        return one_sided_slopes(lambda value: function({**values, name: value}), values[name], side, size).values
-
-    return np.array([along(name) for name in names]).T
 
 
 def _newton(
@@ -201,11 +187,17 @@ def _newton(
     sizes = np.array([size_of(name) for name in names])
     values = dict(start)
     residual = function(values)
+
+    def along(name: str) -> Floats:
+        """Slopes of the function by a value (rows,)."""
+        side, size = side_of(name, values, None), size_of(name)
+        return one_sided_slopes(lambda value: function({**values, name: value}), values[name], side, size)[0]
+
     for _ in range(_MOST_STEPS):
         largest = float(np.max(np.abs(residual)))
         if largest < STEADY:
             return values if abs(values["command"]) <= 1.0 + STEADY else None
-        slopes = _slopes(function, names, values)
+        slopes = np.array([along(name) for name in names]).T
         if not (np.isfinite(largest) and np.isfinite(slopes).all()):
             return None
         # Least squares instead of a solver that refuses: in a dead band the slopes are singular.

@@ -10,7 +10,6 @@ from ppafo.analyses.linearise.plant import (
     UNITS,
     VALVE,
     LinearisedPlant,
-    PlantValues,
     functions_in,
     one_sided_slopes,
     opens_in_proportion,
@@ -112,8 +111,12 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     values, plant = dict(point.values), plant_of(run, point.way, point.values, point.time or 0.0)
     here = plant.at(values)
     slopes = {name: _both_slopes(plant, values, name) for name in (*here.rates, *plant.inputs)}
-    # What the valve takes from its command at once is no state: nothing asks for what it was before.
-    idle = [name for name in here.rates if name.startswith(VALVE) and not _acts(here, name, slopes[name])]
+    # What the valve takes from its command at once is no state: nothing but the output that shows it asks for it.
+    rows, idle = [*(f"rate of {state}" for state in here.rates), *here.outputs], []
+    for name in (name for name in here.rates if name.startswith(VALVE)):
+        others = [row != name for row in rows]
+        if not any(np.any(side[others]) for side in slopes[name][:2]):
+            idle.append(name)
     states, outputs = ([name for name in names if name not in idle] for names in (here.rates, here.outputs))
     columns = [*states, *plant.inputs]
     is_row = [name not in idle for name in (*here.rates, *here.outputs)]
@@ -152,11 +155,5 @@ def _both_slopes(plant: LinearisedPlant, values: Mapping[str, float], name: str)
         return np.array([*found.rates.values(), *found.outputs.values()])
 
     side, size = side_of(name, values, plant.way), size_of(name)
-    taken, beyond = (one_sided_slopes(moved, values[name], way, size) for way in (side, -side))
-    return taken.values, beyond.values, taken.errors + beyond.errors
-
-
-def _acts(here: PlantValues, name: str, slopes: tuple[Floats, Floats, Floats]) -> bool:
-    """True where a state of the valve changes anything but the output that shows it."""
-    is_other = [row != name for row in (*(f"rate of {state}" for state in here.rates), *here.outputs)]
-    return any(bool(np.any(side[is_other])) for side in slopes[:2])
+    (taken, error), (beyond, other) = (one_sided_slopes(moved, values[name], way, size) for way in (side, -side))
+    return taken, beyond, error + other

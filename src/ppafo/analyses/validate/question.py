@@ -25,8 +25,6 @@ Recorded = Annotated["Recording | DataFrame | Dataset | str | Path", Word("RECOR
 Motion = Annotated[str, Word("free|measured|locked|leg")]
 Initial = Annotated[str, Word("CHANNEL=VALUE")]
 Limits = Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")]
-LARGEST_DELAY = 1.0
-"""Seconds; a recording that is later than this was not recorded with its command."""
 
 
 @checked
@@ -87,60 +85,18 @@ def validate(
     name_plugins(plugins)
     from ppafo.analyses.validate.answer import finding_of
     from ppafo.analyses.validate.result import Validation
-    from ppafo.errors import DataError
     from ppafo.parameters import load_device
-    from ppafo.storage.column_map import column_map_of
-    from ppafo.validation.agreement import ReplaySettings, compare_recording
+    from ppafo.validation.agreement import compare_recording, replay_settings
     from ppafo.validation.causes import causes_of
-    from ppafo.validation.compared import parse_thresholds
-    from ppafo.validation.initial import parse_initial
-    from ppafo.validation.measured import MeasuredRecording, read_measured
-    from ppafo.validation.replay import MOTIONS
-    from ppafo.wording import nearest_name, one_line
+    from ppafo.validation.measured import read_all
 
     report = progress or report_nothing
     device = load_device(parameter_set, overrides=overrides, valve=valve)
     device.check_pressurised("a validation, which counts in parts of the gauge supply pressure,")
-    if volume is not None and not volume > 0.0:
-        raise DataError(f"volume of {volume:g} m^3: must be above 0")
-    if not 0.0 <= longest_delay <= LARGEST_DELAY:
-        raise DataError(f"longest delay of {longest_delay:g} s: must be from 0 to {LARGEST_DELAY:g} s")
-    chosen = next((known for known in MOTIONS if known == motion), None)
-    if chosen is None:
-        near = nearest_name(motion, MOTIONS)
-        raise DataError(f"motion '{one_line(motion)}' is not one of {', '.join(MOTIONS)}{near}")
-    if volume is not None and chosen != "free":
-        raise DataError(
-            f"motion '{chosen}': a fixed volume has no vane that could move; give motion or volume, not both"
-        )
-    settings = ReplaySettings(
-        motion=chosen,
-        initial=parse_initial(initial, device.supply.atmospheric_pressure),
-        longest_delay=longest_delay,
-        thresholds=parse_thresholds(thresholds),
-        volume=volume,
-    )
-    if not recordings:
-        raise DataError("no recording was given; name at least one .csv or .nc file or result folder")
-    column_map, map_name = (None, "") if columns is None else column_map_of(columns)
-    read: list[MeasuredRecording] = []
-    for path in recordings:
-        measured = read_measured(path, device, column_map, map_name)
-        # Given twice, under two names too, a recording would count twice as evidence.
-        same = next((recording_read.file for recording_read in read if recording_read.sha256 == measured.sha256), None)
-        if same is not None:
-            raise DataError(f"{measured.file}: the same recording as {same}; give each once")
-        read.append(measured)
-    agreements = []
+    settings = replay_settings(device, motion, volume, initial, thresholds, longest_delay)
+    read, agreements = read_all(recordings, device, columns), []
     for measured in read:
         report(Progress(f"replaying {measured.file}"))
         agreements.append(compare_recording(measured, device, settings))
-    validation = Validation(
-        parameter_set=str(parameter_set),
-        device=device,
-        overrides=tuple(overrides),
-        settings=settings,
-        recordings=tuple(agreements),
-        causes=causes_of(read, agreements, device, settings, report),
-    )
-    return finding_of(validation)
+    causes = causes_of(read, agreements, device, settings, report)
+    return finding_of(Validation(str(parameter_set), device, tuple(overrides), settings, tuple(agreements), causes))

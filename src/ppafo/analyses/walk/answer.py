@@ -1,7 +1,7 @@
 """A walk of one wearer with and without the device, in words, tables and figures."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -20,7 +20,6 @@ from ppafo.analyses.walk.task_sequence import (
 from ppafo.arguments.door import argument_text
 from ppafo.control.walking.assistance import PEAKS
 from ppafo.documents.json_text import plain
-from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
 from ppafo.report.display_units import quantity_text
@@ -29,7 +28,6 @@ from ppafo.report.kind import Kind
 from ppafo.report.live_parts import live_part
 from ppafo.running import tried
 from ppafo.simulation.gains import gains_of
-from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking import Tracking, following_text
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
@@ -98,15 +96,6 @@ def safety_remarks(worn: WalkResult) -> list[str]:
     return remarks
 
 
-def over_time_parts(worn: WalkResult) -> tuple[Section, ...]:
-    """Return the walk over time, where something happened in it."""
-    # A figure of an even walk shows nothing that the mean stride does not.
-    if not worn.events and not failure_times(worn.scenario):
-        return ()
-    draw = partial(whole_walk_figure, worn)
-    return (Section("The walk over time", name="over-time", caption=_OVER_TIME, draw=draw, is_detail=True),)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkPair:
     """Result of a walk with the device beside one without it, in the form that is printed and kept.
@@ -119,24 +108,17 @@ class WalkPair:
 
     def json_document(self) -> dict[str, Any]:
         """Return metrics with the device, without it and of a healthy ankle, and events, as plain data in SI."""
-        worn = self.comparison.with_device
+        worn, verdict = self.comparison.with_device, self.tracking
         return {
             **walk_data(WALK_FORMAT, SCHEMA_VERSION, self.comparison),
-            **torque_loop_data(worn, self.tracking),
+            "tracking": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
+            "gains": plain(gains_of(worn.scenario, law_of(worn.scenario))),
             "minutes": float(worn.recording.time[-1]) / 60.0,
             **task_sequence_data(self.comparison),
             **bottle_data(worn),
             "metrics_vented": plain(dict(worn.vented_metrics)),
             "healthy": plain(dict(self.comparison.healthy)),
         }
-
-
-def torque_loop_data(worn: WalkResult, verdict: Tracking | None) -> dict[str, Any]:
-    """Return the gains in force, and the verdict where the torque does not follow, as plain data in SI."""
-    return {
-        "tracking": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
-        "gains": plain(gains_of(worn.scenario, law_of(worn.scenario))),
-    }
 
 
 SCHEMA_VERSION = 1
@@ -198,14 +180,26 @@ def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
     along = "" if motion.task_sequence is None else f", task sequence {motion.task_sequence.name}"
     assumed = [(assumption.path, assumption.note) for assumption in configuration.assumptions]
     verdict = tried(configuration, worn.tracking)
+    # How the torque follows what is requested, and the gains in force with their origin.
+    in_force = gains_of(configuration, law_of(configuration))
+    follows = following_text(worn) if verdict is None and "strides" in worn.metrics else ""
+    first_lines = [follows if verdict is None else verdict.sentence, "" if in_force is None else in_force.sentence]
+    gait, overrides = motion.gait, configuration.origin.overrides
+    title = f" ({gait.title})" if gait.title else ""
+    set_up = (
+        configuration.description,
+        f"device '{configuration.device.name}', gait '{gait.name}'{title}",
+        law_of(configuration).summary,
+        f"values changed for this walk: {', '.join(overrides)}" if overrides else "",
+    )
     ended = f"{configuration.name}: {worn.status.kind}, {strides} of {motion.gait.name}{along}"
     return Finding(
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
         title=f"Walking with {configuration.name}",
-        said=(ended, *first_lines(worn, verdict)),
+        said=(ended, *filter(None, first_lines)),
         parts=(
-            Section(said=_set_up(configuration), is_detail=True),
+            Section(said=[sentence for sentence in set_up if sentence], is_detail=True),
             *task_sequence_parts(comparison),
             Section(columns=comparison_table(comparison), remarks=_remarks(comparison)),
             *bottle_parts(worn),
@@ -230,19 +224,6 @@ def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
         },
         live=partial(live_part, [configuration]),
     )
-
-
-def _set_up(configuration: Scenario) -> list[str]:
-    """Return what walks: description, device, gait, law, and what was changed for this walk."""
-    gait, overrides = walk_of(configuration).gait, configuration.origin.overrides
-    title = f" ({gait.title})" if gait.title else ""
-    sentences = (
-        configuration.description,
-        f"device '{configuration.device.name}', gait '{gait.name}'{title}",
-        law_of(configuration).summary,
-        f"values changed for this walk: {', '.join(overrides)}" if overrides else "",
-    )
-    return [sentence for sentence in sentences if sentence]
 
 
 def _remarks(comparison: WalkComparison) -> list[str]:
@@ -271,9 +252,10 @@ def _pictures(comparison: WalkComparison) -> Sequence[Section]:
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is not None:
         return task_sequence_pictures(comparison)
-    over_time = over_time_parts(worn)
-    if not (worn.averages and bare.averages):
-        return over_time
+    figures: list[tuple[str, str, str, Callable[[], Any]]] = []
+    # A figure of an even walk over time shows nothing that the mean stride does not.
+    if worn.events or failure_times(worn.scenario):
+        figures.append(("The walk over time", "over-time", _OVER_TIME, partial(whole_walk_figure, worn)))
     walks = {"with the device": worn, "without": bare}
     of_mean_stride = (
         ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
@@ -281,13 +263,11 @@ def _pictures(comparison: WalkComparison) -> Sequence[Section]:
         ("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn)),
         ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
     )
-    return (
-        *over_time,
-        *(
-            Section(heading, name=name, caption=caption, draw=draw, is_detail=True)
-            for heading, name, caption, draw in of_mean_stride
-        ),
-    )
+    figures += of_mean_stride if worn.averages and bare.averages else ()
+    return [
+        Section(heading, name=name, caption=caption, draw=draw, is_detail=True)
+        for heading, name, caption, draw in figures
+    ]
 
 
 def comparison_table(comparison: WalkComparison) -> list[Column]:
@@ -301,32 +281,16 @@ def comparison_table(comparison: WalkComparison) -> list[Column]:
     columns: list[tuple[str, dict[str, float | str | None]]] = []
     for head, metrics in (*walked, ("healthy", comparison.healthy)):
         values: dict[str, float | str | None] = {"body_mass": walk_of(worn.scenario).wearer.body_mass}
-        values |= per_stride_values(metrics)
-        values |= {
-            name: toes(metric.value) if name == "lowest_toes" else metric.value for name, metric in metrics.items()
-        }
+        values |= {name: metric.value for name, metric in metrics.items()}
+        values["lowest_toes"] = toes(metrics["lowest_toes"].value) if "lowest_toes" in metrics else None
+        if "command_reversals" in metrics and "strides" in metrics and metrics["strides"].value > 0.0:
+            values[REVERSALS_PER_STRIDE] = metrics["command_reversals"].value / metrics["strides"].value
         columns.append((head, values))
     columns[0][1][LARGEST_TORQUE] = worn.scenario.controller.settings.get(LARGEST_TORQUE)
     # The positive work of a healthy ankle is what the device's is a share of.
     if "positive_push_off_work" in comparison.healthy:
         columns[-1][1]["push_off_share"] = 1.0
     return metrics_table(_NUMBERS, columns)
-
-
-def per_stride_values(metrics: Mapping[str, Metric]) -> dict[str, float | None]:
-    """Return the reversals of the command per stride of a walk that has whole strides."""
-    strides = metrics["strides"].value if "strides" in metrics else 0.0
-    if "command_reversals" not in metrics or strides == 0.0:
-        return {}
-    return {REVERSALS_PER_STRIDE: metrics["command_reversals"].value / strides}
-
-
-def first_lines(worn: WalkResult, verdict: Tracking | None) -> list[str]:
-    """Return how the torque follows what is requested, and the gains in force with their origin."""
-    in_force = gains_of(worn.scenario, law_of(worn.scenario))
-    follows = following_text(worn) if verdict is None and "strides" in worn.metrics else ""
-    said = [follows if verdict is None else verdict.sentence, "" if in_force is None else in_force.sentence]
-    return [sentence for sentence in said if sentence]
 
 
 def strides_csv(result: WalkResult) -> bytes:

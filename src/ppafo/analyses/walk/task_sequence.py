@@ -7,7 +7,7 @@ from typing import Any
 
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes
 from ppafo.errors import DataError
-from ppafo.gait.gait import Gait, speed_range
+from ppafo.gait.gait import speed_range
 from ppafo.report.display_units import si_unit
 from ppafo.report.finding import Column, Section
 from ppafo.simulation.scenario import Scenario
@@ -158,7 +158,9 @@ def trust_remark(configuration: Scenario) -> str:
         low, high = speed_range(gait)
     except DataError:
         return f"gait '{gait.name}' has no walking speed: how far its strides can be scaled is not known"
-    speeds = [*_given(sequence, "speed"), *(_speed_at(cadence, gait) for cadence in _given(sequence, "cadence"))]
+    # A cadence counts both feet; the speed goes with its square, as the walk ratio is constant.
+    ratios = [0.5 * cadence * gait.stride_time for cadence in _given(sequence, "cadence")]
+    speeds = [*_given(sequence, "speed"), *((gait.walking_speed or 0.0) * ratio * ratio for ratio in ratios)]
     # A speed at the edge, written in another unit, is not beyond it.
     beyond = [speed for speed in speeds if not low - _SAME_SPEED <= speed <= high + _SAME_SPEED]
     if not beyond:
@@ -173,12 +175,3 @@ def trust_remark(configuration: Scenario) -> str:
 def _given(sequence: TaskSequence, name: str) -> list[float]:
     """Return a number [SI] of all segments that state it."""
     return [segment.values[name] for segment in sequence.segments if name in segment.values]
-
-
-def _speed_at(cadence: float, gait: Gait) -> float:
-    """Return the speed [m/s] of a gait at a cadence [1/s] of steps, which counts both feet.
-
-    The speed goes with the square of the cadence, as the walk ratio is constant.
-    """
-    ratio = 0.5 * cadence * gait.stride_time
-    return (gait.walking_speed or 0.0) * ratio * ratio

@@ -83,6 +83,9 @@ def wearers_finding(population: Population) -> Finding[Wearers]:
         )
     if population.diverged:
         remarks.append(population.message)
+    # One line for each wearer, in SI units.
+    columns = {f"{name} [{trait.unit}]": population.traits[name] for name, trait in TRAITS.items()}
+    columns |= {f"{name} [{outcome.unit}]": population.outcomes[name] for name, outcome in OUTCOMES.items()}
     draw = partial(population_figure, population)
     figure = Section("The wearers", name="wearers", caption=_WEARERS_CAPTION, draw=draw, is_detail=True)
     return Finding(
@@ -98,16 +101,9 @@ def wearers_finding(population: Population) -> Finding[Wearers]:
         ),
         found=Wearers(population),
         passed=not population.diverged,
-        files={"wearers.csv": partial(wearers_csv, population)},
+        files={"wearers.csv": partial(csv_of, columns)},
         command="walk",
     )
-
-
-def wearers_csv(population: Population) -> bytes:
-    """Return one line for each wearer, in SI units."""
-    columns = {f"{name} [{trait.unit}]": population.traits[name] for name, trait in TRAITS.items()}
-    columns |= {f"{name} [{outcome.unit}]": population.outcomes[name] for name, outcome in OUTCOMES.items()}
-    return csv_of(columns)
 
 
 def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, WearerQuantity]) -> dict[str, dict[str, object]]:

@@ -165,7 +165,7 @@ def force_of_plates(
         for name in [column for column in names if column in table.columns]:
             values, _ = CurveColumns("vertical_force.unit", table, ((1.0, name),), True).in_unit(None, ("N",))
             plate = with_absence(Signal(table.file, table.time, values / (body_mass * STANDARD_GRAVITY)))
-            own = [contact for contact in contacts_of(plate) if _is_own(contact, plate, shank)]
+            own = [(start, end) for start, end in contacts_of(plate) if _is_own(start, end, plate, shank)]
             if own:
                 step = 1.0 / plate.rate
                 starts = [-np.inf if start is None else start - step for start, _ in own]
@@ -184,17 +184,14 @@ def force_of_plates(
     ]
 
 
-def _is_own(contact: Contact, plate: Signal, shank: Signal) -> bool:
-    start, end = (
-        plate.time[0] if contact[0] is None else contact[0],
-        plate.time[-1] if contact[1] is None else contact[1],
-    )
-    start, end = max(float(start), float(shank.time[0])), min(float(end), float(shank.time[-1]))
-    if end <= start:
+def _is_own(start: float | None, end: float | None, plate: Signal, shank: Signal) -> bool:
+    least = _LEAST_LEAN_OF_PART if start is None or end is None else _LEAST_LEAN
+    first = max(float(plate.time[0] if start is None else start), float(shank.time[0]))
+    last = min(float(plate.time[-1] if end is None else end), float(shank.time[-1]))
+    if last <= first:
         return False
     # Over its own contact the shank leans forward, so that its angle falls.
-    before, after = np.interp([start, end], shank.time, shank.values)
-    least = _LEAST_LEAN if None not in contact else _LEAST_LEAN_OF_PART
+    before, after = np.interp([first, last], shank.time, shank.values)
     return bool(before - after > least * np.ptp(shank.values))
 
 
@@ -386,13 +383,9 @@ def _strides_of_file(tables: Sequence[MotionTable], side: Side) -> list[Stride]:
     if len(trials) != 1:
         return []
     strikes, offs = (trials[0].events.get((side, kind), []) for kind in (STRIKE, OFF))
-    strides = []
-    for start, end in pairwise(strikes):
-        # Two toe-offs between two strikes are a missed strike: such a stride is none.
-        between = [time for time in offs if start < time < end]
-        if len(between) == 1:
-            strides.append(Stride(start, between[0], end))
-    return strides
+    between = {(start, end): [time for time in offs if start < time < end] for start, end in pairwise(strikes)}
+    # Two toe-offs between two strikes are a missed strike: such a stride is none.
+    return [Stride(start, times[0], end) for (start, end), times in between.items() if len(times) == 1]
 
 
 def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[list[Stride], str]:

@@ -21,16 +21,6 @@ class Convention:
     remarks: tuple[str, ...] = ()
 
 
-def any_file(_path: str | Path) -> bool:
-    """Recognise every file with a suffix of the form."""
-    return True
-
-
-def as_it_is(table: MotionTable) -> MotionTable:
-    """Return a table as it was read."""
-    return table
-
-
 @dataclass(frozen=True, slots=True)
 class GaitForm:
     """A form of gait recordings: its name, a summary in a phrase, and suffixes in lower case, with their dot.
@@ -47,6 +37,6 @@ class GaitForm:
     suffixes: tuple[str, ...]
     read: Callable[[str | Path], MotionTable]
     convention: Callable[[MotionTable, Side, float], Convention]
-    recognises: Callable[[str | Path], bool] = any_file
-    arrange: Callable[[MotionTable], MotionTable] = as_it_is
+    recognises: Callable[[str | Path], bool] = lambda _path: True
+    arrange: Callable[[MotionTable], MotionTable] = lambda table: table
     is_whole: bool = False

@@ -4,13 +4,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.agreement import check_side, delay_remarks, size_remarks
 from ppafo.gait.document import load_gait
-from ppafo.gait.gait import HARMONICS, REQUIRED, FitError, Gait, GaitCurve, Origin, fit_curve
+from ppafo.gait.gait import HARMONICS, REQUIRED, FitError, Gait, Origin, fit_curve
 from ppafo.gait.mean_stride import MeanStride
 from ppafo.gait.plausible import check_force_scale, check_plausible, force_remarks, moment_remarks
 from ppafo.gait.plausible_angles import sign_remarks, standing_tilt, zero_remarks
@@ -253,7 +254,7 @@ def _gait(
     settings: ImportSettings,
     tables: Sequence[MotionTable],
     strides: Sequence[Stride],
-    curves: Mapping[str, GaitCurve],
+    curves: Mapping[str, Any],
     events: str,
 ) -> Gait:
     """Return the gait of mean strides and their series, with where it comes from."""
@@ -272,13 +273,7 @@ def _gait(
         stride_time_deviation=_spread([stride.time for stride in strides]),
         stance_share_deviation=_spread([stride.stance_share for stride in strides]),
         strides=len(strides),
-        shank_angle=curves["shank_angle"],
-        ankle_angle=curves["ankle_angle"],
-        ankle_moment=curves.get("ankle_moment"),
-        vertical_force=curves.get("vertical_force"),
-        centre_of_pressure=curves.get("centre_of_pressure"),
-        knee_forward=curves.get("knee_forward"),
-        knee_up=curves.get("knee_up"),
+        **curves,
     )
 
 

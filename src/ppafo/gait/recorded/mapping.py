@@ -6,7 +6,6 @@ before it subtracts it.
 
 import math
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -144,16 +143,12 @@ def column_names(mapped: object) -> tuple[str, ...]:
     """Return the columns that the map of one curve names, a minus before those that are subtracted."""
     if isinstance(mapped, KneeMap):
         return (*mapped.forward, *mapped.up, *(mapped.thigh or ()))
-    if isinstance(mapped, ShankMap) and mapped.terms is None:
-        return _marker_columns((mapped.knee, mapped.ankle), mapped.forward, mapped.vertical)
-    if isinstance(mapped, AngleMap) and mapped.terms is None:
-        return _marker_columns((mapped.heel, mapped.toe), mapped.forward, mapped.vertical)
+    if isinstance(mapped, ShankMap | AngleMap) and mapped.terms is None:
+        markers = (mapped.knee, mapped.ankle) if isinstance(mapped, ShankMap) else (mapped.heel, mapped.toe)
+        axes = mapped.forward.removeprefix("-"), mapped.vertical
+        return tuple(f"{marker}.{axis}" for marker in markers for axis in axes)
     terms: tuple[str, ...] = getattr(mapped, "terms")  # noqa: B009  # every other map has them, by its own class
     return terms
-
-
-def _marker_columns(markers: Sequence[str | None], forward: str, vertical: str) -> tuple[str, ...]:
-    return tuple(f"{marker}.{axis}" for marker in markers for axis in (forward.removeprefix("-"), vertical))
 
 
 def unsaid_axes(columns: GaitMap) -> list[str]:

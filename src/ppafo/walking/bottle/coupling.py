@@ -183,7 +183,7 @@ def _use_bottle(
     states = row_numbers(batch.program.state_rows())
     regulated, lines = ([row for path, row in states.items() if path.endswith(end)] for end in (REGULATED, _LINE))
     every, walked_before = max(1, round(supply.coupling / run.step)), use.walked
-    lanes = _lanes_of(run, device, use.met[0].offered.gas_temperature)
+    lanes = _Lanes.of(run, device, use.met[0].offered.gas_temperature)
     # The line falls for a moment at each draw: its best over some strides counts, of two meetings at least.
     window = max(2, math.ceil(_STRIDES * stride_time / (every * run.step))) * every
     # The line starts at the set pressure.
@@ -259,6 +259,16 @@ class _Lanes:
     device: Device
     effects: tuple[Effect, ...]
 
+    @classmethod
+    def of(cls, run: Run, device: Device, start: float) -> "_Lanes":
+        """Return the lanes of a run, whose numbers were planned for gas of a temperature [K]."""
+        assert run.lines is not None, "a bottle feeds lines"
+        effects = tuple(effect for effect in run.program.effects if effect.is_of_device)
+        names = row_numbers(run.program.parameter_rows())
+        of_effects = [path for effect in effects for path in leaf_paths(effect.parameters, effect.name)]
+        rows = [names[path] for path in (*_PARAMETERS, *of_effects)]
+        return cls(rows, run.plant, run.lines.parameters.volume_1, start, device, effects)
+
     def parameters(self, now: SupplyNow) -> Floats:
         """Return the parameters that follow the supply.
 
@@ -278,22 +288,6 @@ class _Lanes:
         plant = self.plant
         pressure = mass * plant.gas_product * now.gas_temperature / (self.start * self.volume)
         return (pressure - plant.atmospheric_pressure) / (plant.supply_pressure - plant.atmospheric_pressure)
-
-
-def _lanes_of(run: Run, device: Device, start: float) -> _Lanes:
-    """Return the lanes of a run, whose numbers were planned for gas of a temperature [K]."""
-    assert run.lines is not None, "a bottle feeds lines"
-    effects = tuple(effect for effect in run.program.effects if effect.is_of_device)
-    names = row_numbers(run.program.parameter_rows())
-    of_effects = [path for effect in effects for path in leaf_paths(effect.parameters, effect.name)]
-    return _Lanes(
-        rows=[names[path] for path in (*_PARAMETERS, *of_effects)],
-        plant=run.plant,
-        volume=run.lines.parameters.volume_1,
-        start=start,
-        device=device,
-        effects=effects,
-    )
 
 
 def _ending(supply: BottleSupply, meeting: _Meeting, reached: float) -> SupplyEnding | None:

@@ -47,16 +47,27 @@ def bottle_figure(result: WalkResult) -> "Figure":
         for name, label, colour in _MASSES
         if name in values
     ]
+    temperatures = [
+        Mark("line", times, values[name], label=label, colour=colour) for name, label, colour in _TEMPERATURES
+    ]
+    if supply.supply.line.freezes > 0.5:
+        dry_ice = supply.supply.line.temperatures[0]
+        temperatures.append(Mark("level", y=dry_ice, label="dry ice", colour=VERMILION, style=_DASHED))
+    regulator = supply.supply.bottle.regulator
+    needed = regulator.set_pressure + regulator.pressure_margin
     panel = partial(_panel, end, Mark("at", supply.ending.time, colour=VERMILION, style={"linewidth": 1.0}))
     return draw_panels(
         [
             panel(Kind("Pressure behind the regulator", "Pa_a", "pressure"), _marks_behind(result, supply)),
             panel(
                 Kind("Pressure in the bottle", "Pa_a", "pressure"),
-                _marks_inside(supply),
+                [
+                    Mark("level", y=needed, label="needed", colour=VERMILION, style=_DASHED),
+                    Mark("line", times, values["bottle_pressure"], label="bottle"),
+                ],
                 largest=float(np.max(values["bottle_pressure"])),
             ),
-            panel(Kind("Temperature", "K", "temperature"), _temperature_marks(supply)),
+            panel(Kind("Temperature", "K", "temperature"), temperatures),
             panel(
                 Kind("Peak torque of each stride", "N m", "torque"),
                 torque,
@@ -83,28 +94,6 @@ def _marks_behind(result: WalkResult, supply: SupplyCourse) -> list[Mark]:
         marks.append(
             Mark("band", recording.time[starts[:-1]], (lowest, highest), label="line, in a stride", style=look)
         )
-    return marks
-
-
-def _marks_inside(supply: SupplyCourse) -> list[Mark]:
-    """Return the pressure in the bottle, and the one that the regulator needs there."""
-    regulator = supply.supply.bottle.regulator
-    needed = regulator.set_pressure + regulator.pressure_margin
-    return [
-        Mark("level", y=needed, label="needed", colour=VERMILION, style=_DASHED),
-        Mark("line", supply.times, supply.values["bottle_pressure"], label="bottle"),
-    ]
-
-
-def _temperature_marks(supply: SupplyCourse) -> list[Mark]:
-    """Return the temperatures along the gas path, and the temperature of dry ice if the gas may freeze."""
-    marks = [
-        Mark("line", supply.times, supply.values[name], label=label, colour=colour)
-        for name, label, colour in _TEMPERATURES
-    ]
-    if supply.supply.line.freezes > 0.5:
-        dry_ice = supply.supply.line.temperatures[0]
-        marks.append(Mark("level", y=dry_ice, label="dry ice", colour=VERMILION, style=_DASHED))
     return marks
 
 

@@ -390,7 +390,7 @@ def animation(comparison: WalkComparison) -> bytes:
             lamp.get_bbox_patch().set_facecolor(colour)
             cursor.axes.draw_artist(cursor)
             cursor.axes.draw_artist(lamp)
-            images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").copy())
+            images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
         sheet = Image.fromarray(np.concatenate([np.asarray(image) for image in images[:: _PER_STRIDE // 5]]))
         palette = sheet.quantize(_COLOURS, dither=Image.Dither.NONE)
         tones = palette.getpalette() or []

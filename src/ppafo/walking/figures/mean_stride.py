@@ -63,6 +63,11 @@ def walk_figure(walks: Mapping[str, _MeanStrideData]) -> "Figure":
     ankle = clinical_angle(gait.ankle_angle.values_at(PHASES))
     healthy = {ANGLE: (ankle, gait.ankle_angle.deviation), TOES: (healthy_toe_height(first.scenario), 0.0)}
     panels: list[Panel] = []
+
+    def whole_stride(axes: "Axes") -> None:
+        axes.set_xlim(0.0, 100.0)
+        axes.locator_params(axis="y", nbins=5)
+
     for kind, channels in _CHANNELS.items():
         thin = {"linewidth": 0.8, "linestyle": "-."}
         marks = [Mark("at", gait.stance_share, label="toe-off", colour=GREY, style=thin)]
@@ -85,7 +90,7 @@ def walk_figure(walks: Mapping[str, _MeanStrideData]) -> "Figure":
             look = {"linewidth": 1.2, "linestyle": (0, (1, 1.2))}
             marks.append(Mark("line", PHASES, mean, label="healthy gait", colour=HEALTHY, style=look))
             marks.append(replace(_band(mean, deviation, GREY, 0.15), label="band: standard deviation"))
-        panels.append(Panel(STRIDE, kind, marks, legend="", then=_whole_stride, shares_x=True))
+        panels.append(Panel(STRIDE, kind, marks, legend="", then=whole_stride, shares_x=True))
     panels[0] = replace(panels[0], legend="figure")
     return draw_panels(
         panels,
@@ -97,9 +102,3 @@ def walk_figure(walks: Mapping[str, _MeanStrideData]) -> "Figure":
 
 def _band(mean: Floats, deviation: Floats | float, colour: str, alpha: float) -> Mark:
     return Mark("band", PHASES, (mean - deviation, mean + deviation), colour=colour, style={"alpha": alpha})
-
-
-def _whole_stride(axes: "Axes") -> None:
-    """Let a panel show one stride from heel strike to heel strike [%]."""
-    axes.set_xlim(0.0, 100.0)
-    axes.locator_params(axis="y", nbins=5)

@@ -29,8 +29,8 @@ _PHASES = {
 }
 """Name and colour of each phase in the strip under the torque; they differ in grey too."""
 _SHADED, _LESS_HELP = "#f3f3f3", "#cc3311"
-_NARROWEST = 0.045
-"""Fraction of the task sequence below which the name of a segment stands upright."""
+_LETTER = 0.0135
+"""Fraction of the task sequence that a letter of a segment's name takes; a name without that room stands upright."""
 _ROOM = 2.2
 """Height of the panel of the pace over its curve, for the names of the segments above it."""
 _STRIP, _STRIP_GAP = 0.18, 0.05
@@ -66,7 +66,12 @@ def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
     losses = [part.safe_time for part in worn.segments if part.safe_time is not None]
     segments = [*shaded, *(Mark("at", loss, colour=_LESS_HELP, style={"linewidth": 1.2}) for loss in losses)]
     set_limits = partial(_set_limits, float(time[-1]))
-    panels = [_pace_panel(worn, segments)]
+    # The walking speed, or strides per second where there is none, under the names of the segments.
+    has_speed = "walking_speed" in recording
+    pace_kind = Kind("Walking speed", "m/s", "velocity") if has_speed else Kind("Strides per second", "Hz", "frequency")
+    pace = recording["walking_speed" if has_speed else "stride_frequency"]
+    curve, name_segments = Mark("line", time, pace, colour=BLACK), partial(_name_segments, worn, pace)
+    panels = [Panel(TIME, pace_kind, [*segments, curve], then=name_segments, shares_x=True)]
     panels += [
         Panel(TIME, kind, [*segments, *marks], then=set_limits, shares_x=True) for kind, marks in marks_by_kind.items()
     ]
@@ -80,22 +85,14 @@ def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
     )
 
 
-def _pace_panel(worn: WalkResult, segments: list[Mark]) -> Panel:
-    """Return the walking speed, or strides per second where there is none, under the names of the segments."""
-    recording = worn.recording
-    has_speed = "walking_speed" in recording
-    kind = Kind("Walking speed", "m/s", "velocity") if has_speed else Kind("Strides per second", "Hz", "frequency")
-    pace = recording["walking_speed" if has_speed else "stride_frequency"]
-    curve = Mark("line", recording.time, pace, colour=BLACK)
-    return Panel(TIME, kind, [*segments, curve], then=partial(_name_segments, worn, pace), shares_x=True)
-
-
 def _name_segments(worn: WalkResult, pace: Floats, axes: "Axes") -> None:
     """Name the segments above the curve of the pace, with room for that."""
+    from matplotlib.patheffects import withStroke
+
     end = float(worn.recording.time[-1])
     for segment in worn.segments:
-        is_narrow = segment.end - segment.start < _NARROWEST * end
-        axes.text(
+        is_narrow = segment.end - segment.start < _LETTER * len(segment.kind) * end
+        name = axes.text(
             0.5 * (segment.start + segment.end),
             0.96,
             segment.kind,
@@ -104,8 +101,10 @@ def _name_segments(worn: WalkResult, pace: Floats, axes: "Axes") -> None:
             ha="center",
             va="top",
             fontsize=8,
-            color=GREY,
+            color=BLACK,
         )
+        # Readable where a line goes through it.
+        name.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
     axes.set_ylim(-0.05 * float(pace.max()), _ROOM * float(pace.max()) + 0.01)
     _set_limits(end, axes)
 

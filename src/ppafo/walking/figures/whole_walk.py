@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -52,11 +52,13 @@ def whole_walk_figure(result: WalkResult) -> "Figure":
     dashed = {"linewidth": 0.9, "linestyle": "--"}
     lines += [Mark("at", failure, colour=GREY, style=dashed) for failure in failed.values()]
     name_failures = partial(_name_failures, failed, end, axis)
-    phase = Kind("Phase of the controller")
+    phase, look = Kind("Phase of the controller"), {"linewidth": 0.9, "drawstyle": "steps-post"}
+    has_phases = "controller_phase" in recording
+    phases = [Mark("line", time, acting_phase(recording), colour=BLACK, style=look)] if has_phases else []
     panels = [
         Panel(axis, GAS, [Mark("line", time, recording["supplied_mass"]), *lines], then=name_failures, shares_x=True),
         Panel(axis, TOES, [Mark("line", time, recording["toe_height"], style=THIN), GROUND, *lines], shares_x=True),
-        Panel(axis, phase, [*_phase_marks(recording), *lines], then=_name_phases, shares_x=True),
+        Panel(axis, phase, [*phases, *lines], then=_name_phases, shares_x=True),
     ]
     if "safe_state" in recording:
         panels.append(_level_panel(recording, axis))
@@ -67,42 +69,26 @@ def whole_walk_figure(result: WalkResult) -> "Figure":
     return figure
 
 
-class _Label(NamedTuple):
-    """Failures that are named together: the time of the first [s], and the names."""
-
-    time: float
-    names: list[str]
-
-
 def _name_failures(failed: Mapping[str, float], end: float, axis: Kind, axes: "Axes") -> None:
     """Name what fails beside its line, with room for that above the curve; ``failed`` and ``end`` are times [s]."""
     axes.set_ylim(top=_ROOM * axes.get_ylim()[1])
-    labels: list[_Label] = []
+    # Labels of failures that are close would cover each other: they are named together, at the time of the first.
+    labels: list[tuple[float, list[str]]] = []
     for part, time in failed.items():
-        # Labels of failures that are close would cover each other.
-        if not labels or time - labels[-1].time >= _APART * end:
-            labels.append(_Label(time, []))
-        labels[-1].names.append(part.replace("_", " "))
-    for number, label in enumerate(labels):
-        verb = "fails" if len(label.names) == 1 else "fail"
+        if not labels or time - labels[-1][0] >= _APART * end:
+            labels.append((time, []))
+        labels[-1][1].append(part.replace("_", " "))
+    for number, (time, names) in enumerate(labels):
         axes.annotate(
-            f"{', '.join(label.names)} {verb}",
-            (float(axis.values(label.time)), 0.98 - _ROW * (number % 2)),
+            f"{', '.join(names)} {'fails' if len(names) == 1 else 'fail'}",
+            (float(axis.values(time)), 0.98 - _ROW * (number % 2)),
             xycoords=("data", "axes fraction"),
-            ha="left" if label.time < _TURNS * end else "right",
+            ha="left" if time < _TURNS * end else "right",
             va="top",
             fontsize=8.5,
             color=GREY,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
         )
-
-
-def _phase_marks(recording: Recording) -> list[Mark]:
-    """Return the phase in which the device acts, where its controller sees phases."""
-    if "controller_phase" not in recording:
-        return []
-    look = {"linewidth": 0.9, "drawstyle": "steps-post"}
-    return [Mark("line", recording.time, acting_phase(recording), colour=BLACK, style=look)]
 
 
 def _name_phases(axes: "Axes") -> None:
@@ -122,13 +108,12 @@ def _level_panel(recording: Recording, axis: Kind) -> Panel:
         marks.append(Mark("span", (begin, end), colour=colour, style={"alpha": 1.0}))
         if end - begin > _NAMED_STRETCH * time[-1]:
             names[float(axis.values(0.5 * (begin + end)))] = name
-    return Panel(axis, Kind("Level of help"), marks, then=partial(_name_levels, names), tall=0.55, shares_x=True)
 
+    def name_levels(axes: "Axes") -> None:
+        for middle, name in names.items():
+            axes.text(middle, 0.5, name, ha="center", va="center", fontsize=9.0)
+        axes.set_ylim(0.0, 1.0)
+        axes.set_yticks([])
+        axes.grid(visible=False)
 
-def _name_levels(names: Mapping[float, str], axes: "Axes") -> None:
-    """Write names in the middle of their stretches, whose places on the axis are their keys."""
-    for middle, name in names.items():
-        axes.text(middle, 0.5, name, ha="center", va="center", fontsize=9.0)
-    axes.set_ylim(0.0, 1.0)
-    axes.set_yticks([])
-    axes.grid(visible=False)
+    return Panel(axis, Kind("Level of help"), marks, then=name_levels, tall=0.55, shares_x=True)
