@@ -9,7 +9,6 @@ import threading
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from itertools import pairwise
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,20 +37,13 @@ ORIGIN = "# origin"
 _MARK = "@entry("
 
 
-@runtime_checkable
-class PackedEntry(Protocol):
-    """An entry that is quicker where its arrays are handed over once."""
-
-    def with_arrays(self, *arrays: NDArray[np.float64]) -> Callable[..., None]:
-        """The entry as a function of what follows its arrays."""
-
-
 def with_arrays(entry: Callable[..., None], *arrays: NDArray[np.float64]) -> Callable[..., None]:
     """An entry of a loaded module as a function of its numbers alone; the arrays, its first arguments, stay the same.
 
     A call then costs what one with a few numbers costs.
     """
-    return entry.with_arrays(*arrays) if isinstance(entry, PackedEntry) else partial(entry, *arrays)
+    packed: Callable[..., Callable[..., None]] | None = getattr(entry, "with_arrays", None)
+    return partial(entry, *arrays) if packed is None else packed(*arrays)
 
 
 def entry_text(name: str, parameters: Mapping[str, str], lines: Iterable[str]) -> str:

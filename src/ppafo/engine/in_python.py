@@ -28,7 +28,7 @@ from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaves, rebuilt
-from ppafo.engine.source_text import MadeFrom, Read
+from ppafo.engine.source_text import MadeFrom, Read, SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.binding import is_made_of
 from ppafo.model.declaration import PlainFunction
@@ -149,7 +149,7 @@ def functions_of(program: Program, rows: EffectRows, operations: "Operations | N
 @lru_cache(maxsize=64)
 def _links_of(program: Program) -> tuple[dict[Any, Any], dict[Any, tuple[str, ...]]]:
     """Replacements of model functions in a program, and the rows that the laws of its effects take."""
-    collector = SimpleNamespace(links={}, effects={})
+    collector = SourceCollector("")
     link_program(program, collector)
     return collector.links, collector.effects
 

@@ -2,29 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Protocol
 
 from ppafo.engine.definitions import place_of
 from ppafo.engine.program import Program
+from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
 from ppafo.model.plant import PlantParameters, net_torque
 from ppafo.model.valves.kind import valve_problem
 
 
-class LinkCollector(Protocol):
-    """Collector of the functions that replace model functions."""
-
-    links: dict[Any, Any]
-    """Replacement of each function; a pair of functions as key replaces the second only inside the first.
-
-    Under a row and ``"_replace"`` is the class that ``row._replace`` makes.
-    """
-    effects: dict[Any, tuple[str, ...]]
-    """Laws of effects, each with the effect's structs that it takes, by the names of its parameters."""
-
-
-def link_program(program: Program, collector: LinkCollector) -> None:
+def link_program(program: Program, collector: SourceCollector) -> None:
     """Let a collector call what the components of a program have in the place of functions of the model.
 
     ProgramError for an effect that cannot act, or whose name other rows of the program have.
@@ -58,7 +46,7 @@ def link_program(program: Program, collector: LinkCollector) -> None:
     link_effects(program.effects, collector)
 
 
-def link_effects(effects: Sequence[Effect], collector: LinkCollector) -> None:
+def link_effects(effects: Sequence[Effect], collector: SourceCollector) -> None:
     """Let a collector call the laws of effects at their ports. ProgramError for an effect that cannot act."""
     for effect in effects:
         problem = effect_problem(effect)

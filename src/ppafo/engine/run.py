@@ -64,7 +64,7 @@ class Walk:
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """Its groups of parameters, by name."""
+        """Groups of parameters of the leg and what leads it, by name."""
         failing = {} if self.failing is None else dict(zip(("plant_faults", "shut_off"), self.failing, strict=True))
         return {
             "leg": self.leg,
@@ -78,7 +78,7 @@ class Walk:
 
     @property
     def states(self) -> dict[str, Any]:
-        """Its groups of states at the start, by name."""
+        """Groups of states at the start, by name."""
         powered = {} if self.failing is None else {"unpowered": kind_at("ppafo.model.shut_off:POWERED")}
         return {"walk": self.initial, "gait_seen": NOTHING_SEEN, **powered}
 

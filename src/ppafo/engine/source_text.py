@@ -70,8 +70,9 @@ class SourceCollector:
     """Gathers definitions in the order in which they must stand; ``adapt`` may write a definition in another way.
 
     Where a function is among ``links``, the one that it is linked to is added and called in its place; a link under a
-    pair holds inside the first of it. The ``effects`` are laws with the rows that they ask for: whoever calls one is
-    handed these rows in its turn, and so on up to the text around the module (``needs``, ``composed_lines``).
+    pair holds inside the first of it, one under a row and ``"_replace"`` is the class that ``row._replace`` makes. The
+    ``effects`` are laws with the rows that they ask for: whoever calls one is handed these rows in its turn, and so on
+    up to the text around the module (``needs``, ``composed_lines``).
     """
 
     decorator: str

@@ -56,7 +56,9 @@ class Panel:
 _TOP = 0.28
 """Inches above the panels, in which the figure says that it is simulated."""
 _LINE = 0.17
-"""Inches of a line of the note."""
+"""Inches of a line of the note, and of names above all panels."""
+_UNDER_NAMES = 0.08
+"""Inches from these names to the panels."""
 _LETTERS, _FEWEST_LETTERS, _KIND = 11.0, 24, 1.0
 """Letters of a title on an inch, the fewest on a line, and inches that its kind of numbers takes beside it."""
 _ENTRY, _ENTRY_LETTERS = 0.53, 14.5
@@ -156,10 +158,10 @@ def draw_panels(
     lines = textwrap.wrap(title, max(_FEWEST_LETTERS, round(_LETTERS * (width - _KIND))))
     shared = next((panel for panel in panels if panel.legend == "figure"), None)
     names, rows_of_names = (0, 0) if shared is None else _legend_rows(shared, "", width if title else width - _KIND)
-    rows_of_names = 0 if shared is None else max(1, rows_of_names)
+    room_of_names = 0.0 if shared is None else _LINE * max(1, rows_of_names) + _UNDER_NAMES
     # A title makes its own room.
-    above = _LINE * rows_of_names if title else max(_TOP, _LINE * rows_of_names)
-    height = size[1] * sum(heights) + 0.4 + below + _LINE * rows_of_names
+    above = room_of_names if title else max(_TOP, room_of_names)
+    height = size[1] * sum(heights) + 0.4 + below + room_of_names
     with house_style():
         rect = (0.0, below / height, 1.0, 1.0 - (above + below) / height)
         figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, rect=rect))
@@ -188,15 +190,6 @@ def draw_panels(
         return figure
 
 
-def _told_apart(marks: Sequence[Mark]) -> list[Mark]:
-    """Return marks with the dashes of their colours where lines of several colours would be one in grey."""
-    plain = [mark for mark in marks if mark.shape in _DASHED_SHAPES and "linestyle" not in mark.style]
-    if len({mark.colour for mark in plain}) < 2:
-        return list(marks)
-    dashed = {id(mark): {**mark.style, "linestyle": DASHES.get(mark.colour, "-")} for mark in plain}
-    return [replace(mark, style=dashed.get(id(mark), mark.style)) for mark in marks]
-
-
 def _legend_rows(panel: Panel, title: str, width: float) -> tuple[int, int]:
     """Return entries of a legend side by side on so many inches, and its rows above those on which the title stands."""
     names = [mark.label for mark in panel.marks if mark.label and mark.shape != "text"]
@@ -211,24 +204,20 @@ def _legend_rows(panel: Panel, title: str, width: float) -> tuple[int, int]:
     return 1, len(widths)
 
 
-def _plain_ticks(axes: "Axes") -> None:
-    """Write the ticks of logarithmic axes as plain numbers, not as powers."""
-    from matplotlib.ticker import FuncFormatter, NullFormatter
-
-    for axis in (axes.xaxis, axes.yaxis):
-        if axis.get_scale() == "log":
-            axis.set_major_formatter(FuncFormatter(lambda value, _: without_exponent(value, ".6g")))
-            axis.set_minor_formatter(NullFormatter())
-
-
 def _draw(axes: "Axes", panel: Panel, size: tuple[float, float]) -> Any:
     """Draw a panel of a size [inches], and return what has colours that stand for numbers."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
     if not panel.marks:
         axes.set_axis_off()
         return None
     mapped = None
-    for mark in _told_apart(panel.marks):
-        shown = SHAPES[mark.shape](axes, mark, panel.x.values(mark.x), panel.y.values(mark.y))
+    # Lines of several colours, which would be one in grey, have the dashes of their colours.
+    plain = {mark.colour for mark in panel.marks if mark.shape in _DASHED_SHAPES and "linestyle" not in mark.style}
+    for mark in panel.marks:
+        is_dashed = len(plain) > 1 and mark.shape in _DASHED_SHAPES
+        style = {"linestyle": DASHES.get(mark.colour, "-"), **mark.style} if is_dashed else mark.style
+        shown = SHAPES[mark.shape](axes, replace(mark, style=style), panel.x.values(mark.x), panel.y.values(mark.y))
         mapped = shown if mark.shape in ("map", "points") else mapped
     title = panel.title or (panel.y.axis if panel.shares_x else "")
     pad = _ABOVE
@@ -254,7 +243,11 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float]) -> Any:
     # Last, so that it can undo what Matplotlib chose.
     if panel.then is not None:
         panel.then(axes)
-    _plain_ticks(axes)
+    for axis in (axes.xaxis, axes.yaxis):
+        if axis.get_scale() == "log":
+            # Plain numbers, not powers.
+            axis.set_major_formatter(FuncFormatter(lambda value, _: without_exponent(value, ".6g")))
+            axis.set_minor_formatter(NullFormatter())
     return mapped
 
 

@@ -44,6 +44,8 @@ _OFFSET_UNITS = ("degC", "°C")
 DEVIATIONS_IN_HALF_WIDTH = 1.959963984540054
 """Standard deviations of a normal distribution in the half width of its 95 % interval."""
 _STATED_DIFFERENCES = {"psi_g": "psi_d", "psi_a": "psi_d", "degC": "K", "°C": "K"}
+_SMALLEST_SAID, _LARGEST_SAID = 1.0e-3, 1.0e7
+"""Size of a number between which it is said in the unit in which it was given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,9 +132,13 @@ def value_at(path: str, scenario: Scenario) -> float | None:
 
 
 def given_in(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
-    """Return a path whose values are said in the unit of the first text that has one."""
-    unit = next(filter(None, map(unit_in, texts)), "")
-    return replace(varied, given=unit) if fits(unit, varied.quantity.unit) else varied
+    """Return a path whose values are said in the unit of the first text that has one.
+
+    A unit in which the number needs a power of ten, as 1.451e-5 m^3, is for writing and not for reading.
+    """
+    number, unit = next((split_quantity(str(text)) for text in texts if unit_in(text)), (0.0, ""))
+    is_plain = number == 0.0 or _SMALLEST_SAID <= abs(number) < _LARGEST_SAID
+    return replace(varied, given=unit) if is_plain and fits(unit, varied.quantity.unit) else varied
 
 
 def in_its_unit(varied: VariedPath, texts: Iterable[object]) -> VariedPath:

@@ -131,7 +131,10 @@ class Expressions:
         owner = self.term(node.value)
         row = owner.type.row if isinstance(owner.type, RowReference) else owner.type
         if not isinstance(row, Row) or node.attr not in dict(row.fields):
-            raise self.mistaken(node, _without_field(ast.unparse(node.value), node.attr, row), f".{node.attr}")
+            fields = [field for field, _ in row.fields] if isinstance(row, Row) else []
+            hint = nearest_name(node.attr, fields) or f"; it has {', '.join(fields)}"
+            problem = f"has no '{node.attr}'{hint}" if fields else f"is {kind_of(row)} and has no '{node.attr}'"
+            raise self.mistaken(node, f"{ast.unparse(node.value)} {problem}", f".{node.attr}")
         return typed.field_of(owner, node.attr)
 
     def _of_subscript(self, node: ast.Subscript) -> Term:
@@ -399,15 +402,6 @@ def kind_of(kind: Type) -> str:
     if isinstance(kind, Row):
         return f"a {kind.name.rpartition('_')[2]}"
     return "a tuple" if isinstance(kind, Items) else "no number"
-
-
-def _without_field(owner: str, name: str, kind: Type) -> str:
-    """Message about a value without such a field, with its fields."""
-    if not isinstance(kind, Row):
-        return f"{owner} is {kind_of(kind)} and has no '{name}'"
-    fields = [field for field, _ in kind.fields]
-    hint = nearest_name(name, fields) or f"; it has {', '.join(fields)}"
-    return f"{owner} has no '{name}'{hint}"
 
 
 _INSTEAD = {

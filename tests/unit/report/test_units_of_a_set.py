@@ -11,6 +11,7 @@ from ppafo.analyses.stored_figures import draw_folder, names_in
 from ppafo.arguments.words import quantity, units_given
 from ppafo.parameters.parameter_set import written_units
 from ppafo.rig.experiments import record, write_rig_recording
+from ppafo.studies.varying import given_in, varied_path
 from ppafo.units.shown import shown_in, shown_text, written_text
 
 PSI = 6894.757293168361
@@ -128,6 +129,12 @@ def test_a_number_is_written_in_the_units_of_the_set_with_digits_that_people_rea
 ) -> None:
     with shown_in(BAR):
         assert shown_text(value, si_unit) == text
+
+
+@pytest.mark.parametrize(("text", "shown"), [("1.451e-5 m^3", "14.51 cm^3"), ("14510 mm^3", "14510 mm^3")])
+def test_a_unit_that_needs_a_power_of_ten_is_not_the_one_in_which_a_number_is_said(text: str, shown: str) -> None:
+    varied = varied_path("actuator.torque_constant", ppafo.load_scenario(TASK))
+    assert given_in(varied, [text]).quote(1.451e-5) == shown
 
 
 def test_a_command_to_paste_has_the_units_in_which_its_numbers_were_given() -> None:

@@ -77,7 +77,7 @@ def search_panels(
         colour = COLOURS[number % len(COLOURS)]
         costs_of_starts.append(Mark("line", np.arange(costs.size), costs, colour=colour, style={"linewidth": 1.3}))
     dashed = {"linestyle": "--", "linewidth": 1.0}
-    costs_of_starts.append(Mark("level", y=before.objective, colour=GREY, style=dashed))
+    costs_of_starts.append(Mark("level", y=before.objective, label="before", colour=BLACK, style=dashed))
 
     def scale(axes: "Axes") -> None:
         # Below a decade a logarithmic axis has no tick that reads as a number.
@@ -107,9 +107,8 @@ def search_panels(
         axes.set_ylim(-0.6, len(searched) - 0.4)
         axes.set_xticks([0.0, 1.0], ["minimum", "maximum"])
 
-    title = "Objective, best so far; dashed: before"
     return [
-        Panel(Kind("Generation"), Kind(), costs_of_starts, title, then=scale),
+        Panel(Kind("Generation"), Kind(), costs_of_starts, "Objective, best so far", then=scale),
         Panel(Kind(), Kind(), marks, "Between bounds", then=name_gains),
     ]
 

@@ -23,23 +23,20 @@ def load_generated(source: str, compiler: Compiler) -> ModuleType:
     wanted = RequestedProgram(source, compiler)
     # A second thread must not get a module of which only the beginning has run.
     with _LOADING.setdefault(wanted.name, threading.RLock()):
-        return sys.modules[wanted.name] if wanted.name in sys.modules else _import_program(wanted)
+        if wanted.name in sys.modules:
+            return sys.modules[wanted.name]
+        folder = cache_folder()
+        # Loading runs what lies there, so the folder is looked at each time, not once for the process.
+        why_not = refusal(folder)
+        kept = None if folder is None or why_not else wanted.place(folder)
+        if kept is None:
+            logger.warning("ppafo: compiled models are not kept: %s; %s names another folder", why_not, CACHE_VARIABLE)
+        module = None if kept is None else load_kept_module(kept, wanted)
+        if module is not None:
+            return module
+        from ppafo.engine.cache.making import make  # most programs are there
 
-
-def _import_program(wanted: RequestedProgram) -> ModuleType:
-    """Return the module of a program from the cache, or compile it; a warning says why where it is not kept."""
-    folder = cache_folder()
-    # Loading runs what lies there, so the folder is looked at each time, not once for the process.
-    why_not = refusal(folder)
-    kept = None if folder is None or why_not else wanted.place(folder)
-    if kept is None:
-        logger.warning("ppafo: compiled models are not kept: %s; %s names another folder", why_not, CACHE_VARIABLE)
-    module = None if kept is None else load_kept_module(kept, wanted)
-    if module is not None:
-        return module
-    from ppafo.engine.cache.making import make  # most programs are there
-
-    return make(wanted, kept)
+        return make(wanted, kept)
 
 
 def note_name(compiler: Compiler) -> str:

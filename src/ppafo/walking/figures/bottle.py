@@ -30,8 +30,6 @@ _MASSES = (("bottle_mass", "total gas", BLUE), ("liquid_mass", "liquid", GREEN))
 """Rows of the supply, with their names in the legend and colours; a gas that has no liquid has no row of it."""
 _LEAST_TORQUE = 0.1
 """Torque [N m] up to which the axis goes at least."""
-_MOST_IN_AXES = 3
-"""Marks of a panel up to which its legend has room above it in the usual form."""
 
 
 def bottle_figure(result: WalkResult) -> "Figure":
@@ -107,8 +105,6 @@ def _panel(end: float, ended: Mark, kind: Kind, marks: Sequence[Mark], largest: 
     def set_limits(axes: "Axes") -> None:
         axes.set_xlim(0.0, 1.005 * float(axis.values(end)))
         axes.locator_params(axis="y", nbins=5)
-        if len(marks) > _MOST_IN_AXES:
-            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, borderaxespad=0.1, handlelength=1.2)
         if largest is not None:
             axes.set_ylim(0.0, 1.08 * display_value(largest, kind.quantity))
 

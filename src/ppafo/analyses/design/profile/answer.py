@@ -200,7 +200,7 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
             legend="figure",
             then=lambda axes: axes.set_ylim(0.0, highest),
         ),
-        Panel(PRESSURE, _GAS, gases, "Gas per repetition within the limit", then=set_gas),
+        Panel(PRESSURE, _GAS, gases, "Gas, within the limit", then=set_gas),
     ]
 
 

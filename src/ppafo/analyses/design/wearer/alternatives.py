@@ -1,5 +1,6 @@
 """Alternatives where no device meets the requirements: one is relaxed in each, and walked on the largest bottle."""
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -69,15 +70,14 @@ def alternatives_to(
         key=lambda at: -at.pair.toes,
     )
     report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
-    nearest = [] if able else [_alternative(lesser[0], bottle, shelf) for lesser in (weak, low) if lesser]
+    nearest = [] if able else [_as_walked(lesser[0], bottle, shelf) for lesser in (weak, low) if lesser]
     alternatives = [
         alternative for alternative in (_thriftiest(able, bottle, shelf), *nearest) if alternative is not None
     ]
     yield from alternatives
     if not able:
-        stronger = (_alternative(candidate, bottle, shelf) for candidate in _at_more_pressure(requirements, tried))
-        first = next((alternative for alternative in stronger if alternative is not None), None)
-        yield from [] if first is None else [first]
+        stronger = (_as_walked(candidate, bottle, shelf) for candidate in _at_more_pressure(requirements, tried))
+        yield from itertools.islice(filter(None, stronger), 1)
     # A walk that ends early is no full answer: less torque for the whole time is offered beside it.
     if all(alternative.requirements.seconds < requirements.seconds for alternative in alternatives):
         lasting = _lasting(requirements, weak, bottle, shelf)
@@ -120,7 +120,7 @@ def _thriftiest(able: Sequence[_Candidate], bottle: Part, shelf: AvailableParts)
     """Return what walks on a bottle with the least gas, of the first few the one whose toes stay as high as wanted."""
     first: Alternative | None = None
     for candidate in able[:_MOST_WALKED]:
-        alternative = _alternative(candidate, bottle, shelf)
+        alternative = _as_walked(candidate, bottle, shelf)
         if alternative is not None and alternative.requirements.clearance >= candidate.requirements.clearance:
             return alternative
         first = alternative if first is None else first
@@ -135,7 +135,7 @@ def _lasting(
     for candidate in weak:
         if candidate.pair.flow > largest_flow:
             continue
-        alternative = _alternative(candidate, bottle, shelf)
+        alternative = _as_walked(candidate, bottle, shelf)
         if alternative is not None and alternative.requirements.seconds == requirements.seconds:
             return alternative
         lasted = 0.0 if alternative is None else alternative.requirements.seconds
@@ -143,8 +143,13 @@ def _lasting(
     return None
 
 
-def _alternative(candidate: _Candidate, bottle: Part, shelf: AvailableParts) -> Alternative | None:
-    """Return the requirements that a pair met in a walk on a bottle, rounded down; None where it meets none."""
+def _as_walked(candidate: _Candidate, bottle: Part, shelf: AvailableParts) -> Alternative | None:
+    """Return a candidate as the alternative that its walk on a bottle confirms; None where that walk does not help.
+
+    The rule: what is offered was walked, and walks again when it is asked for. So the requirements are lowered to what
+    the candidate showed, rounded down to what a command line says; the pair walks a few strides for these, then on the
+    bottle. What that walk has less of is offered as less, unless other strides would be walked for it.
+    """
     lesser, pair = candidate
     if not lesser.is_reached_by(pair.torque):
         lesser = replace(lesser, torque=math.floor(_SHOWN_TORQUE * pair.torque) / _SHOWN_TORQUE)
@@ -154,15 +159,14 @@ def _alternative(candidate: _Candidate, bottle: Part, shelf: AvailableParts) -> 
     walked = None if again is None else walk_on_bottle(again, shelf.bottle_name(bottle), lesser.seconds)
     if again is None or walked is None or not walked.averages:
         return None
+    # The toes come down a little as the pressure falls.
     toes = walked.metrics["lowest_toes"].value
     if toes < lesser.clearance:
-        # The toes come down a little as the pressure falls: what is offered is what they then have.
         lesser = replace(lesser, toes=shown_clearance(toes))
         if [strides.overrides for strides in few_strides(lesser, pair.valve, pair.actuator)] != [again.overrides]:
             return None
     lasted = walking_time(walked)
-    # Rounded down to what a command line can say, so that a run from that line still meets the alternative.
-    shown_time = _SHOWN_TIME * math.floor(min(lasted, lesser.seconds) / _SHOWN_TIME)
-    seconds = lesser.seconds if lasted >= lesser.seconds else shown_time
+    if lasted < lesser.seconds:
+        lesser = replace(lesser, seconds=_SHOWN_TIME * math.floor(lasted / _SHOWN_TIME))
     helps = lesser.torque > 0.0 and lesser.clearance >= 0.0 and keeps(walked, lesser)
-    return Alternative(replace(lesser, seconds=seconds), again, bottle) if helps and seconds >= SHORTEST else None
+    return Alternative(lesser, again, bottle) if helps and lesser.seconds >= SHORTEST else None

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from ppafo.analyses.design.wearer.available_parts import AvailableParts
 from ppafo.analyses.design.wearer.requirements import WALKS, DesignRequirements, WalkedDevice
@@ -18,17 +17,9 @@ _ALLOWANCE = 1.15
 """Gas that a pair may need over what another got out of a bottle, to be tried on it as well."""
 
 
-class OnBottle(NamedTuple):
-    """A pair of parts with a bottle, and its walk on it."""
-
-    pair: WalkedDevice
-    bottle: Part
-    walked: WalkResult
-
-
 def lightest_on_bottle(
     requirements: DesignRequirements, tried: Sequence[WalkedDevice], shelf: AvailableParts, report: Report
-) -> OnBottle | None:
+) -> tuple[WalkedDevice, Part, WalkResult] | None:
     """Return the lightest pair and bottle whose walk meets the requirements, with that walk; None if none does.
 
     No pair that might last on a bottle is left out, so that an alternative is found again when it is requested.
@@ -46,7 +37,7 @@ def lightest_on_bottle(
         if walked is None or walking_time(walked) < requirements.seconds:
             too_thirsty[bottle.name] = lasting_flow(pair, walking_time(walked), requirements.seconds)
         elif keeps(walked, requirements):
-            return OnBottle(pair, bottle, walked)
+            return pair, bottle, walked
     return None
 
 

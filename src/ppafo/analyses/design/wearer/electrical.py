@@ -75,14 +75,12 @@ def electrical_of(
     return Electrical(powers, cell, max(1, math.ceil(needed)), is_whole)
 
 
-def _power_text(power: float) -> str:
-    """Return a power [W] with three digits, in milliwatts below one watt."""
-    return f"{power:.3g} W" if power >= 1.0 else f"{1000.0 * power:.3g} mW"
-
-
 def electrical_sentences(electrical: Electrical) -> list[str]:
     """Return powers, and mass and minutes of the battery."""
-    parts = ", ".join(f"{name} {_power_text(power)}" for name, power in electrical.powers.items())
+    parts = ", ".join(
+        f"{name} {power:.3g} W" if power >= 1.0 else f"{name} {1000.0 * power:.3g} mW"
+        for name, power in electrical.powers.items()
+    )
     valve = "" if electrical.is_whole else ", without the valve, whose power the catalogue does not state"
     return [
         f"electrical power: {electrical.power:.3g} W ({parts}){valve}",

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ppafo.analyses.design.wearer.alternatives import alternatives_to
 from ppafo.analyses.design.wearer.available_parts import AvailableParts, shelf_of
-from ppafo.analyses.design.wearer.bottle import OnBottle, lightest_on_bottle
+from ppafo.analyses.design.wearer.bottle import lightest_on_bottle
 from ppafo.analyses.design.wearer.electrical import electrical_of
 from ppafo.analyses.design.wearer.requirements import (
     TOES,
@@ -29,6 +29,7 @@ from ppafo.parameters.parts import Part
 from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.progress import Progress, Report
 from ppafo.walking.loading import load_walk
+from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import healthy_metrics
 
 _REGULATORS = ("pipeline-jacpac-regulator", "festo-lrma-qs-4")
@@ -67,7 +68,7 @@ def size_for_wearer(
         tried += few_strides(requirements, valve, actuator)
     lightest = lightest_on_bottle(requirements, tried, shelf, report)
     if lightest is not None:
-        return WearerSizing(requirements, healthy, tuple(tried), _device(lightest, requirements, shelf), ())
+        return WearerSizing(requirements, healthy, tuple(tried), _device(*lightest, requirements, shelf), ())
     instead = tuple(
         alternative.text(requirements) for alternative in alternatives_to(requirements, tried, shelf, report)
     )
@@ -76,30 +77,28 @@ def size_for_wearer(
     return WearerSizing(requirements, healthy, tuple(tried), None, instead)
 
 
-def _device(lightest: OnBottle, requirements: DesignRequirements, shelf: AvailableParts) -> SizedDevice:
+def _device(
+    pair: WalkedDevice, bottle: Part, walked: WalkResult, requirements: DesignRequirements, shelf: AvailableParts
+) -> SizedDevice:
     """Return the device of a pair and a bottle: with regulators, shut-off valve, processor and battery."""
-    pair, bottle, walked = lightest
     life = endurance_of_walk(walked)
     assert life is not None, "a walk on a bottle that has a torque took gas"
     processor, cell = shelf.part("processors", _PROCESSOR), shelf.part("batteries", _CELL)
     electrical = electrical_of(
         walked.recording, pair.valve, SHUT_OFF_PARTS["power"], processor, cell, requirements.seconds
     )
+    # Both regulators may be of one part.
+    regulators = [shelf.part("regulators", name) for name in _REGULATORS]
+    of_regulators = {f"regulator {part.name}": part.full_mass for part in regulators}
+    if len(of_regulators) < len(regulators):
+        of_regulators = {f"2 x {name}": 2.0 * mass for name, mass in of_regulators.items()}
     masses = {
         f"actuator {pair.actuator.name}": pair.actuator.full_mass,
         f"valve {pair.valve.name}": pair.valve.full_mass,
         f"bottle {bottle.name}, full": bottle.full_mass,
-        **_masses_of_regulators([shelf.part("regulators", name) for name in _REGULATORS]),
+        **of_regulators,
         "shut-off valve": SHUT_OFF_PARTS["mass"],
         f"processor {processor.name}": processor.full_mass,
         f"battery, {electrical.cells} x {cell.name}": electrical.mass,
     }
     return SizedDevice(pair, bottle, shelf.bottle_name(bottle), walked, life, electrical, masses)
-
-
-def _masses_of_regulators(regulators: list[Part]) -> dict[str, float]:
-    """Return the masses of both regulators, which may be two of one part."""
-    first, second = regulators
-    if first.name == second.name:
-        return {f"2 x regulator {first.name}": 2.0 * first.full_mass}
-    return {f"regulator {part.name}": part.full_mass for part in regulators}

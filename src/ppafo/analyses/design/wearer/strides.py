@@ -45,11 +45,24 @@ def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -
     """
     common = _common_overrides(requirements, valve, actuator)
     strides: list[WalkedDevice] = []
+    is_followed = valve.kind == _PROPORTIONAL
     own_limit = float(load_walk(WALKS[valve.kind]).controller.settings["largest_torque"])
-    for request in _requests(requirements, valve, actuator):
-        for lift in _lifts(request, own_limit, requirements, valve, actuator):
-            peak = (f"controller.peak_torque={request:.4g} N m",) if valve.kind == _PROPORTIONAL else ()
-            limit = (f"controller.largest_torque={request:.4g} N m",) if request > own_limit else ()
+    # No request above what the supply pressure can hold with this actuator; those that are equal then are one.
+    held = actuator.values["torque_constant"] * (requirements.pressure - STANDARD_ATMOSPHERE)
+    follows = dict.fromkeys(min(factor * requirements.torque, held) for factor in _REQUESTS)
+    for request in follows if is_followed else [_ABOVE * requirements.torque]:
+        # Requests and limits as their overrides have them, with four digits.
+        rounded = float(f"{request:.4g}")
+        asked = written_text(rounded, "N m")
+        limit = (f"controller.largest_torque={asked}",) if request > own_limit else ()
+        peak: tuple[str, ...] = ()
+        lifts: list[tuple[str, ...]] = [()]
+        if is_followed:
+            # The lift in the swing: the walk's own, then one that begins at toe-off, with all torque.
+            torque = float(f"{min(_DORSIFLEXION * held, max(rounded, own_limit)):.4g}")
+            peak = (f"controller.peak_torque={asked}",)
+            lifts = [(), (f"controller.swing_peak_torque={written_text(torque, 'N m')}", *_EARLY_LIFT)]
+        for lift in lifts:
             tried = _strides_of(valve, actuator, (*common, *peak, *limit, *lift))
             if tried is None:
                 break
@@ -80,30 +93,6 @@ def _common_overrides(requirements: DesignRequirements, valve: Part, actuator: P
         *(f"{path}={written_text(number, units[path.partition('.')[2]])}" for path, number in numbers.items()),
         f"shut_off.area={written_text(SHUT_OFF_PARTS['area'], 'm^2')}",
     )
-
-
-def _requests(requirements: DesignRequirements, valve: Part, actuator: Part) -> list[float]:
-    """Return the torques [N m] that are requested one after the other, from the lowest."""
-    if valve.kind != _PROPORTIONAL:
-        return [_ABOVE * requirements.torque]
-    # No request above what the supply pressure can hold with this actuator; those that are equal then are one.
-    held = actuator.values["torque_constant"] * (requirements.pressure - STANDARD_ATMOSPHERE)
-    return list(dict.fromkeys(min(factor * requirements.torque, held) for factor in _REQUESTS))
-
-
-def _lifts(
-    request: float, own_limit: float, requirements: DesignRequirements, valve: Part, actuator: Part
-) -> list[tuple[str, ...]]:
-    """Return overrides of the lift in the swing: the walk's own, then one that begins at toe-off, with all torque.
-
-    ``own_limit`` [N m] is the limit of the walk itself. A pair of solenoid valves has its own alone.
-    """
-    if valve.kind != _PROPORTIONAL:
-        return [()]
-    held = actuator.values["torque_constant"] * _DORSIFLEXION * (requirements.pressure - STANDARD_ATMOSPHERE)
-    # The limit as its override has it, with four digits.
-    torque = min(held, max(float(f"{request:.4g}"), own_limit))
-    return [(), (f"controller.swing_peak_torque={torque:.4g} N m", *_EARLY_LIFT)]
 
 
 def _strides_of(valve: Part, actuator: Part, overrides: tuple[str, ...]) -> WalkedDevice | None:

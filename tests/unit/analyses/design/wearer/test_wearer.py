@@ -27,6 +27,7 @@ from ppafo.parameters.parts.catalogue import Catalogue
 from ppafo.progress import report_nothing
 from ppafo.report.finding import text_of
 from ppafo.signals import Channel, Recording
+from ppafo.units.shown import shown_in
 from ppafo.walking.motion import walk_of
 
 PSI = 6894.757
@@ -165,7 +166,7 @@ def test_a_bottle_of_compressed_air_feeds_the_device_with_air() -> None:
     assert "gas.species=air" in tried[0].overrides
     found = lightest_on_bottle(requirements, tried, shelf, report_nothing)
     assert found is not None
-    assert found.walked.scenario.device.gas.species == "air"
+    assert found[2].scenario.device.gas.species == "air"
 
 
 def test_a_bottle_that_is_none_is_refused_before_any_walk() -> None:
@@ -180,8 +181,13 @@ def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assu
         catalogue.part("actuators", "smc-crb2bw40-90d"),
     )
     requirements = DesignRequirements(60.0, None, 5.0, 101325.0 + 60.0 * PSI, 60.0)
-    found = few_strides(requirements, valve, actuator)
+    with shown_in({"N m": "N cm"}):
+        found = few_strides(requirements, valve, actuator)
     assert found[0].torque >= 5.0
+    # A command to paste has the unit in which the torque was given.
+    torques = [line for line in found[0].overrides if "_torque=" in line]
+    assert len(torques) == 3
+    assert all(line.endswith(" N cm") for line in torques)
     assert requirements.height == pytest.approx(math.sqrt(60.0 / 22.0))
     said = text_of(finding_of(WearerSizing(requirements, 0.0052, tuple(found), None, ())))
     assert "1.651 m (assumed: a body mass index of 22 kg/m^2; give --stature)" in said
