@@ -79,13 +79,14 @@ def hil(
         load_drawing()
         from ppafo.report.recording_figure import figure_files
 
-        ran.save(folder, figure_files(ran.plot_signals()))
+        ran.result.save(folder, {**ran.files(), **figure_files(ran.plot_signals())})
     return _said(ran, port, folder)
 
 
 @in_units(lambda ran, *_: ran.result.scenario.device.shown)
 def _said(ran: "HardwareRun", port: str, folder: Path) -> CommandOutput:
     """Return what is said of a run that is written."""
+    from ppafo.documents.json_text import plain
     from ppafo.report.display_units import metrics_lines
 
     result, exchange = ran.result, ran.exchange
@@ -99,7 +100,15 @@ def _said(ran: "HardwareRun", port: str, folder: Path) -> CommandOutput:
         "",
         f"written: {folder} (recording.nc, recording.csv, log.csv, link.json, run.json, figures)",
     ]
-    text, document = "\n".join(lines), {**ran.outcome(port), "folder": str(folder)}
+    text = "\n".join(lines)
+    document = {
+        "scenario": result.scenario.name,
+        "port": port,
+        "status": plain(result.status),
+        "link": ran.document(),
+        "metrics": {name: plain(metric) for name, metric in result.metrics.items()},
+        "folder": str(folder),
+    }
     if exchange.is_stopped:
         aside = f"stopped at {exchange.vented_at:.6g} s and vented; {folder} is whole"
         return CommandOutput(text, document, exit_code=EXIT_INTERRUPTED, aside=aside)

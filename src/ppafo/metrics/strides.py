@@ -172,10 +172,7 @@ def stride_with_sample(stride: CurrentStride, sample: Sample) -> CurrentStride:
     """The stride under way with one sample more."""
     error = sample.reference - sample.torque
     pushes = sample.stride.phase == PUSH_OFF
-    return CurrentStride(
-        is_whole=stride.is_whole,
-        on_toes=stride.on_toes,
-        at_strike=stride.at_strike,
+    return stride._replace(
         lacked_help=1.0 if sample.stride.level > HELPS else stride.lacked_help,
         squared_errors=stride.squared_errors + (error * error if pushes else 0.0),
         push_off_samples=stride.push_off_samples + (1.0 if pushes else 0.0),

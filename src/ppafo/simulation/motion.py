@@ -63,11 +63,11 @@ class VaneKind:
     reads_forces: ClassVar[bool] = False
     is_repeated_for_its_error: ClassVar[bool] = True
 
-    def rules(self, scenario: Scenario) -> "tuple[Problem, ...]":
-        """Return which numbers contradict each other: the vane beyond a stop, a delay too long."""
-        from ppafo.simulation.ensemble.vane import rules
+    def contradictory_numbers(self, scenario: Scenario) -> "tuple[Problem, ...]":
+        """Return the numbers that do not go together: the vane beyond a stop, a delay too long."""
+        from ppafo.simulation.ensemble.vane import contradictory_numbers
 
-        return rules(scenario)
+        return contradictory_numbers(scenario)
 
     def quantities(self, scenario: Scenario) -> dict[str, Quantity]:
         """Return the declaration of every number of a scenario beside its device's, by path."""
@@ -139,16 +139,10 @@ def _plan(scenario: Scenario) -> "tuple[Run, tuple[Problem, ...]]":
     return plan_vane(scenario)
 
 
-def _measured_free(scenario: Scenario, run: "Run", times: "Floats", rows: "Mapping[str, Floats]") -> Measured:
-    from ppafo.simulation.vane_recording import measured_free
+def _measured(scenario: Scenario, run: "Run", times: "Floats", rows: "Mapping[str, Floats]") -> Measured:
+    from ppafo.simulation.vane_recording import measured_vane
 
-    return measured_free(scenario, run, times, rows)
-
-
-def _measured_prescribed(scenario: Scenario, run: "Run", times: "Floats", rows: "Mapping[str, Floats]") -> Measured:
-    from ppafo.simulation.vane_recording import measured_prescribed
-
-    return measured_prescribed(scenario, run, times, rows)
+    return measured_vane(scenario, run, times, rows)
 
 
 def _read_angle(reading: DocumentReader, device: Device) -> float:
@@ -169,7 +163,7 @@ FREE_MOTION = VaneKind(
     name="free",
     section=MotionSection("the vane moves as the torques demand", FREE, _read_free),
     plan=_plan,
-    measured=_measured_free,
+    measured=_measured,
 )
 """Equation (1), with a constant external torque."""
 
@@ -184,7 +178,7 @@ LOCKED_MOTION = VaneKind(
     name="locked",
     section=MotionSection("the vane stays at one angle", (ANGLE,), _read_locked),
     plan=_plan,
-    measured=_measured_prescribed,
+    measured=_measured,
     places={LOCKED_ANGLE: ("motion", "profile", "level")},
 )
 """A vane on a test bench that is clamped: its profile is constant."""
@@ -214,7 +208,7 @@ PRESCRIBED_MOTION = VaneKind(
         ),
     ),
     plan=_plan,
-    measured=_measured_prescribed,
+    measured=_measured,
 )
 """The ankle goes along a profile whatever the device does."""
 

@@ -10,43 +10,20 @@ from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.exports import filled, in_comment, in_markdown, template
 from ppafo.exports.c_library.conditions import conditions_of_program, limits_in_c, relations_of_library
 from ppafo.exports.c_library.library import Library
-from ppafo.model.controlled import CONTROLLED
 from ppafo.model.declaration import Quantity
+from ppafo.signals import CHANNELS
 from ppafo.version import __version__
 
 _FOLDER = "ppafo.exports.c_library"
 """The package whose templates these are."""
 
-OUTPUTS = {
-    "angle": ("rad", "angle of the vane"),
-    "angular_velocity": ("rad/s", "its rate"),
-    "pressure_1": ("Pa", "pressure in chamber 1, absolute"),
-    "pressure_2": ("Pa", "pressure in chamber 2, absolute"),
-    "torque": ("N m", "torque of the actuator, above 0 turns the toes down"),
-    "command": ("-", "command to the valve, -1 to 1"),
-    **{kind.reference: (kind.unit, f"requested {kind.words}") for kind in CONTROLLED.values()},
-    "temperature_1": ("K", "temperature in chamber 1"),
-    "temperature_2": ("K", "temperature in chamber 2"),
-    "mass_1": ("kg", "gas in chamber 1"),
-    "mass_2": ("kg", "gas in chamber 2"),
-    "supplied_mass": ("kg", "gas from the supply so far"),
-    "vented_mass": ("kg", "gas to the atmosphere so far"),
-    "leaked_mass": ("kg", "gas leaked from chamber to chamber so far"),
+OUTPUTS = {name: (channel.unit, channel.summary) for name, channel in CHANNELS.items()} | {
     "strides": ("-", "heel strikes so far"),
     "phase": ("-", "gait phase, 0 at heel strike, in turns"),
-    "contact": ("-", "where the foot stands: 0 swing, 1 heel, 2 flat, 3 toes"),
-    "shank_angle": ("rad", "shank from the vertical, above 0 with the ankle before the knee"),
-    "healthy_angle": ("rad", "angle of the healthy ankle of this gait"),
-    "external_torque": ("N m", "torque T_ex of the device on the wearer"),
-    "heel_force": ("N", "force under the heel, as the sensor shows it without faults"),
-    "toe_force": ("N", "force under the toes, likewise"),
     "positive_push_off_work": ("J", "positive work of T_ex while the foot rolls over the toes, so far"),
     "net_push_off_work": ("J", "net work of T_ex while the foot rolls over the toes, so far"),
-    "controller_phase": ("-", "phase that the controller sees: 0 swing, 1 landing, 2 mid-stance, 3 push-off"),
-    "safe_state": ("-", "0 the controller helps, 1 lifts only, 2 pauses, 3 has stopped"),
-    "gait_fraction": ("-", "gait phase that the controller goes by, in turns"),
 }
-"""Unit and meaning of the outputs at each sample."""
+"""Unit and meaning of the outputs at each sample: channels of a recording, and totals of a walk."""
 SAME_METRIC = 1.0e-12
 """Difference of a metric in C from Python's, as a share of it: sums are rounded in another order."""
 UNITS = {"1": "-", "Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
@@ -67,8 +44,8 @@ def library_files(library: Library) -> dict[str, bytes]:
 
     name, program = library.name, library.program
     words = _words(library, name)
-    surface = library.surface
-    sources = {surface.header: f"{name}.h", surface.main: "main.c", surface.page: "README.md", **_FILES}
+    api = library.api
+    sources = {api.header: f"{name}.h", api.main: "main.c", api.page: "README.md", **_FILES}
     texts = {target: filled(template(_FOLDER, source), words) for source, target in sources.items()}
     texts["LICENSE"] = template(_FOLDER, "LICENSE")
     head = f'#include "{name}.h"\n\n#include <string.h>\n\n'
@@ -76,7 +53,7 @@ def library_files(library: Library) -> dict[str, bytes]:
     further = [add for add in (library.further, library.following) if add is not None]
     settings = [setting.name for setting in library.settings]
     # The interface is written around the functions, whose names must not hide its own.
-    interface = "".join(filled(template(_FOLDER, file), words) for file in ("interface.c", surface.source))
+    interface = "".join(filled(template(_FOLDER, file), words) for file in ("interface.c", api.source))
     functions = c_text_of_run(program, title, name, settings, further, interface)
     texts[f"{name}.c"] = f"{head}{functions}\n{interface}"
     return {file: text.encode() for file, text in sorted(texts.items())}
@@ -97,7 +74,7 @@ def run_words(library: Library) -> dict[str, str]:
 
 def _words(library: Library, name: str) -> dict[str, str]:
     """Marks of the templates of a library, and the text in the place of each; words of its own go before these."""
-    settings, program, surface = library.settings, library.program, library.surface
+    settings, program, api = library.settings, library.program, library.api
     outputs = ("time", *program.outputs)
     # The last argument of the loop of a run in C, where it has both kinds of steps.
     in_parts = ", run->needs_parts" if program.program.chooses_parts else ""
@@ -145,10 +122,10 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "in_parts": in_parts,
         "run": filled(template(_FOLDER, "run.h"), {"name": name}),
         "steps": filled(template(_FOLDER, "steps.c"), steps),
-        "first": "".join(f"    before.{setting} = before.{surface.step};\n" for setting in surface.as_step),
+        "first": "".join(f"    before.{setting} = before.{api.step};\n" for setting in api.as_step),
         "follow": "" if library.following is None else "    follow(&before, &all);",
         **library.words,
-        **surface.words,
+        **api.words,
     }
 
 

@@ -82,7 +82,7 @@ class Library:
     ``other_program`` has further conditions in C under which another would be needed, with the setting that is named;
     ``rules`` are between its times, as in a file. ``following`` adds the function that lets settings follow others,
     None where none does, and ``defaults`` names the settings whose default does so, which has no range; ``links`` say
-    what follows what. ``words`` fill the page. ``surface`` is how it is called.
+    what follows what. ``words`` fill the page. ``api`` is how it is called.
     """
 
     title: str
@@ -97,7 +97,7 @@ class Library:
     following: Further | None = None
     defaults: frozenset[str] = frozenset()
     links: Graph = field(default_factory=dict)
-    surface: LibraryApi = LOOP
+    api: LibraryApi = LOOP
     rules: tuple[Rule, ...] = ()
 
     @property

@@ -35,24 +35,10 @@ class Input:
 
 
 COMMAND = Input("command", "-", "command to the valve, clipped to -1 to 1; above 0 feeds chamber 1", 0.0, -1.0, 1.0)
-WALKING_COMMAND = Input(
-    "command",
-    "-",
-    "command to the valve, clipped to -1 to 2; above 0 feeds chamber 1, above 1.5 vents both",
-    VENT,
-    -1.0,
-    VENT,
-)
-
-
-SAFE_STATE = Input(
-    "safe_state",
-    "-",
-    "assistance level, 0 to 3; at 3, where the controller has stopped, the shut-off valve shuts",
-    0.0,
-    0.0,
-    3.0,
-)
+_WALKING = "command to the valve, clipped to -1 to 2; above 0 feeds chamber 1, above 1.5 vents both"
+WALKING_COMMAND = Input("command", "-", _WALKING, VENT, -1.0, VENT)
+_STOPS = "assistance level, 0 to 3; at 3, where the controller has stopped, the shut-off valve shuts"
+SAFE_STATE = Input("safe_state", "-", _STOPS, 0.0, 0.0, 3.0)
 
 
 Assignment = tuple[str, str]
@@ -188,15 +174,11 @@ def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParamete
 @_drive_of.register
 def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -> Drive:
     """Return the drive of a free joint: T_ex on a vane alone, or T_2 on the ankle of a leg, which T_ex opposes."""
-    if motion.leg is None:
-        name, summary, start, load = (
-            "external_torque",
-            "T_ex, above 0 against plantarflexion",
-            motion.external_torque,
-            "",
-        )
-    else:
-        name, summary, start, load = "ankle_torque", "T_2, above 0 plantarflexes", motion.leg.ankle_torque, "-"
+    name, summary, load = "external_torque", "T_ex, above 0 against plantarflexion", ""
+    start = motion.external_torque
+    if motion.leg is not None:
+        name, summary, load = "ankle_torque", "T_2, above 0 plantarflexes", "-"
+        start = motion.leg.ankle_torque
     limits = settings[f"motion.{name}"].quantity
     torque = Input(name, "N m", f"torque on the ankle, {summary}", start, limits.minimum, limits.maximum)
     return Drive(
@@ -209,7 +191,7 @@ def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -
 
 def plant_library(scenario: Scenario) -> dict[str, bytes]:
     """Return the files of the plant in C by name: ``NAME_step(run, command, ...)`` goes on by one step."""
-    library = surfaced(plant_of(scenario)).library
+    library = with_api(plant_of(scenario)).library
     return {**library_files(library), "expected.csv": expected_csv(half_open(scenario), library.program.outputs)}
 
 
@@ -225,7 +207,7 @@ def half_open(scenario: Scenario) -> Scenario:
     return replace(plant, controller=command, run=replace(plant.run, duration=duration))
 
 
-def surfaced(alone: PlantAlone) -> PlantAlone:
+def with_api(alone: PlantAlone) -> PlantAlone:
     """Return a plant whose library is called with its inputs."""
     names = [variable.name for variable in alone.inputs]
     by_name = {name: name for name in names}
@@ -262,16 +244,9 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
         "step": f"{alone.step:g}",
         "clock": c_identifier(alone.clock),
     }
-    surface = LibraryApi(
-        "plant.h",
-        "plant_main.c",
-        "plant_README.md",
-        "plant.c",
-        words,
-        c_identifier(alone.clock),
-        _as_clock(alone),
-    )
-    return replace(alone, library=replace(alone.library, surface=surface))
+    clock = c_identifier(alone.clock)
+    api = LibraryApi("plant.h", "plant_main.c", "plant_README.md", "plant.c", words, clock, _as_clock(alone))
+    return replace(alone, library=replace(alone.library, api=api))
 
 
 def _as_clock(alone: PlantAlone) -> tuple[str, ...]:

@@ -108,11 +108,6 @@ class Preparation:
         return [*found, "relieving"]
 
     @property
-    def wall_settings(self) -> list[str]:
-        """Names of the settings of a gas with an energy balance."""
-        return [quantity.name for quantity in gas_settings(THERMAL)]
-
-    @property
     def valve_settings(self) -> list[str]:
         """Names of the settings of the valve."""
         return named(VALVES[self.device.valve.kind].quantities)
@@ -345,8 +340,8 @@ def set_gas(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     lane.sensors = rebuilt(SensorParameters, (getattr(settings, name) for name in flaws))
     if parts.program.is_thermal:
         lane.thermal = thermal_gas(
-            parts.row("Walls", parts.wall_settings)(
-                *(getattr(settings, name) for name in parts.names("gas_model", parts.wall_settings))
+            parts.row("Walls", named(gas_settings(THERMAL)))(
+                *(getattr(settings, name) for name in parts.names("gas_model", named(gas_settings(THERMAL))))
             ),
             lane.gas,
         )

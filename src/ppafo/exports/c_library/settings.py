@@ -1,5 +1,6 @@
 """Settings of an exported scenario: every number by its path, in SI units, and those that contradict each other."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from ppafo.exports.c_library.library import ExportParameter, Relation, c_identifier
@@ -7,7 +8,7 @@ from ppafo.model.catalog import device_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import consistency
 from ppafo.parameters.plant import effects_of
-from ppafo.simulation.clock import TIMES, step_unless_given, step_with_output, time_texts
+from ppafo.simulation.clock import step_unless_given, step_with_output, time_texts
 from ppafo.simulation.declaration import LOCKED_ANGLE
 from ppafo.simulation.document import value_at
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form, path_of_locked_angle
@@ -41,14 +42,21 @@ def settings_of(scenario: Scenario) -> tuple[ExportParameter, ...]:
         "run.output_interval": scenario.run.output_interval,
         "controller.period": period,
     }
+    return export_parameters(scenario, declared_settings(scenario), times)
+
+
+def export_parameters(
+    scenario: Scenario, declared: Mapping[str, Quantity], times: Mapping[str, float]
+) -> tuple[ExportParameter, ...]:
+    """Declared numbers of a scenario by path with their values in SI: the ``times`` [s], else those of the scenario."""
     return tuple(
         ExportParameter(
             c_identifier(path),
             path,
             replace(quantity, summary=SAID.get(path, quantity.summary)),
-            times[path] if path in TIMES else number_at(scenario, path),
+            times[path] if path in times else number_at(scenario, path),
         )
-        for path, quantity in declared_settings(scenario).items()
+        for path, quantity in declared.items()
     )
 
 

@@ -4,7 +4,6 @@ What a gait comes to (series, events, how its heel rolls) and a task sequence in
 the planning reads as mappings are structs in C: Python runs the functions of ``preparation`` alone.
 """
 
-from dataclasses import replace
 from typing import Any
 
 from ppafo.control.walking.catalog import walking_controllers
@@ -21,7 +20,7 @@ from ppafo.exports.c_library.preparation import (
     set_timing,
     start,
 )
-from ppafo.exports.c_library.settings import SAID, declared_settings
+from ppafo.exports.c_library.settings import declared_settings, export_parameters
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
 from ppafo.model.sensors import NOTHING_SEEN
@@ -29,7 +28,7 @@ from ppafo.model.shut_off import NEVER, POWERED
 from ppafo.parameters.building import consistency
 from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction, holding
 from ppafo.simulation.declaration import RUN, SUPPLY_LINE, SUPPLY_LINES
-from ppafo.simulation.numbers import device_numbers, number_at
+from ppafo.simulation.numbers import device_numbers
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.contradictions import PAIRS
@@ -103,16 +102,8 @@ def settings_of_walk(configuration: Scenario) -> tuple[ExportParameter, ...]:
     # The structures of libraries have the times behind the device.
     wearer = (f"wearer.{quantity.name}" for quantity in (*WEARER, PERSON))
     paths = dict.fromkeys((*device_numbers(configuration.device), *of_run, *wearer, *times, *control, *declared))
-    return tuple(
-        ExportParameter(
-            c_identifier(path),
-            path,
-            replace(declared[path], summary=SAID.get(path, declared[path].summary)),
-            times[path] if path in times else number_at(configuration, path),
-        )
-        for path in paths
-        if path in declared and not path.startswith(fixed)
-    )
+    known = {path: declared[path] for path in paths if path in declared and not path.startswith(fixed)}
+    return export_parameters(configuration, known, times)
 
 
 def _control(configuration: Scenario) -> dict[str, Quantity]:

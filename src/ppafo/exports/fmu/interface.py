@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.library import Library
-from ppafo.exports.c_library.plant import Input, follow_lines, half_open, plant_of, surfaced
+from ppafo.exports.c_library.plant import Input, follow_lines, half_open, plant_of, with_api
 from ppafo.simulation.scenario import Scenario
 
 _LOOP_TIME = (
@@ -78,7 +78,7 @@ def plant_alone(scenario: Scenario) -> Interface:
 
     ``export c`` writes the same plant.
     """
-    alone = surfaced(plant_of(scenario))
+    alone = with_api(plant_of(scenario))
     library = alone.library
     inputs = ", ".join(f"inputs[{index}]" for index in range(len(alone.inputs)))
     numbers = {variable.name: f"inputs[{index}]" for index, variable in enumerate(alone.inputs)}

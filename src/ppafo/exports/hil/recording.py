@@ -1,7 +1,6 @@
 """A recording from a bench by the protocol: its samples, put in order, as channels over time."""
 
 import contextlib
-import os
 import time
 from array import array
 from collections import Counter
@@ -300,7 +299,7 @@ def kept_aside(target: Path) -> Iterator[Callable[[str], None]]:
     aside = target.with_name(f"{target.stem}{ASIDE}{target.suffix}")
     try:
         # Exclusive: two recordings with one target must not write into one file.
-        file = os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        file = aside.open("xb", buffering=0)
     except FileExistsError:
         raise DataError(
             f"{aside}: exists, with samples of an interrupted recording or of one still running: "
@@ -315,7 +314,7 @@ def kept_aside(target: Path) -> Iterator[Callable[[str], None]]:
         nonlocal is_full
         if lines and not is_full:
             try:
-                os.write(file, lines.encode())
+                file.write(lines.encode())
             except OSError:
                 is_full = True
 
@@ -324,11 +323,11 @@ def kept_aside(target: Path) -> Iterator[Callable[[str], None]]:
         yield keep
     except (DataError, KeyboardInterrupt) as error:
         # An empty file says nothing and goes away.
-        if os.fstat(file).st_size:
+        if file.tell():
             left = f"; received samples are in {aside}"
             raise type(error)(f"{str(error) or 'interrupted'}{left}") from error
         raise
     finally:
-        os.close(file)
+        file.close()
         if not left:
             aside.unlink(missing_ok=True)

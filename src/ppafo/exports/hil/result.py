@@ -5,12 +5,11 @@ import io
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ppafo.documents.json_text import json_text, plain
+from ppafo.documents.json_text import json_text
 from ppafo.exports.hil import wire
 from ppafo.exports.hil.loop import LinkTraffic, LogRow
 from ppafo.exports.hil.plant import CompiledPlant
@@ -99,16 +98,6 @@ class HardwareRun:
             "machine": {name: getattr(self.machine, name) for name in HostComputer.__slots__},
         }
 
-    def outcome(self, port: str) -> dict[str, Any]:
-        """Return scenario, port, status, link and metrics as plain data."""
-        return {
-            "scenario": self.result.scenario.name,
-            "port": port,
-            "status": plain(self.result.status),
-            "link": self.document(),
-            "metrics": {name: plain(metric) for name, metric in self.result.metrics.items()},
-        }
-
     def text(self) -> str:
         """The run in words."""
         exchange, machine, late, after = self.exchange, self.machine, self.sent_late, self.answered_after
@@ -194,10 +183,6 @@ class HardwareRun:
             for axes in (late, after):
                 axes.axvline(period, color=VERMILION, linewidth=1.0, linestyle="--")
             return figure
-
-    def save(self, folder: Path, further: dict[str, bytes]) -> None:
-        """Write the result folder with log, figures of the link and what else there is."""
-        self.result.save(folder, {**self.files(), **further})
 
 
 def spread(values: Sequence[float]) -> dict[str, float] | None:
