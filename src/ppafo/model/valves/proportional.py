@@ -21,7 +21,7 @@ from ppafo.model.plant import (
     single_port_flow_slopes,
     single_ports,
 )
-from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel, never
+from ppafo.model.valves.kind import ValveKind, ValveModel, never
 
 # From shut to open within 1 ps, below any step; two instants within 10 ps are one; and a quotient of zeros is finite.
 NO_SLEW_LIMIT = 1.0e12
@@ -76,12 +76,9 @@ class SpoolState(NamedTuple):
 
 
 def opening_of_command(command: float, dead_band: float) -> float:
-    """Opening [-], -1 to 1, that a command asks for: nothing inside the dead band, all at full command.
-
-    While a vent valve behind it vents, the spool returns to its middle, so that it feeds no chamber when that shuts.
-    """
+    """Opening [-], -1 to 1, that a command asks for: nothing inside the dead band, all at full command."""
     size = max(min(abs(command), 1.0) - dead_band, 0.0) / (1.0 - dead_band)
-    return 0.0 if command > VENTS_ABOVE else (size if command >= 0.0 else -size)
+    return size if command >= 0.0 else -size
 
 
 def advance_ideal(
@@ -89,7 +86,7 @@ def advance_ideal(
 ) -> tuple[float, NoValveState]:
     """Opening during the step [-], -1 to 1, of a valve without dynamics."""
     size = max(min(abs(command), 1.0) - valve.dead_band, 0.0) * valve.gain
-    opening = 0.0 if command > VENTS_ABOVE else (size if command >= 0.0 else -size)
+    opening = size if command >= 0.0 else -size
     return opening, NoValveState(opening)
 
 
