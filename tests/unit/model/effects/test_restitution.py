@@ -8,8 +8,8 @@ import pytest
 from ppafo.model.catalog import device_effects
 from ppafo.model.effects.kind import effect_problem
 from ppafo.model.effects.restitution import EFFECT, Restitution, thrown_back
+from ppafo.parameters.effects import effect_rows, effects_of
 from ppafo.parameters.loading import load_device
-from ppafo.parameters.plant import effect_rows, effects_of
 
 
 def test_a_vane_leaves_a_stop_with_its_share_of_the_speed() -> None:
