@@ -42,19 +42,18 @@ def draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
     if RIG_FILE in names:
         file = folder / RIG_FILE
         document, tables = _document(file), [name for name in names if name.endswith(".csv")]
-        return {name.removesuffix(".csv"): _draw_rig_recording(file, document, name) for name in tables}
+        drawn = {}
+        for name in tables:
+            # The truth of a recording is in the document of its folder.
+            with shown_in(stated_units(file, document, "recordings", name)):
+                drawn[name.removesuffix(".csv")] = recording_figure(read_recording(folder / name))
+        return drawn
     if NETCDF_FILE in names and MARK in names:
         # Of a walk its end is recorded.
         file = folder / WALK_FILE
         document = _document(file) if WALK_FILE in names else {}
         return {_FIGURE: draw_stored_walk(file, document, read_recording(folder / NETCDF_FILE))}
     return {}
-
-
-def _draw_rig_recording(file: Path, document: dict[str, Any], name: str) -> "Figure":
-    """Return the figure of a recording of the rig, whose truth the document of its folder holds."""
-    with shown_in(stated_units(file, document, "recordings", name)):
-        return recording_figure(read_recording(file.parent / name))
 
 
 def _document(file: Path) -> dict[str, Any]:

@@ -190,15 +190,6 @@ def draw_panels(
         return figure
 
 
-def _told_apart(marks: Sequence[Mark]) -> list[Mark]:
-    """Return marks with the dashes of their colours where lines of several colours would be one in grey."""
-    plain = [mark for mark in marks if mark.shape in _DASHED_SHAPES and "linestyle" not in mark.style]
-    if len({mark.colour for mark in plain}) < 2:
-        return list(marks)
-    dashed = {id(mark): {**mark.style, "linestyle": DASHES.get(mark.colour, "-")} for mark in plain}
-    return [replace(mark, style=dashed.get(id(mark), mark.style)) for mark in marks]
-
-
 def _legend_rows(panel: Panel, title: str, width: float) -> tuple[int, int]:
     """Return entries of a legend side by side on so many inches, and its rows above those on which the title stands."""
     names = [mark.label for mark in panel.marks if mark.label and mark.shape != "text"]
@@ -213,24 +204,20 @@ def _legend_rows(panel: Panel, title: str, width: float) -> tuple[int, int]:
     return 1, len(widths)
 
 
-def _plain_ticks(axes: "Axes") -> None:
-    """Write the ticks of logarithmic axes as plain numbers, not as powers."""
-    from matplotlib.ticker import FuncFormatter, NullFormatter
-
-    for axis in (axes.xaxis, axes.yaxis):
-        if axis.get_scale() == "log":
-            axis.set_major_formatter(FuncFormatter(lambda value, _: without_exponent(value, ".6g")))
-            axis.set_minor_formatter(NullFormatter())
-
-
 def _draw(axes: "Axes", panel: Panel, size: tuple[float, float]) -> Any:
     """Draw a panel of a size [inches], and return what has colours that stand for numbers."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
     if not panel.marks:
         axes.set_axis_off()
         return None
     mapped = None
-    for mark in _told_apart(panel.marks):
-        shown = SHAPES[mark.shape](axes, mark, panel.x.values(mark.x), panel.y.values(mark.y))
+    # Lines of several colours, which would be one in grey, have the dashes of their colours.
+    plain = {mark.colour for mark in panel.marks if mark.shape in _DASHED_SHAPES and "linestyle" not in mark.style}
+    for mark in panel.marks:
+        is_dashed = len(plain) > 1 and mark.shape in _DASHED_SHAPES
+        style = {"linestyle": DASHES.get(mark.colour, "-"), **mark.style} if is_dashed else mark.style
+        shown = SHAPES[mark.shape](axes, replace(mark, style=style), panel.x.values(mark.x), panel.y.values(mark.y))
         mapped = shown if mark.shape in ("map", "points") else mapped
     title = panel.title or (panel.y.axis if panel.shares_x else "")
     pad = _ABOVE
@@ -256,7 +243,11 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float]) -> Any:
     # Last, so that it can undo what Matplotlib chose.
     if panel.then is not None:
         panel.then(axes)
-    _plain_ticks(axes)
+    for axis in (axes.xaxis, axes.yaxis):
+        if axis.get_scale() == "log":
+            # Plain numbers, not powers.
+            axis.set_major_formatter(FuncFormatter(lambda value, _: without_exponent(value, ".6g")))
+            axis.set_minor_formatter(NullFormatter())
     return mapped
 
 

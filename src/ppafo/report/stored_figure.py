@@ -93,8 +93,12 @@ def stated_units(
         except UnitError as error:
             raise _other_form(file, f"shown.{one_line(si_unit)[:_LONGEST_SHOWN]}", unit, "a unit for it") from error
     path = (*keys, *device, "supply", "atmospheric_pressure")
-    atmosphere = _positive(file, document, "a pressure in Pa", *path)
-    return counted_from(stated, STANDARD_ATMOSPHERE if atmosphere is None else atmosphere)
+    atmosphere = _under(file, document, *path[:-1]).get(path[-1], STANDARD_ATMOSPHERE)
+    # JSON has true and false, which Python takes for 1 and 0.
+    is_number = isinstance(atmosphere, int | float) and not isinstance(atmosphere, bool)
+    if not is_number or not 0.0 < atmosphere < _LARGEST:
+        raise _other_form(file, ".".join(path), atmosphere, "a pressure in Pa")
+    return counted_from(stated, float(atmosphere))
 
 
 def stated_joint(file: Path, document: Mapping[str, Any], *device: str) -> JointNames:
@@ -115,18 +119,6 @@ def _ending(file: Path, document: Mapping[str, Any]) -> str:
     status = _under(file, document, "status")
     message = one_line(status.get("message", ""))[:_LONGEST_REMARK]
     return "" if status.get("kind", "completed") == "completed" else message
-
-
-def _positive(file: Path, document: Mapping[str, Any], wanted: str, *keys: str) -> float | None:
-    """Return the number above 0 at some keys of a file's document, None where it has none; ``wanted`` is what it is."""
-    table = _under(file, document, *keys[:-1])
-    if keys[-1] not in table:
-        return None
-    value = table[keys[-1]]
-    # JSON has true and false, which Python takes for 1 and 0.
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < _LARGEST:
-        raise _other_form(file, ".".join(keys), value, wanted)
-    return float(value)
 
 
 def _under(file: Path, document: Mapping[str, Any], *keys: str) -> Mapping[str, Any]:

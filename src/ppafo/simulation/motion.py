@@ -31,9 +31,10 @@ from ppafo.simulation.declaration import (
 )
 from ppafo.simulation.document import DocumentReader, kind_at, value_at
 from ppafo.simulation.motion_kind import VANE, LawSignals, Measured, MotionSection, ProfileTable, RunTimes
-from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile, stops_of
+from ppafo.simulation.profiles import TOLERANCE, profile_problem, read_profile, stops_of
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario, vane_motion
 from ppafo.simulation.schema import profile_table, shank_table
+from ppafo.units.shown import shown_text
 from ppafo.wording import one_line
 
 if TYPE_CHECKING:
@@ -63,11 +64,11 @@ class VaneKind:
     reads_forces: ClassVar[bool] = False
     is_repeated_for_its_error: ClassVar[bool] = True
 
-    def rules(self, scenario: Scenario) -> "tuple[Problem, ...]":
-        """Return which numbers contradict each other: the vane beyond a stop, a delay too long."""
-        from ppafo.simulation.ensemble.vane import rules
+    def contradictory_numbers(self, scenario: Scenario) -> "tuple[Problem, ...]":
+        """Return the numbers that do not go together: the vane beyond a stop, a delay too long."""
+        from ppafo.simulation.ensemble.vane import contradictory_numbers
 
-        return rules(scenario)
+        return contradictory_numbers(scenario)
 
     def quantities(self, scenario: Scenario) -> dict[str, Quantity]:
         """Return the declaration of every number of a scenario beside its device's, by path."""
@@ -139,23 +140,18 @@ def _plan(scenario: Scenario) -> "tuple[Run, tuple[Problem, ...]]":
     return plan_vane(scenario)
 
 
-def _measured_free(scenario: Scenario, run: "Run", times: "Floats", rows: "Mapping[str, Floats]") -> Measured:
-    from ppafo.simulation.vane_recording import measured_free
+def _measured(scenario: Scenario, run: "Run", times: "Floats", rows: "Mapping[str, Floats]") -> Measured:
+    from ppafo.simulation.vane_recording import measured_vane
 
-    return measured_free(scenario, run, times, rows)
-
-
-def _measured_prescribed(scenario: Scenario, run: "Run", times: "Floats", rows: "Mapping[str, Floats]") -> Measured:
-    from ppafo.simulation.vane_recording import measured_prescribed
-
-    return measured_prescribed(scenario, run, times, rows)
+    return measured_vane(scenario, run, times, rows)
 
 
 def _read_angle(reading: DocumentReader, device: Device) -> float:
     """Return the angle [rad] of the vane; ScenarioError where it is not between the stops of the device."""
     angle, stops = reading.number(LOCKED_ANGLE, ANGLE), (device.actuator.angle_min, device.actuator.angle_max)
     if not stops[0] - TOLERANCE <= angle <= stops[1] + TOLERANCE:
-        raise reading.refusal(LOCKED_ANGLE, f"must be between the stops of {device.name}, {range_text(stops)}")
+        low, high = (shown_text(stop, "rad") for stop in stops)
+        raise reading.refusal(LOCKED_ANGLE, f"must be between the stops of {device.name}, {low} to {high}")
     return angle
 
 
@@ -169,7 +165,7 @@ FREE_MOTION = VaneKind(
     name="free",
     section=MotionSection("the vane moves as the torques demand", FREE, _read_free),
     plan=_plan,
-    measured=_measured_free,
+    measured=_measured,
 )
 """Equation (1), with a constant external torque."""
 
@@ -184,7 +180,7 @@ LOCKED_MOTION = VaneKind(
     name="locked",
     section=MotionSection("the vane stays at one angle", (ANGLE,), _read_locked),
     plan=_plan,
-    measured=_measured_prescribed,
+    measured=_measured,
     places={LOCKED_ANGLE: ("motion", "profile", "level")},
 )
 """A vane on a test bench that is clamped: its profile is constant."""
@@ -214,7 +210,7 @@ PRESCRIBED_MOTION = VaneKind(
         ),
     ),
     plan=_plan,
-    measured=_measured_prescribed,
+    measured=_measured,
 )
 """The ankle goes along a profile whatever the device does."""
 

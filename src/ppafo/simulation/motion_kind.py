@@ -91,8 +91,8 @@ class MotionKind(Protocol[ScenarioType_contra]):
     def plan(self, scenario: ScenarioType_contra, /) -> "tuple[Run, tuple[Problem, ...]]":
         """Return the run and what may be wrong with it, as ``plan_vane`` does."""
 
-    def rules(self, scenario: ScenarioType_contra, /) -> "tuple[Problem, ...]":
-        """Return which numbers contradict each other."""
+    def contradictory_numbers(self, scenario: ScenarioType_contra, /) -> "tuple[Problem, ...]":
+        """Return the numbers that do not go together."""
 
     def quantities(self, scenario: ScenarioType_contra, /) -> dict[str, Quantity]:
         """Return the declaration of the numbers of a scenario beside those of its device, by path."""

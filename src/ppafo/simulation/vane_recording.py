@@ -15,7 +15,7 @@ from ppafo.metrics import evaluate
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.gas import energy_per_content
-from ppafo.model.plant import gravity_torque, loaded, net_torque, sliding_friction, viscous_torque
+from ppafo.model.plant import gravity_torque, net_torque, sliding_friction, torque_less_loads, viscous_torque
 from ppafo.model.ports import friction_in_motion
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.parameters.device import Gas
@@ -25,18 +25,13 @@ from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import Scenario, vane_motion
 
 
-def measured_free(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
-    """Return recording and metrics of a free vane, whose T_ex of equation (1) is constant."""
-    external = np.full(times.size, run.plant.external_torque)
-    return measured(scenario, run, times, rows, lambda _: external)
-
-
-def measured_prescribed(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
-    """Return recording and metrics of a vane whose T_ex of equation (1) is what keeps it on its path."""
+def measured_vane(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
+    """Return recording and metrics of a vane, whose T_ex of equation (1) is constant, or keeps it on its path."""
     path, plant = vane_motion(scenario).profile, run.plant
-    assert path is not None, "the angle is prescribed"
 
     def external_torque(torque: Floats) -> Floats:
+        if path is None:
+            return np.full(times.size, plant.external_torque)
         acceleration = profile_values(path, times)[2]
         gravity = over_samples(gravity_torque, rows["state.angle"], plant.gravity_torque)
         return np.asarray(net_torques(run, rows, torque - gravity) - plant.inertia * acceleration)
@@ -126,20 +121,14 @@ def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tu
 def net_torques(run: Run, rows: Mapping[str, Floats], torque: Floats) -> Floats:
     """Net torque [N m] at each sample of a vane that another ``torque`` [N m] than loads drives. Equation (1)."""
     angle, rate = rows["state.angle"], rows["state.angular_velocity"]
-    friction = over_samples(sliding_friction, rate, 1.0) * _friction_sizes(run, rows)
-    driving = _with_effects(run, rows, loaded, torque, angle)
+    largest: Any = run.plant.dynamic_torque
+    if "friction_in_motion" in run.program.ports_with_laws:
+        pressures = pressures_of(run.program.actuator, run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
+        largest = _with_effects(run, rows, friction_in_motion, largest, rate, *pressures)
+    friction = over_samples(sliding_friction, rate, 1.0) * largest
+    driving = _with_effects(run, rows, torque_less_loads, torque, angle)
     damping = over_samples(viscous_torque, run.plant.viscous_damping, rate)
     return np.asarray(_with_effects(run, rows, net_torque, driving, friction, damping, angle, rate))
-
-
-def _friction_sizes(run: Run, rows: Mapping[str, Floats]) -> Any:
-    """Size of the friction torque in motion [N m] at each sample, with the effects of a run."""
-    if "friction_in_motion" not in run.program.ports_with_laws:
-        return run.plant.dynamic_torque
-    angle, masses = rows["state.angle"], (rows["state.mass_1"], rows["state.mass_2"])
-    pressures = pressures_of(run.program.actuator, run.plant, angle, *masses)
-    rate = rows["state.angular_velocity"]
-    return _with_effects(run, rows, friction_in_motion, run.plant.dynamic_torque, rate, *pressures)
 
 
 def _with_effects(run: Run, rows: Mapping[str, Floats], function: PlainFunction, *given: Any) -> Any:

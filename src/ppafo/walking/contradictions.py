@@ -106,7 +106,7 @@ def check_walk(scenario: Scenario, reading: DocumentReader) -> None:
             )
 
 
-def rules(scenario: Scenario) -> tuple[Problem, ...]:
+def contradictory_numbers(scenario: Scenario) -> tuple[Problem, ...]:
     """Contradictions in the runs of an ensemble. ScenarioError for a walk on a bottle, which cannot vary."""
     check_no_bottle(scenario)
     return tuple(

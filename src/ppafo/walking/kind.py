@@ -25,7 +25,7 @@ class WalkKind:
     is_repeated_for_its_error: ClassVar[bool] = False
 
     plan = staticmethod(planning.plan_walks)
-    rules = staticmethod(contradictions.rules)
+    contradictory_numbers = staticmethod(contradictions.contradictory_numbers)
     quantities = staticmethod(motion.numbers_of_scenario)
     clock = staticmethod(motion.clock_with)
     switches = staticmethod(planning.switches)

@@ -12,7 +12,8 @@ from ppafo.errors import ParameterError, PpafoError, ScenarioError
 from ppafo.loading import reloaded
 from ppafo.parameters.overrides import split_override
 from ppafo.simulation.declaration import OF_A_VANE
-from ppafo.simulation.loading import device_paths, load_scenario, scenario_from_dict
+from ppafo.simulation.loading import load_scenario, scenario_from_dict
+from ppafo.simulation.overrides import device_paths
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice
 
 TASK = "torque-task-proportional"

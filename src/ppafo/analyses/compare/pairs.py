@@ -1,16 +1,13 @@
 """Two configurations in the same draws: differences, probabilities, and what no other dominates."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.metrics import METRICS
 from ppafo.metrics.tracking import ONE_INSTANT, TRACKING
 from ppafo.report.kind import ConfidenceInterval
-from ppafo.simulation.ensemble.running import lacking
-from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import (
     Floats,
     effective_sample_size,
@@ -39,11 +36,6 @@ COMPARED: dict[str, int] = {
     "toe_clearance": 1,
 }
 """Metrics of the table: -1 where less is better, 1 where more is, 0 where neither is better as such."""
-
-
-def compared_metrics(scenarios: Collection[Scenario]) -> tuple[str, ...]:
-    """Return the metrics of the table that all scenarios can have: without a reference there is no error."""
-    return tuple(name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios))
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,7 +79,7 @@ def compare(
     from dataclasses import replace
 
     from ppafo.analyses.compare.answer import finding_of
-    from ppafo.analyses.compare.solve import Draws, baseline_of, compared, overrides_by_task
+    from ppafo.analyses.compare.solve import Draws, compared
     from ppafo.arguments.words import taken_tasks
     from ppafo.studies.draws import study_of
     from ppafo.studies.study import choose_configurations
@@ -89,8 +89,7 @@ def compare(
     requested.check()
     loaded = study_of(study) if study is not None else None
     chosen = choose_configurations(configurations or None, loaded, overrides)
-    reference = baseline_of(chosen, baseline)
-    comparison = compared(chosen, reference, overrides_by_task(taken_tasks(tasks)), loaded, requested)
+    comparison = compared(chosen, baseline, taken_tasks(tasks), loaded, requested)
     device = comparison.tasks[0].cases[0].scenario
     with shown_in(device.device.shown if loaded is None else loaded.shown_for(device)):
         finding = finding_of(comparison)

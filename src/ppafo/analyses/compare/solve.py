@@ -4,23 +4,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ppafo.analyses.compare.answer import ComparisonResult, ConfigurationResult, OnTask, front_of, remarks_of
-from ppafo.analyses.compare.pairs import COMPARED, Paired, best_probabilities, compare_pairs, compared_metrics
+from ppafo.analyses.compare.pairs import COMPARED, Paired, best_probabilities, compare_pairs
 from ppafo.errors import StudyError
+from ppafo.metrics import METRICS
 from ppafo.progress import Report
 from ppafo.report.kind import ConfidenceInterval
 from ppafo.running import tried
+from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
 from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
 from ppafo.studies.declaration import DEFAULT_SEED
-from ppafo.studies.draws import (
-    CONFIDENCE,
-    FEWEST_DRAWS,
-    MAXIMUM_DRAWS,
-    Uncertainty,
-    check_fraction,
-    uncertainty_of,
-)
+from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, Uncertainty, uncertainty_of
+from ppafo.studies.limits import CONFIDENCE, check_fraction
 from ppafo.studies.sampling import NOISE, with_new_noise
 from ppafo.studies.study import Configuration, Study, with_overrides
 from ppafo.studies.varying import value_at, varied_path
@@ -33,26 +29,6 @@ DEFAULT_DRAWS = 4096
 """Draws of the uncertain values unless given."""
 _SAME = 1.0e-9
 """Values that differ by less than this fraction are one."""
-
-
-def overrides_by_task(pairs: Iterable[tuple[str, Sequence[str]]]) -> dict[str, Sequence[str]]:
-    """Return the overrides of each task by its name; as the scenarios are written where there is none."""
-    pairs = list(pairs) or [(AS_WRITTEN, ())]
-    repeated = first_twice([name for name, _ in pairs])
-    if repeated is not None:
-        raise StudyError(f"there are two tasks named '{repeated}'; give each its own name")
-    return dict(pairs)
-
-
-def baseline_of(configurations: Sequence[Configuration], name: str | None) -> str:
-    """Return the configuration that all others are compared with, the first unless one is named; StudyError if none."""
-    names = [configuration.name for configuration in configurations]
-    if name is None:
-        return names[0]
-    if name not in names:
-        hint = nearest_name(name, names)
-        raise StudyError(f"baseline: no configuration '{name}'{hint}; available: {', '.join(names)}")
-    return name
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,22 +69,36 @@ _DrawnRuns = Mapping[tuple[str, str], tuple[Rows, Rows | None, str]]
 
 def compared(
     configurations: Sequence[Configuration],
-    baseline: str,
-    overrides: Mapping[str, Sequence[str]],
+    baseline: str | None,
+    tasks: Iterable[tuple[str, Sequence[str]]],
     study: Study | None,
     draws: Draws,
 ) -> ComparisonResult:
-    """Return configurations side by side on tasks, given by their ``overrides``, and over the values of a study.
+    """Return configurations side by side on tasks, pairs of name and overrides, and over the values of a study.
 
+    All are compared with the ``baseline``, the first unless one is named; without a task the scenarios are as written.
     Without a study the noise of the sensors alone is drawn, where there is any. StudyError where too many runs fail,
     and for a study that draws a value in which the configurations differ.
     """
+    names = [configuration.name for configuration in configurations]
+    if baseline is not None and baseline not in names:
+        hint = nearest_name(baseline, names)
+        raise StudyError(f"baseline: no configuration '{baseline}'{hint}; available: {', '.join(names)}")
+    baseline = baseline or names[0]
+    pairs = list(tasks) or [(AS_WRITTEN, ())]
+    repeated = first_twice([name for name, _ in pairs])
+    if repeated is not None:
+        raise StudyError(f"there are two tasks named '{repeated}'; give each its own name")
+    overrides = dict(pairs)
     scenarios: dict[tuple[str, str], Scenario] = {}
     for task, texts in overrides.items():
         for configuration in configurations:
             scenarios[task, configuration.name] = with_overrides(configuration.scenario, texts)
     tell_coarse_pairs(scenarios.values())
-    metrics = compared_metrics(scenarios.values())
+    # Those of the table that all scenarios can have: without a reference there is no error.
+    metrics = [
+        name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios.values())
+    ]
     distributions = Uncertainty(()) if study is None or not study.paths else uncertainty_of(study)
     uncertainty = distributions.with_noise_of(scenarios.values())
     seed = draws.seed
@@ -118,7 +108,7 @@ def compared(
     cases = _cases(scenarios, drawn, draws.threads)
     comparison = ComparisonResult(
         units="SI: N m, kg, J; fractions from 0 to 1",
-        configurations=[configuration.name for configuration in configurations],
+        configurations=names,
         baseline=baseline,
         draws=draws.count if drawn else 0,
         seed=seed if drawn else 0,
@@ -128,7 +118,7 @@ def compared(
         tasks=[
             _on_task(task, texts, cases[task], baseline, metrics, draws.confidence) for task, texts in overrides.items()
         ],
-        metrics=metrics,
+        metrics=tuple(metrics),
     )
     return replace(comparison, remarks=remarks_of(comparison))
 

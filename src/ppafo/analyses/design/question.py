@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ppafo.analyses.design.wearer.requirements import WearerSizing
     from ppafo.report.finding import Finding
 
+FOR_A_WEARER = "--mass '72.5 kg' --torque '2.5 N m' --pressure '50 psi_g' --minutes 5"
 DesignLike = Annotated["SizingProblem | str | Path", Word("DESIGN")]
 
 
@@ -70,7 +71,6 @@ def design(
     from ppafo.analyses.design.loading import load_design
     from ppafo.analyses.design.profile import answer as profile
     from ppafo.analyses.design.profile.solve import size_for_profile
-    from ppafo.analyses.design.solve import FOR_A_WEARER
     from ppafo.analyses.design.wearer import answer as wearer
     from ppafo.analyses.design.wearer.requirements import DesignRequirements
     from ppafo.analyses.design.wearer.solve import size_for_wearer

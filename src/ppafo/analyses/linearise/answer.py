@@ -295,7 +295,8 @@ def steps_panels(model: LinearModel) -> list[Panel]:
                 Mark("line", steps.sizes, steps.errors, label="largest difference", style=dots),
                 Mark("line", steps.sizes, square, (), "square of the amplitude", GREY, _DASHED),
             ],
-            legend="inside",
+            # Inside it would hide the largest steps.
+            legend="above",
             then=lambda axes: axes.set(xscale="log", yscale="log"),
         ),
     ]

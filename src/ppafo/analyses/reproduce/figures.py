@@ -43,13 +43,14 @@ _BIN = 3.0
 _CURVES = (
     ("Vane angle", "Angle", "deg", ACTUAL.colour, (0.66, 0.26, 0.31, 0.34)),
     ("Pressure difference, $P_1 - P_2$", "Difference", "psi", ACTUAL.colour, (0.69, 0.14, 0.29, 0.34)),
-    ("Chamber 1 (plantarflexion), $P_1$", "Pressure", "psig", CHAMBER_1.colour, (0.3, 0.12, 0.34, 0.34)),
+    ("Chamber 1 (plantarflexion), $P_1$", "Pressure", "psig", CHAMBER_1.colour, (0.22, 0.12, 0.3, 0.34)),
     ("Chamber 2 (dorsiflexion), $P_2$", "Pressure", "psig", CHAMBER_2.colour, (0.69, 0.3, 0.29, 0.4)),
 )
 """Panels of figure 7: name, quantity, unit, colour, and the room for the first milliseconds (x, y, width, height)."""
 _EVENT: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (4, 3)), "alpha": 0.7, "zorder": 0.5}
 _LEVEL: dict[str, Any] = {"linewidth": 0.9, "linestyle": (0, (1, 2)), "zorder": 0.9}
 _WORDS: dict[str, Any] = {"fontsize": 8.5, "va": "center"}
+_SMALL_WORDS: dict[str, Any] = {"fontsize": 7.5, "va": "center"}
 
 
 def step_response_figure(
@@ -67,7 +68,7 @@ def step_response_figure(
         marked = [Mark("at", x=time, colour=GREY, style=_EVENT) for time in (breakaway, stop)]
         # Angles at which nothing else is drawn there.
         for time, angle, words in ((breakaway, 120.0, "vane breaks away"), (stop, 25.0, "vane at rest")):
-            named.append(Mark("text", time + 0.015 * end, angle, label=words, colour=GREY, style=_WORDS))
+            named.append(Mark("text", time + 0.01 * end, angle, label=words, colour=GREY, style=_SMALL_WORDS))
     ends = -_SHOWN_BEFORE_STEP * end, end
     upper: list[Panel] = []
     lower: list[Panel] = []
@@ -96,7 +97,7 @@ def step_response_figure(
         upper.append(Panel(_AFTER_STEP, Kind(quantity, unit), marks, title, None, legend, then, 2.3, shares_x=True))
         named = []
     panels = [*upper[:2], *lower[:2], *upper[2:], *lower[2:]]
-    return draw_panels(panels, 2, (3.65, 1.0), kind=(synthetic or recording).kind)
+    return draw_panels(panels, 2, (3.15, 1.0), kind=(synthetic or recording).kind)
 
 
 def _curves(recording: Recording, levels: SupplyLevels) -> tuple[Floats, ...]:
@@ -194,10 +195,10 @@ def torque_task_figure(
         )
     ]
     # Room to the right of the longer bar for the amounts.
-    ends = {"xlim": (0.0, 2.95 * most), "yticks": (1.0, 0.0), "yticklabels": [name for _, _, name in runs]}
+    ends = {"xlim": (0.0, 4.0 * most), "yticks": (1.0, 0.0), "yticklabels": [name for _, _, name in runs]}
     then = methodcaller("set", **ends)
     panels.append(Panel(_GAS, Kind(), at_end, "Where that gas is at the end", then=then, tall=0.75))
-    return draw_panels(panels, 1, (7.3, 1.0), kind=solenoid.kind)
+    return draw_panels(panels, 1, (6.3, 1.0), kind=solenoid.kind)
 
 
 def _torque_marks(recording: Recording, look: DrawingStyle, ceiling: float, synthetic: Recording | None) -> list[Mark]:

@@ -252,7 +252,7 @@ def _panels(decays: tuple[FreeDecay, ...], model: Floats, slowing: Slowing) -> t
     rates.append(curve_mark("$-\\beta\\omega/I - T_c/I$", speeds, -straight.at(speeds)))
     if slowing.rise > 0.0 and slowing.rise_velocity > 0.0:
         # The formula of the legend is a straight line; what was fitted near rest bends, and has a name of its own.
-        bent = Mark("line", speeds, -slowing.at(speeds), label="fit, with more friction near rest")
+        bent = Mark("line", speeds, -slowing.at(speeds), label="fit near rest")
         rates.append(replace(bent, colour=GREY, style={"linestyle": "--", "linewidth": 1.2}))
     return (
         Panel(TIME, Kind("Angle", "rad", "angle"), angles, "Free decay", legend="inside"),

@@ -96,7 +96,7 @@ def open_valve_flow(
     )
     shown, fitted = (1.0e8 * one / upstream for one in (flow, model))
     marks = readings_mark("measured", ratio, shown), curve_mark(law, ratio, fitted)
-    axes = Kind("Downstream over upstream pressure"), Kind("Flow over upstream pressure", "g/s per bar")
+    axes = Kind("Pressure ratio"), Kind("Flow over upstream pressure", "g/s per bar")
     result = result_of(
         PROCEDURE,
         sources,

@@ -109,7 +109,8 @@ def _estimate(fitted: Fit, reported: ReportedNumber, origin: tuple[str, ...]) ->
     return Estimate(reported.path, value, reported.unit, low, high, verdict, sentence, origin, fitted.confidence)
 
 
-_SIZE = (4.1, 3.3)
+_SIZE = (3.1, 2.7)
+"""Inches of a panel: two of them side by side can be read at the width of a column."""
 
 
 def bench_figure(panels: Sequence[Panel], kind: RecordingKind) -> "Figure":

@@ -1,8 +1,9 @@
 """Planning of an ensemble: runs with one program and one clock from columns; contradictory runs are refused."""
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,19 +16,16 @@ from ppafo.model.columns import Problem, at
 from ppafo.model.declaration import range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.declaration import limits_text
-from ppafo.parameters.plant import switches_of
+from ppafo.parameters.effects import switches_of
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import ScenarioColumns
-from ppafo.simulation.motion_kind import MotionKind, RunTimes
+from ppafo.simulation.motion_kind import RunTimes
 from ppafo.simulation.numbers import declared_numbers, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_text
 
 # Numbers that name one of many: there is nothing between two of them.
 _WHOLE = ("sensors.seed", "wearer.person")
-
-Rule = Callable[[Scenario], tuple[Problem, ...]]
-"""Function that returns the possible faults of a scenario that represents many runs."""
 
 
 @dataclass(slots=True)
@@ -91,13 +89,12 @@ def screen_columns(columns: ScenarioColumns) -> ValidRuns:
         screen.clock, problems = columns.base.motion.motion_kind.clock(columns.base, times)
         for is_bad, line in problems:
             screen.refuse(is_bad, line)
-    for rule in rules_of(columns.base.motion.motion_kind):
-        # After each problem that some runs have, the others are checked again: their numbers may have fewer.
-        while screen.members.size:
-            problems_left = [problem for problem in rule(screen.scenario) if np.any(problem[0])]
-            if not problems_left:
-                break
-            screen.refuse(*problems_left[0])
+    # After each problem that some runs have, the others are checked again: their numbers may have fewer.
+    while screen.members.size:
+        found = next((problem for problem in _contradictory_numbers(screen.scenario) if np.any(problem[0])), None)
+        if found is None:
+            break
+        screen.refuse(*found)
     return screen
 
 
@@ -130,25 +127,17 @@ def plan_ensemble(columns: ScenarioColumns, change: Callable[[Run], Run] | None 
     """Batches of all runs that can be; each has the rows, bit for bit, that ``plan_run`` gives it alone and changed."""
     screen = screen_columns(columns)
     batches: list[tuple[Members, Batch]] = []
-    if screen.members.size:
-        for places in _of_one_program(screen.scenario, screen.members.size):
-            batches += _plan_batches(screen, places, change)
+    for places in _of_one_program(screen.scenario, screen.members.size) if screen.members.size else ():
+        part = screen.at(places)
+        while part.members.size:
+            run, problems = part.scenario.motion.motion_kind.plan(part.scenario)
+            bad = next((problem for problem in problems if np.any(problem[0])), None)
+            if bad is None:
+                run = run if change is None else change(run)
+                batches += [(part.members[members], batch) for members, batch in batches_of(run, part.members.size)]
+                break
+            part.refuse(*bad)
     return EnsemblePlan(tuple(batches), screen.reasons)
-
-
-def _plan_batches(
-    screen: ValidRuns, places: Members, change: Callable[[Run], Run] | None
-) -> list[tuple[Members, Batch]]:
-    """Batches of some runs that ask for one program; what cannot be planned is refused."""
-    part = screen.at(places)
-    while part.members.size:
-        run, problems = part.scenario.motion.motion_kind.plan(part.scenario)
-        bad = [problem for problem in problems if np.any(problem[0])]
-        if not bad:
-            run = run if change is None else change(run)
-            return [(part.members[members], batch) for members, batch in batches_of(run, part.members.size)]
-        part.refuse(*bad[0])
-    return []
 
 
 def _of_one_program(scenario: Scenario, runs: int) -> list[Members]:
@@ -166,20 +155,36 @@ def _of_one_program(scenario: Scenario, runs: int) -> list[Members]:
     return [np.flatnonzero(patterns == pattern) for pattern in np.unique(patterns)]
 
 
-def _inconsistent(scenario: Scenario) -> tuple[Problem, ...]:
-    """Two numbers of a device that contradict each other."""
+def _contradictory_numbers(scenario: Scenario) -> Iterator[Problem]:
+    """Yield the numbers of a scenario of many runs that do not go together; the later ones suppose the earlier."""
+    device, supply = scenario.device, scenario.device.supply
+    for path, relation, other, holds in consistency(device):
+        yield np.logical_not(holds), partial(_inconsistent_line, scenario, path, relation, other)
+    yield from _misshapen(scenario)
+    is_beyond, line = beyond_pressures(device)
+    yield is_beyond, lambda run: f"actuator: {line(run)}"
+    yield growth_and_problem(device)[1]
+    yield from scenario.motion.motion_kind.contradictory_numbers(scenario)
+    if scenario.supply_lines is None:
+        return
 
-    def problem(path: str, relation: str, other: str, holds: Any) -> Problem:
-        first, second = operator.attrgetter(path, other)(scenario.device)
+    def line_of_regulator(run: int) -> str:
+        first, second = (
+            shown_text(at(pressure, run), "Pa_a", atmosphere=at(supply.atmospheric_pressure, run))
+            for pressure in (supply.pressure, supply.dorsiflexion_pressure)
+        )
+        return f"supply.dorsiflexion_pressure = {second}: with [supply_line] at most supply.pressure, {first}"
 
-        def line(run: int) -> str:
-            unit, room = declared_numbers(scenario)[path].unit, at(scenario.device.supply.atmospheric_pressure, run)
-            number, limit = (shown_text(at(value, run), unit, ".9g", room) for value in (first, second))
-            return f"{path} = {number} must be {relation} {other} = {limit}"
+    yield np.atleast_1d(supply.dorsiflexion_pressure > supply.pressure), line_of_regulator
 
-        return np.logical_not(holds), line
 
-    return tuple(problem(*rule) for rule in consistency(scenario.device))
+def _inconsistent_line(scenario: Scenario, path: str, relation: str, other: str, run: int) -> str:
+    """Sentence on two numbers of a device that contradict each other in a run."""
+    unit, room = declared_numbers(scenario)[path].unit, at(scenario.device.supply.atmospheric_pressure, run)
+    number, limit = (
+        shown_text(at(value, run), unit, ".9g", room) for value in operator.attrgetter(path, other)(scenario.device)
+    )
+    return f"{path} = {number} must be {relation} {other} = {limit}"
 
 
 def _misshapen(scenario: Scenario) -> tuple[Problem, ...]:
@@ -208,36 +213,3 @@ def _misshapen(scenario: Scenario) -> tuple[Problem, ...]:
     # A kind checks single numbers, so the runs are gone through one by one.
     problems = [words(run) for run in range(varied[0].size)]
     return ((np.array([bool(line) for line in problems]), lambda run: problems[run]),)
-
-
-def _beyond_the_table(scenario: Scenario) -> tuple[Problem, ...]:
-    """A supply above the pressures at which an actuator was measured."""
-    is_beyond, line = beyond_pressures(scenario.device)
-    return ((is_beyond, lambda run: f"actuator: {line(run)}"),)
-
-
-def _without_growth(scenario: Scenario) -> tuple[Problem, ...]:
-    """An actuator whose chamber 1 does not grow with the angle."""
-    return (growth_and_problem(scenario.device)[1],)
-
-
-def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]:
-    """A second regulator that is set to more than the line has that feeds it."""
-    supply = scenario.device.supply
-    if scenario.supply_lines is None:
-        return ()
-
-    def line(run: int) -> str:
-        first, second = (
-            shown_text(at(pressure, run), "Pa_a", atmosphere=at(supply.atmospheric_pressure, run))
-            for pressure in (supply.pressure, supply.dorsiflexion_pressure)
-        )
-        return f"supply.dorsiflexion_pressure = {second}: with [supply_line] at most supply.pressure, {first}"
-
-    return ((np.atleast_1d(supply.dorsiflexion_pressure > supply.pressure), line),)
-
-
-def rules_of(kind: MotionKind[Scenario]) -> tuple[Rule, ...]:
-    """The rules for the scenarios of a kind of motion."""
-    of_device = _inconsistent, _misshapen, _beyond_the_table, _without_growth
-    return *of_device, kind.rules, _second_regulator_above_the_first

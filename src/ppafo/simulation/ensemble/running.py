@@ -16,6 +16,7 @@ from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS, has_channels
 from ppafo.metrics.gas import WITH_ENERGY_BALANCE
 from ppafo.metrics.metric import MetricKind, Readings
+from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Scenario
 
@@ -138,7 +139,8 @@ def lacking(scenario: Scenario, kind: MetricKind) -> str:
 
 def offered(scenario: Scenario) -> dict[str, MetricKind]:
     """The metrics that runs of a scenario have, for messages: metrics of walks are not for a vane, nor the reverse."""
-    missing = frozenset() if scenario.gas_model is not None else WITH_ENERGY_BALANCE
+    missing: frozenset[str] = frozenset() if scenario.gas_model is not None else WITH_ENERGY_BALANCE
+    missing |= OF_SECOND_CHAMBER if scenario.device.actuator.has_one_chamber else frozenset()
     return {
         name: kind
         for name, kind in METRICS.items()

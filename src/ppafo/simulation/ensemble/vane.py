@@ -20,48 +20,34 @@ from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
 from ppafo.units.shown import shown_text
 
 
-def rules(scenario: Scenario) -> tuple[Problem, ...]:
-    """Return what may be wrong with a scenario that represents many runs: the vane beyond a stop, a delay too long."""
-    delay, step = scenario.sensors.delay, scenario.run.step
+def contradictory_numbers(scenario: Scenario) -> tuple[Problem, ...]:
+    """Numbers of a vane that do not go together: it or its reference beyond a limit, a delay too long."""
+    delay, step, device = scenario.sensors.delay, scenario.run.step, scenario.device
+    motion, followed = vane_motion(scenario), CONTROLLED[scenario.controlled]
+    profile = ProfileChoice("constant", {"level": motion.angle}) if motion.profile is None else motion.profile
+    stops = stops_of(device)
 
-    def long_line(run: int) -> str:
+    def angle_line(run: int) -> str:
+        low, high = (shown_text(at(stop, run), "rad") for stop in (stops.lowest, stops.highest))
+        said = f"{path_of_locked_angle(scenario) or LOCKED_ANGLE} = {shown_text(at(profile.level, run), 'rad')}"
+        return f"{said}: must be between the stops of {device.name}, {low} to {high}"
+
+    def delay_line(run: int) -> str:
         longest = shown_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
         return f"sensors.delay = {at(delay, run):.9g} s: must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps"
 
-    return (
-        _beyond_the_stops(scenario),
-        _reference_beyond_reach(scenario),
+    is_held = profile.kind == "constant"
+    angle = (_is_beyond(stops, profile), angle_line) if is_held else _beyond(scenario, stops, profile, "motion.profile")
+    problems = [
         (
             delay > scenario.run.duration,
             lambda run: f"sensors.delay = {at(delay, run):.9g} s: must not be longer than run.duration",
         ),
-        (delay / step > MAXIMUM_STEPS_OF_DELAY, long_line),
-    )
-
-
-def _beyond_the_stops(scenario: Scenario) -> Problem:
-    """A vane that begins, is held or is to move beyond the stops."""
-    actuator, motion = scenario.device.actuator, vane_motion(scenario)
-    profile = ProfileChoice("constant", {"level": motion.angle}) if motion.profile is None else motion.profile
-    if profile.kind != "constant":
-        return _profile_beyond(scenario, stops_of(scenario.device), profile, "motion.profile")
-    level = profile.level
-
-    def angle_line(run: int) -> str:
-        low, high = (shown_text(at(stop, run), "rad") for stop in (actuator.angle_min, actuator.angle_max))
-        path = path_of_locked_angle(scenario) or LOCKED_ANGLE
-        said = f"{path} = {shown_text(at(level, run), 'rad')}"
-        return f"{said}: must be between the stops of {scenario.device.name}, {low} to {high}"
-
-    return _is_beyond(stops_of(scenario.device), profile), angle_line
-
-
-def _reference_beyond_reach(scenario: Scenario) -> Problem:
-    """An angle or a pressure that no controller can reach."""
-    followed = CONTROLLED[scenario.controlled]
-    if followed.reach is None or not scenario.follows_reference:
-        return np.zeros(1, dtype=np.bool_), lambda _: ""
-    return _profile_beyond(scenario, limits_of(scenario.device, followed), scenario.reference, "reference")
+        (delay / step > MAXIMUM_STEPS_OF_DELAY, delay_line),
+    ]
+    if followed.reach is not None and scenario.follows_reference:
+        problems.insert(0, _beyond(scenario, limits_of(device, followed), scenario.reference, "reference"))
+    return angle, *problems
 
 
 def _is_beyond(limits: Limits, profile: ProfileChoice) -> NDArray[np.bool_]:
@@ -71,7 +57,7 @@ def _is_beyond(limits: Limits, profile: ProfileChoice) -> NDArray[np.bool_]:
     return np.atleast_1d(np.logical_or(lowest < lower, highest > upper))
 
 
-def _profile_beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, section: str) -> Problem:
+def _beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, section: str) -> Problem:
     """A profile of a section that leaves its limits."""
     outside = _is_beyond(limits, profile)
     # The bounds hold for all time; a run that may leave them is checked at its own times.

@@ -41,15 +41,6 @@ _QUICKER = 1.3
 """Rate at an angle over the rate the gains are made for, from which it causes oscillation [-]."""
 
 
-def causes_of_task(case: Case) -> tuple[TrackingCause, ...]:
-    """Causes that apply to a task, the surest first."""
-    return tuple(cause for find in _OF_TASK if (cause := find(case)) is not None)
-
-
-def _unless_oscillating(case: Case) -> TrackingCause | None:
-    return None if case.oscillates else torque_beyond_reach(case)
-
-
 def _shut_valve(case: Case) -> TrackingCause | None:
     """The command is 0, or stays within the dead band of the valve."""
     scenario, settled = case.scenario, case.settled
@@ -212,8 +203,8 @@ def _not_settled(case: Case) -> TrackingCause:
     return TrackingCause("reach, dead band, friction and opening do not tell why", (), "look at the figure")
 
 
-_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
-    _unless_oscillating,
+CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
+    torque_beyond_reach,
     load_beyond_reach,
     flung_at_start,
     _static_friction,

@@ -27,7 +27,7 @@ _FLUNG = 0.5
 def torque_beyond_reach(case: Case) -> TrackingCause | None:
     """A torque is wanted that the supplies of the device do not give at that angle."""
     scenario, samples = case.scenario, case.settled.samples
-    if scenario.controlled != TORQUE:
+    if scenario.controlled != TORQUE or case.oscillates:
         return None
     reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
     place = int(np.argmax(np.abs(reference)))

@@ -177,6 +177,8 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
     # An error behind a reference that turns turns with it.
     turns = reversals(error, OSCILLATION_THRESHOLD * wanted)
     turns -= 0 if rests else reversals(np.asarray(reference[samples]), OSCILLATION_THRESHOLD * wanted)
+    steps = np.diff(reference)
+    is_monotone = bool(np.all(steps >= 0.0) or np.all(steps <= 0.0))
     return SettledPart(
         samples=samples,
         duration=float(time[-1] - time[samples][0]),
@@ -188,7 +190,7 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
         moved=float(np.ptp(value)),
         peak=_peak(scenario, reference, value) if asked >= wanted else 0.0,
         rests=rests,
-        ends_on_ramp=not rests and first is None and _is_monotone(reference),
+        ends_on_ramp=not rests and first is None and is_monotone,
         start=float(time[samples][0]),
         worst=float(np.max(np.abs(error))),
         span=float(np.ptp(error)),
@@ -205,11 +207,6 @@ def _peak(scenario: Scenario, reference: Floats, value: Floats) -> float:
     # What a joint has at the start, such as the torque of its material, is not the loop's.
     met = int(np.argmax((value - reference) * sign <= 0.0))
     return float(np.max((value[met:] - start) * sign))
-
-
-def _is_monotone(reference: Floats) -> bool:
-    steps = np.diff(reference)
-    return bool(np.all(steps >= 0.0) or np.all(steps <= 0.0))
 
 
 def smallest_change(scenario: Scenario) -> float:

@@ -4,22 +4,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED
-from ppafo.signals import Recording
-from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.case import Case, TrackingCause
-from ppafo.simulation.tracking.causes import causes_of_task
+from ppafo.simulation.tracking.causes import CAUSES_OF_TASK
 from ppafo.simulation.tracking.load_causes import torque_beyond_reach
 from ppafo.simulation.tracking.remedies import Remedy, change_text
 from ppafo.simulation.tracking.rule import (
     LARGEST_SHARE,
     REVERSALS,
     Failure,
-    SettledPart,
     failure_of_task,
     failure_of_walk,
     is_noisy,
@@ -28,7 +22,7 @@ from ppafo.simulation.tracking.rule import (
     settled_walk,
     torque_limit,
 )
-from ppafo.simulation.tracking.walk_causes import causes_of_walk
+from ppafo.simulation.tracking.walk_causes import CAUSES_OF_WALK
 from ppafo.units.shown import in_units, units_in_force
 
 if TYPE_CHECKING:
@@ -83,7 +77,14 @@ class Tracking:
     @in_units(lambda tracking: tracking.units)
     def sentence(self) -> str:
         """Verdict in one line."""
-        return f"{self._found}; {self.cause}{self._help}"
+        remedies = " or ".join(remedy.text for remedy in self.remedies[:2])
+        if self.accepted:
+            last = f"; on purpose: {self.accepted}"
+        elif self.tried or not remedies:
+            last = f"; {self.tried or self.advice}" if self.tried or self.advice else ""
+        else:
+            last = f": {remedies}"
+        return f"{self._found}; {self.cause}{last}"
 
     @property
     def _found(self) -> str:
@@ -109,102 +110,32 @@ class Tracking:
     @property
     def time_text(self) -> str:
         """Settled part of the run, in words; its error is less than the error of the whole run in the metrics."""
-        return f" from {self.since:.3g} s on" if self.since > 0.0 else ""
-
-    @property
-    def _help(self) -> str:
-        if self.accepted:
-            return f"; on purpose: {self.accepted}"
-        if self.tried:
-            return f"; {self.tried}"
-        if self.remedies:
-            return f": {' or '.join(remedy.text for remedy in self.remedies[:2])}"
-        return f"; {self.advice}" if self.advice else ""
-
-
-def tracking_in(result: "RecordedResult") -> Tracking | None:
-    """Verdict on a result; None where it follows its reference, or has none."""
-    return tracking_of(result.scenario, result.scenario.law, result.recording, *_reversals_and_stride(result))
+        return _time_text(self.since)
 
 
 @in_units(lambda result: result.scenario.device.shown)
-def following_text(result: "RecordedResult") -> str:
-    """Sentence on a result that follows its reference, with its RMS error; "" where it does not, or is not judged."""
-    scenario = result.scenario
-    judged = _judged(scenario, scenario.law, result.recording, *_reversals_and_stride(result))
-    if judged is None or judged[0].failure is not None:
-        return ""
-    settled, controlled = judged[0].settled, CONTROLLED[scenario.controlled]
-    # On a ramp every loop is behind, and a walk whose law requests no torque has a peak alone.
-    if settled.ends_on_ramp or controlled_in(result.recording) is None:
-        return ""
-    error, wanted = (change_text(controlled.name, each) for each in (settled.error, settled.wanted))
-    since = f" from {settled.start:.3g} s on" if settled.start > 0.0 else ""
-    return f"the {controlled.words} follows its reference: RMS {error} of {wanted} wanted{since}"
-
-
-def _reversals_and_stride(result: "RecordedResult") -> tuple[float, float]:
-    """Reversals of the command in a result, and the duration of its strides [s], 0 for a task."""
-    metrics = {name: metric.value for name, metric in result.metrics.items()}
-    strides, time = metrics.get("strides", 0.0), result.recording.time
-    return metrics.get(REVERSALS, 0.0), float(time[-1] - time[0]) / strides if strides > 0.0 else 0.0
-
-
-def _judged(
-    scenario: Scenario, law: ControllerKind | None, recording: Recording, reversals: float, stride_time: float
-) -> tuple[Case, float] | None:
-    """Run with its kind of failure, if any, and its command reversals over the most; None where nothing is judged."""
-    is_task = scenario.follows_reference
-    if (
-        len(recording) < _FEWEST_SAMPLES
-        or scenario.controller.is_open_loop
-        or (is_task and controlled_in(recording) is None)
-    ):
-        return None
-    limit = 0.0 if is_task else torque_limit(scenario.controller.settings)
-    settled = settled_task(scenario, recording) if is_task else settled_walk(recording, limit)
-    if settled is None:
-        return None
-    duration = float(np.ptp(recording.time[[0, -1]]))
-    counted = settled.reversals * max(duration, 1.0) if is_noisy(scenario) else reversals
-    turning = counted / most_reversals(scenario, law, duration, stride_time)
-    if is_task:
-        failure = failure_of_task(settled, turning, law is not None and law.only_switches)
-    else:
-        failure = failure_of_walk(settled, turning, limit)
-    case = Case(scenario=scenario, law=law, recording=recording, settled=settled, failure=failure)
-    # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does.
-    if failure is None and is_task and abs(settled.missing) > LARGEST_SHARE * settled.wanted:
-        failure = "does not follow" if torque_beyond_reach(case) is not None else None
-        case = case._replace(failure=failure)
-    return case, turning
-
-
-@in_units(lambda scenario, *_, **__: scenario.device.shown)
-def tracking_of(
-    scenario: Scenario, law: ControllerKind | None, recording: Recording, reversals: float, stride_time: float = 0.0
-) -> Tracking | None:
-    """Verdict on a recording whose command reversed so often; None where it follows its reference, or has none.
-
-    ``stride_time`` [s] is the duration of a stride of a walk, 0 for a task.
-    """
-    judged = _judged(scenario, law, recording, reversals, stride_time)
+def tracking_in(result: "RecordedResult") -> Tracking | None:
+    """Verdict on a result; None where it follows its reference, or has none."""
+    judged, scenario = _judged(result), result.scenario
     if judged is None or (failure := judged[0].failure) is None:
         return None
-    case, turning = judged
+    case, turning, per_second, stride_time = judged
     settled, is_task = case.settled, scenario.follows_reference
-    limit = 0.0 if is_task else torque_limit(scenario.controller.settings)
-    duration = float(np.ptp(recording.time[[0, -1]]))
-    cause, *others = causes_of_task(case) if is_task else causes_of_walk(case)
+    found = (find(case) for find in (CAUSES_OF_TASK if is_task else CAUSES_OF_WALK))
+    cause, *others = (each for each in found if each is not None)
+    # Reversals of the value where these fail, else of the command.
+    if settled.turns and turning <= 1.0:
+        per_second = settled.turns / settled.duration
+    overshoots, is_of_walk = failure == "overshoots", stride_time > 0.0
     return Tracking(
         kind=failure,
         controlled=scenario.controlled,
         error=settled.error,
-        wanted=limit if failure == "overshoots" and not is_task else settled.wanted,
+        wanted=torque_limit(scenario.controller.settings) if overshoots and not is_task else settled.wanted,
         missing=settled.missing,
-        moved=settled.peak if failure == "overshoots" else settled.moved,
-        reversals=_rate(settled, turning > 1.0, reversals / duration) * (stride_time if stride_time > 0.0 else 1.0),
-        per="stride" if stride_time > 0.0 else "second",
+        moved=settled.peak if overshoots else settled.moved,
+        reversals=per_second * (stride_time if is_of_walk else 1.0),
+        per="stride" if is_of_walk else "second",
         cause=cause.text,
         advice=cause.advice,
         remedies=cause.remedies,
@@ -216,6 +147,55 @@ def tracking_of(
     )
 
 
-def _rate(settled: SettledPart, is_restless: bool, of_command: float) -> float:
-    """Reversals a second of the value where these fail, else of the command."""
-    return settled.turns / settled.duration if settled.turns and not is_restless else of_command
+@in_units(lambda result: result.scenario.device.shown)
+def following_text(result: "RecordedResult") -> str:
+    """Sentence on a result that follows its reference, with its RMS error; "" where it does not, or is not judged."""
+    judged, controlled = _judged(result), CONTROLLED[result.scenario.controlled]
+    # On a ramp every loop is behind, and a walk whose law requests no torque has a peak alone.
+    if judged is None or judged[0].failure is not None or controlled_in(result.recording) is None:
+        return ""
+    settled = judged[0].settled
+    if settled.ends_on_ramp:
+        return ""
+    error, wanted = (change_text(controlled.name, each) for each in (settled.error, settled.wanted))
+    return f"the {controlled.words} follows its reference: RMS {error} of {wanted} wanted{_time_text(settled.start)}"
+
+
+def _time_text(since: float) -> str:
+    """Settled part of a run from a time [s] on, in words."""
+    return f" from {since:.3g} s on" if since > 0.0 else ""
+
+
+def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None:
+    """Run with its kind of failure, if any; None where nothing is judged.
+
+    Then the command reversals over the most that are allowed [-], those in a second, and the duration of a stride [s],
+    0 for a task.
+    """
+    scenario, law, recording = result.scenario, result.scenario.law, result.recording
+    is_task = scenario.follows_reference
+    if (
+        len(recording) < _FEWEST_SAMPLES
+        or scenario.controller.is_open_loop
+        or (is_task and controlled_in(recording) is None)
+    ):
+        return None
+    limit = 0.0 if is_task else torque_limit(scenario.controller.settings)
+    settled = settled_task(scenario, recording) if is_task else settled_walk(recording, limit)
+    if settled is None:
+        return None
+    reversals, strides = (
+        result.metrics[name].value if name in result.metrics else 0.0 for name in (REVERSALS, "strides")
+    )
+    stride_time = recording.duration / strides if strides > 0.0 else 0.0
+    counted = settled.reversals * max(recording.duration, 1.0) if is_noisy(scenario) else reversals
+    turning = counted / most_reversals(scenario, law, recording.duration, stride_time)
+    if is_task:
+        failure = failure_of_task(settled, turning, law is not None and law.only_switches)
+    else:
+        failure = failure_of_walk(settled, turning, limit)
+    case = Case(scenario=scenario, law=law, recording=recording, settled=settled, failure=failure)
+    # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does.
+    if failure is None and is_task and abs(settled.missing) > LARGEST_SHARE * settled.wanted:
+        case = case._replace(failure="does not follow" if torque_beyond_reach(case) is not None else None)
+    return case, turning, reversals / recording.duration, stride_time

@@ -17,13 +17,8 @@ _OFTEN = 0.1
 """Share of the time with a request that is often [-]."""
 _DORSIFLEXION = ("landing_peak_torque", "swing_peak_torque", "hold_stiffness", "hold_damping")
 """Settings of a walk that ask for a torque in dorsiflexion."""
-_ANGLES_OF_WALK = 400
+_ANGLESCAUSES_OF_WALK = 400
 """Samples of a walk at which the reach is compared with the request."""
-
-
-def causes_of_walk(case: Case) -> tuple[TrackingCause, ...]:
-    """Causes that apply to a walk, the surest first."""
-    return tuple(cause for find in _OF_WALK if (cause := find(case)) is not None)
 
 
 def _request_beyond_reach(case: Case) -> TrackingCause | None:
@@ -33,7 +28,7 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
         return None
     device, torque = scenario.device, static_torque(scenario.device)
     reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
-    places = np.unique(np.linspace(0, angle.size - 1, _ANGLES_OF_WALK).astype(np.intp))
+    places = np.unique(np.linspace(0, angle.size - 1, _ANGLESCAUSES_OF_WALK).astype(np.intp))
     reaches = np.array([torque_reach(device, float(angle[place]), torque) for place in places])
     above, below = reference[places] - reaches[:, 1], reaches[:, 0] - reference[places]
     share = float(np.mean((above > 0.0) | (below > 0.0)))
@@ -120,7 +115,7 @@ def _dead_band_of_walk(case: Case) -> TrackingCause | None:
     return TrackingCause(text, tuple(larger_gains(scenario, case.law, (2.0, 4.0, 8.0))), advice)
 
 
-_OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (
+CAUSES_OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _request_beyond_reach,
     _oscillation_of_walk,
     _dead_band_of_walk,
