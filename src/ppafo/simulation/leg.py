@@ -72,10 +72,10 @@ def measured_leg(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str,
         shank = np.broadcast_to(shank_over_samples(kind, leg.shank, times).angle, times.shape)
         channels["shank_angle"] = (shank, "rad")
         if kind is GAIT_SHANK:
-            foot = over_samples(foot_in_gait, leg.shank, times, angle)
-            channels["foot_angle"] = (foot.angle, "rad")
-            channels["measured_foot_angle"] = (foot.measured_angle, "rad")
-            channels["toe_difference"] = (foot.toe_difference, "m")
+            foot, measured_foot, toe_difference = over_samples(foot_in_gait, leg.shank, times, angle)
+            channels["foot_angle"] = (foot, "rad")
+            channels["measured_foot_angle"] = (measured_foot, "rad")
+            channels["toe_difference"] = (toe_difference, "m")
         else:
             channels["foot_angle"] = (shank - angle + 0.5 * np.pi, "rad")
     external_torque = partial(_torque_on_leg, _leg_of(scenario), run, times, rows)

@@ -30,7 +30,8 @@ from ppafo.model.regulator import SupplyLines, lines_at_start
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device, SonicOrifice
-from ppafo.parameters.plant import SEEN_BY_EFFECTS, area_restriction, plant_with, sonic_restriction
+from ppafo.parameters.effects import SEEN_BY_EFFECTS
+from ppafo.parameters.plant import area_restriction, plant_with, sonic_restriction
 from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES, THERMAL, gas_settings
 from ppafo.simulation.leg import foot_load, with_load
 from ppafo.simulation.numbers import path_of_locked_angle
