@@ -1,11 +1,12 @@
 """Numbers of the plant, computed from a device: its orifices, its valve and its actuator."""
 
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
-from ppafo.model.actuators.kind import Range, mean_growth, plant_in_shape
+from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import first, over_runs
-from ppafo.model.orifice import FlowCurve, area_conductance, isentropic_curve, iso6358_curve, sonic_conductance_mass
+from ppafo.model.flow_curve import isentropic_curve, iso6358_curve
+from ppafo.model.orifice import FlowCurve, area_conductance, sonic_conductance_mass
 from ppafo.model.plant import PlantParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice, Valve
@@ -76,11 +77,13 @@ def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParam
     valve = restriction(device.valve.orifice, device.gas, ratio)
     plant = plant_with(device, valve, restriction(device.actuator.leak, device.gas, ratio), external_torque)
     plant = plant._replace(relieving=float(device.supply.takes_back))
-    if ACTUATORS[device.actuator.kind].model.shape is None:
+    model: Any = ACTUATORS[device.actuator.kind].model
+    if model.shape is None:
         return plant
-    return cast(
-        PlantParameters, plant_in_shape(plant, ACTUATORS[device.actuator.kind].model, *shape_and_growth(device))
-    )
+    # The plant of another kind, from a vane's with the same stops, gas and orifices.
+    shape, growth = shape_and_growth(device)
+    other: PlantParameters = model.plant(*plant._replace(torque_constant=growth, displacement_per_radian=growth), shape)
+    return other
 
 
 def shape_and_growth(device: Device) -> tuple[Any, Any]:
