@@ -266,7 +266,7 @@ def _recording(bottle: Bottle, stretches: Sequence[DischargeInterval]) -> Record
 
 
 def content_of(bottle: Bottle, mass: float, energy: float) -> BottleContent:
-    """Return what the bottle holds with a mass [kg] of an energy [J]."""
+    """State of the bottle's content with a mass [kg] of an energy [J]."""
     table = bottle.fluid.table
     return bottle_content(table, mass, bottle.volume, content_temperature(table, mass, bottle.volume, energy))
 
