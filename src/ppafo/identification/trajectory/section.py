@@ -11,7 +11,7 @@ from pathlib import Path
 from ppafo.errors import DataError, IdentificationError, ScenarioError
 from ppafo.identification.estimate import Estimate, interval_factor
 from ppafo.identification.keys import positive_in, quantity_in
-from ppafo.identification.source import RecordingSource, UsedRecording, double_use, told_of_readings
+from ppafo.identification.source import RecordingSource, UsedRecording, double_use, remarks_on_readings
 from ppafo.identification.tolerances import Tolerances, quantity_of
 from ppafo.identification.trajectory.expected import CandidateExperiment, ExpectedBenefit, expected_information
 from ppafo.identification.trajectory.experiment import (
@@ -255,7 +255,7 @@ def solve_section(section: TrajectorySection, setting: SectionContext, report: R
     sources = tuple(RecordingSource(experiment.recording, experiment.source) for experiment in problem.experiments)
     disagreeing = _against_bench(fitted.estimates, setting.bench)
     return TrajectoryOutcome(
-        fitted, expected, (*told_of_readings(sources), *fitted.outliers, *fitted.remarks, *disagreeing)
+        fitted, expected, (*remarks_on_readings(sources), *fitted.outliers, *fitted.remarks, *disagreeing)
     )
 
 
