@@ -28,7 +28,7 @@ from ppafo.identification.keys import Columns, Confidence, positive_in, quantity
 from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.source import RecordingSource
 from ppafo.identification.tolerances import DEFAULTS, BenchSection, Tolerances
-from ppafo.identification.trajectory.layout import TrajectorySection
+from ppafo.identification.trajectory.layout import TrajectorySection, refuse_removed
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE
 from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si, with_followers
@@ -354,6 +354,7 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
     IdentificationError for one that is not usable.
     """
     document = _FILE.parse(content, file)
+    refuse_removed(document, file)
     problem = validate(ProblemFile, document, file, IdentificationError)
     # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:

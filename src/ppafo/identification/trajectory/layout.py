@@ -1,11 +1,13 @@
 """The layout of the section [trajectory] of a problem file; texts have units, scenarios and recordings go by name."""
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from ppafo.documents.models import StrictTable, Text, Texts
 from ppafo.documents.problems import NAME
+from ppafo.errors import IdentificationError
 from ppafo.identification.keys import Columns, Confidence
 from ppafo.identification.trajectory.experiment import ALL_INPUTS
 
@@ -86,3 +88,28 @@ class TrajectorySection(StrictTable):
     candidates: tuple[CandidateSection, ...] = Field(
         (), strict=False, description="experiments to rank by the information that they would bring"
     )
+
+
+_REMOVED = {
+    "loss": "the first pass is always robust; omit it",
+    "other_starts": "other starts are tried where the first does not explain the recordings; omit it",
+    "seed": "the fit uses no random numbers; omit it",
+    "directions": "recordings that disagree are found automatically; omit it",
+    "profiles": "the table of the result has the intervals; omit it",
+    "scale": "numbers are scaled automatically; omit it",
+    "held": "is renamed to locked; write locked = '75 deg'",
+}
+
+
+def refuse_removed(document: Mapping[str, Any], file: str) -> None:
+    """Refuse keys that earlier versions had, with what to write instead; IdentificationError."""
+    section, bench = document.get("trajectory"), document.get("bench")
+    if isinstance(bench, dict) and "can" in bench:
+        raise IdentificationError(
+            f"{file}: bench.can: experiments are not proposed; write [[trajectory.candidates]], which are ranked"
+        )
+    lists = [section.get(name) for name in ("parameters", "experiments")] if isinstance(section, dict) else []
+    tables = [section, *(table for tables in lists if isinstance(tables, list) for table in tables)]
+    for key, instead in _REMOVED.items():
+        if any(isinstance(table, dict) and key in table for table in tables):
+            raise IdentificationError(f"{file}: trajectory: {key}: {instead}")
