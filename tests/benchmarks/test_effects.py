@@ -2,7 +2,7 @@
 
 from benchmarks.effects import ON
 from ppafo.model.catalog import EFFECTS
-from ppafo.parameters.plant import effects_of
+from ppafo.parameters.effects import effects_of
 from ppafo.simulation.loading import load_scenario
 
 

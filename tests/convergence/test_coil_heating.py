@@ -10,9 +10,9 @@ from ppafo.model.effects.coil_heating import (
     CoilRises,
     CoilSettings,
     advance,
-    opening_when_warm,
     prepare,
-    slower,
+    relative_opening_time,
+    warm_opening_time,
 )
 from ppafo.model.effects.kind import PlantSnapshot
 
@@ -24,9 +24,9 @@ def test_the_parabola_is_the_opening_time_of_a_coil_with_resistance_and_inductan
     for rise in np.linspace(0.0, 100.0, 41).tolist():
         ratio = 1.0 + COPPER * rise
         exact = np.log(1.0 - 0.6 * ratio) / (ratio * np.log(0.4))
-        assert slower(rise, 0.6) == pytest.approx(exact, rel=1e-12)
-        assert opening_when_warm(8e-3, 1.0, row, CoilRises(rise, 0.0)) == pytest.approx(8e-3 * exact, rel=6e-3)
-        assert opening_when_warm(8e-3, 0.0, row, CoilRises(rise, 0.0)) == 8e-3
+        assert relative_opening_time(rise, 0.6) == pytest.approx(exact, rel=1e-12)
+        assert warm_opening_time(8e-3, 1.0, row, CoilRises(rise, 0.0)) == pytest.approx(8e-3 * exact, rel=6e-3)
+        assert warm_opening_time(8e-3, 0.0, row, CoilRises(rise, 0.0)) == 8e-3
 
 
 def test_a_coil_that_is_on_warms_and_the_other_cools() -> None:

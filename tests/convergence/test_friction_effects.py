@@ -2,8 +2,8 @@
 
 import pytest
 
-from ppafo.model.effects.seal_friction import SealFriction, pressed_at_rest, pressed_in_motion
-from ppafo.model.effects.stribeck import Stribeck, more_near_standstill
+from ppafo.model.effects.seal_friction import SealFriction, dynamic_seal_friction, static_seal_friction
+from ppafo.model.effects.stribeck import Stribeck, stribeck_friction
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 
@@ -23,11 +23,11 @@ def test_seals_that_the_gas_presses_hold_the_vane_for_longer() -> None:
 
 def test_the_formulas_are_those_that_they_name() -> None:
     seals = SealFriction(2.0e-6, 1.0e-6)
-    assert pressed_at_rest(0.5, 1.0e5, 4.0e5, seals) == pytest.approx(1.1)
-    assert pressed_in_motion(0.4, 3.0, 4.0e5, 1.0e5, seals) == pytest.approx(0.7)
+    assert static_seal_friction(0.5, 1.0e5, 4.0e5, seals) == pytest.approx(1.1)
+    assert dynamic_seal_friction(0.4, 3.0, 4.0e5, 1.0e5, seals) == pytest.approx(0.7)
     near = Stribeck(friction_rise=0.09, velocity_scale=0.25)
-    assert more_near_standstill(0.4, 0.0, 1.0e5, 1.0e5, near) == pytest.approx(0.49)
-    assert more_near_standstill(0.4, -2.0, 1.0e5, 1.0e5, near) == pytest.approx(0.445)
+    assert stribeck_friction(0.4, 0.0, 1.0e5, 1.0e5, near) == pytest.approx(0.49)
+    assert stribeck_friction(0.4, -2.0, 1.0e5, 1.0e5, near) == pytest.approx(0.445)
 
 
 def test_the_torque_on_a_prescribed_joint_has_the_friction_of_the_effects() -> None:

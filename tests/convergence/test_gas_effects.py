@@ -5,11 +5,12 @@ import pytest
 
 from ppafo.analyses.linearise.question import linearise
 from ppafo.errors import ScenarioError, SimulationError
-from ppafo.model.effects.laminar_leak import LaminarLeak, with_gap
-from ppafo.model.effects.leak_opening import LeakOpening, lifted
+from ppafo.model.effects.laminar_leak import LaminarLeak, leak_with_gap
+from ppafo.model.effects.leak_opening import LeakOpening, lifted_leak
 from ppafo.model.effects.line_resistance import LineSettings, fed_through_line, prepare
-from ppafo.model.effects.spool_play import SpoolPlace, SpoolPlay, behind_play, settle, spool_position
-from ppafo.model.orifice import area_conductance, isentropic_curve, orifice_flow
+from ppafo.model.effects.spool_play import SpoolPlace, SpoolPlay, command_behind_play, settle, spool_position
+from ppafo.model.flow_curve import isentropic_curve
+from ppafo.model.orifice import area_conductance, orifice_flow
 from ppafo.parameters.loading import load_device
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
@@ -26,17 +27,21 @@ THERMAL = (
 
 def test_a_leak_that_opens_at_a_pressure_is_tight_below_and_whole_far_above() -> None:
     row = LeakOpening(3.0e4, 1.0)
-    assert lifted(2.0e-9, 1.0e5, 1.29e5, CURVE, row) == 0.0
-    assert lifted(2.0e-9, 1.0e5, 1.6e5, CURVE, row) == lifted(2.0e-9, 1.6e5, 1.0e5, CURVE, row) == pytest.approx(1.0e-9)
-    assert lifted(2.0e-9, 1.0e5, 3.1e6, CURVE, row) == pytest.approx(2.0e-9, rel=0.011)
+    assert lifted_leak(2.0e-9, 1.0e5, 1.29e5, CURVE, row) == 0.0
+    assert (
+        lifted_leak(2.0e-9, 1.0e5, 1.6e5, CURVE, row)
+        == lifted_leak(2.0e-9, 1.6e5, 1.0e5, CURVE, row)
+        == pytest.approx(1.0e-9)
+    )
+    assert lifted_leak(2.0e-9, 1.0e5, 3.1e6, CURVE, row) == pytest.approx(2.0e-9, rel=0.011)
 
 
 @pytest.mark.parametrize("rise", [0.01, 0.3, 1.0, 7.0])
 def test_half_of_a_leak_is_open_where_its_rise_says(rise: float) -> None:
     row = LeakOpening(3.0e4, rise)
-    assert lifted(2.0e-9, 1.0e5, 1.3e5, CURVE, row) == pytest.approx(0.0, abs=1e-22)
-    assert lifted(2.0e-9, 1.0e5, 1.3e5, CURVE, row) >= 0.0
-    assert lifted(2.0e-9, 1.0e5, 1.3e5 + rise * 3.0e4, CURVE, row) == pytest.approx(1.0e-9)
+    assert lifted_leak(2.0e-9, 1.0e5, 1.3e5, CURVE, row) == pytest.approx(0.0, abs=1e-22)
+    assert lifted_leak(2.0e-9, 1.0e5, 1.3e5, CURVE, row) >= 0.0
+    assert lifted_leak(2.0e-9, 1.0e5, 1.3e5 + rise * 3.0e4, CURVE, row) == pytest.approx(1.0e-9)
 
 
 def test_a_leak_that_never_opens_loses_nothing() -> None:
@@ -73,7 +78,7 @@ PLAY = ("effects.spool_play.width=0.2",)
 def test_a_spool_with_play_is_the_one_of_the_rig_and_lags_on_the_way_back() -> None:
     row, place, rig, shown = SpoolPlay(0.2), SpoolPlace(0.0), 0.0, []
     for command in (0.0, 0.05, 0.5, 1.0, 0.9, 0.7, -1.0, -0.95, 2.0, -0.5):
-        now = behind_play(command, row, place)
+        now = command_behind_play(command, row, place)
         place = settle(row, place, now)
         if command <= 1.5:
             rig = spool_position(rig, command, 0.2)
@@ -142,6 +147,6 @@ def test_gas_that_is_not_ideal_is_refused_where_it_has_no_step(texts: tuple[str,
 def test_a_laminar_gap_passes_its_coefficient_times_the_difference_of_the_squares_at_any_pressures() -> None:
     gap = LaminarLeak(1.0e-15)
     for first, second in ((6.0e5, 1.0e5), (2.0e5, 3.0e5), (3.0e5, 2.9995e5), (3.0e5, 3.0e5 - 1.0), (2.0e5, 2.0e5)):
-        through = orifice_flow(first, second, with_gap(1.0e-10, first, second, CURVE, gap), CURVE)
+        through = orifice_flow(first, second, leak_with_gap(1.0e-10, first, second, CURVE, gap), CURVE)
         alone = orifice_flow(first, second, 1.0e-10, CURVE)
         assert through - alone == pytest.approx(1.0e-15 * (first**2 - second**2), rel=1e-9, abs=1e-22)

@@ -82,18 +82,16 @@ def show_plainly(value: Any) -> None:
     signature = inspect.signature(function)
     function.__signature__ = signature.replace(  # type: ignore[attr-defined]  # of all functions, says inspect
         parameters=[
-            each.replace(annotation=said.get(name, each.annotation), default=_default_shown(each.default))
+            each.replace(annotation=said.get(name, each.annotation))
+            # A function, and what a field makes anew, have no text of their own.
+            if each.default is each.empty or not repr(each.default).startswith("<")
+            else each.replace(
+                annotation=said.get(name, each.annotation), default=_Shown(getattr(each.default, "__name__", "..."))
+            )
             for name, each in signature.parameters.items()
         ],
         return_annotation=said.get("return", signature.return_annotation),
     )
-
-
-def _default_shown(default: Any) -> Any:
-    """Return a default as help shows it: a function and what a field makes anew have no text of their own."""
-    if default is inspect.Parameter.empty or not repr(default).startswith("<"):
-        return default
-    return _Shown(getattr(default, "__name__", "..."))
 
 
 def _type_text(annotation: Any) -> str:
@@ -146,35 +144,45 @@ def taken(annotation: Any) -> Taken:
         if word is None or word.take is None:
             return taken(inner[0])
         own = _one(word.what, word.take)
-        return own if word.takes_all or not _is_repeated(inner[0]) else _several(own)
+        is_repeated = _is_iterable(typing.get_origin(inner[0]))
+        return own if word.takes_all or not is_repeated else _several(own)
     if origin in (typing.Union, types.UnionType):
         return _either([taken(item) for item in inner if item is not types.NoneType], types.NoneType in inner)
     if origin is Literal:
-        return _one(" or ".join(map(repr, inner)), lambda value: _among(inner, value))
+        return _one(
+            " or ".join(map(repr, inner)), lambda value: _that_is(taken_text(value) in inner, taken_text(value))
+        )
     if annotation is Any:
         return Taken("anything", lambda _, value: value)
     return _one(*_PLAIN[annotation]) if annotation in _PLAIN else _of_class(origin or annotation, inner)
 
 
 def _of_class(kind: type, inner: tuple[Any, ...]) -> Taken:
-    if issubclass(kind, Mapping) and inner[1] is Any:
-        return _one("a dictionary with texts as its keys", taken_document)
     if issubclass(kind, Mapping):
-        return _mapping(taken(inner[1]))
+        is_document = inner[1] is Any
+        return _one("a dictionary with texts as its keys", taken_document) if is_document else _mapping(taken(inner[1]))
     if inner and _is_iterable(kind):
         return _several(taken(inner[0]))
     if kind is typing.get_origin(Callable[..., Any]):
-        return _one("a function", _taken_function)
-    return _one(f"a {kind.__name__}", lambda value: _instance(kind, value))
+        return _one("a function", lambda value: _that_is(callable(value), value))
+    return _one(f"a {kind.__name__}", lambda value: _that_is(_is_instance(kind, value), value))
 
 
-def _is_iterable(kind: type) -> bool:
-    return issubclass(kind, Iterable) and not issubclass(kind, str | bytes)
+def _is_iterable(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, Iterable) and not issubclass(kind, str | bytes)
 
 
-def _is_repeated(annotation: Any) -> bool:
-    origin = typing.get_origin(annotation)
-    return isinstance(origin, type) and _is_iterable(origin)
+def _is_instance(kind: type, value: Any) -> bool:
+    """Tell whether a value is of a class, which may be one that is not loaded."""
+    is_named = issubclass(kind, _NotLoaded) and any(base.__name__ == kind.__name__ for base in type(value).__mro__)
+    return is_named or isinstance(value, kind)
+
+
+def _that_is(is_taken: bool, value: Any) -> Any:
+    """Return a value that is taken; ValueError for another."""
+    if not is_taken:
+        raise ValueError
+    return value
 
 
 def _one(what: str, take: Callable[[Any], Any]) -> Taken:
@@ -250,32 +258,12 @@ def _in_words(kinds: list[str]) -> str:
     return what.replace("a text, a path", "a name, a path").replace("a text or a path", "a name or a path")
 
 
-def _among(allowed: tuple[Any, ...], value: Any) -> Any:
-    word = taken_text(value)
-    if word not in allowed:
-        raise ValueError
-    return word
-
-
-def _instance(kind: type, value: Any) -> Any:
-    is_named = issubclass(kind, _NotLoaded) and any(base.__name__ == kind.__name__ for base in type(value).__mro__)
-    if not is_named and not isinstance(value, kind):
-        raise ValueError
-    return value
-
-
 def _taken_path(value: Any) -> Path:
     """Return a path; a text is left to what takes names, which stands before it wherever both are taken."""
     path = Path(taken_text(os.fspath(value)))
     if "\0" in str(path):
         raise ValueError
     return path
-
-
-def _taken_function(value: Any) -> Callable[..., Any]:
-    if not callable(value):
-        raise ValueError
-    return value  # type: ignore[no-any-return]
 
 
 _PLAIN: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {

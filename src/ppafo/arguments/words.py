@@ -383,15 +383,6 @@ def _quantity_word(metavar: str, si_unit: str, allowed: _NumberRange = ANY) -> W
     )
 
 
-def _minutes_word() -> Word:
-    return Word(
-        "N",
-        minutes,
-        taken_number(ABOVE_ZERO, minutes),
-        "a number of minutes above 0, or a text with its unit such as '90 s'",
-    )
-
-
 def fraction_word(help_text: str = "") -> Word:
     """Return the word of a fraction from 0 to 1."""
     return Word(
@@ -412,7 +403,15 @@ def whole_word(least: int, help_text: str = "") -> Word:
 
 Whole = Annotated[int, whole_word(0)]
 Count = Annotated[int, whole_word(1)]
-Minutes = Annotated[float, _minutes_word()]
+Minutes = Annotated[
+    float,
+    Word(
+        "N",
+        minutes,
+        taken_number(ABOVE_ZERO, minutes),
+        "a number of minutes above 0, or a text with its unit such as '90 s'",
+    ),
+]
 Mass = Annotated[float, _quantity_word("MASS", "kg", ABOVE_ZERO)]
 Length = Annotated[float, _quantity_word("LENGTH", "m", ABOVE_ZERO)]
 Time = Annotated[float, _quantity_word("TIME", "s")]

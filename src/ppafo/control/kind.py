@@ -15,49 +15,14 @@ VALVE_LAG, VALVE_DELAY = "lag of the valve", "dead time of the valve"
 PRESSURE_LAG, FORCE_LAG = "lag of the pressure sensors", "lag of the force sensors"
 """Sensor lags that the default of a setting may follow, where a device has them: names for ``Quantity.follows``."""
 
-NOMINAL = {
-    name: f"nominal {name.replace('_', ' ')}"
-    for name in (
-        "flow",
-        "gas_product",
-        "valve_conductance",
-        "leak_conductance",
-        "critical_ratio",
-        "supply_pressure",
-        "dorsiflexion_pressure",
-        "atmospheric_pressure",
-        "relieving",
-        "torque_constant",
-        "displacement_per_radian",
-        "dead_volume_1",
-        "dead_volume_2",
-        "chamber_growth",
-        "chamber_rest_1",
-        "chamber_rest_2",
-        "angle_min",
-        "angle_max",
-        "pair",
-        "opening_delay",
-        "closing_delay",
-        "switching_interval",
-        "delay",
-        "lag",
-        "dead_band",
-        "joining_time",
-        "line_droop_1",
-        "line_largest_flow_1",
-        "line_volume_1",
-        "line_droop_2",
-        "line_largest_flow_2",
-        "line_volume_2",
-        "line_relieving",
-        "converter_range",
-    )
-}
-"""Device numbers that the default of a model-based controller's setting may follow, by their name in the model.
 
-``simulation.nominal`` gives each its value.
-"""
+def nominal_term(name: str) -> str:
+    """Term that the default of a model-based law's setting may follow: a number of the device, by its name there.
+
+    ``simulation.nominal`` gives each its value.
+    """
+    return f"nominal {name.replace('_', ' ')}"
+
 
 DEAD_BAND = Quantity(
     "dead_band",
@@ -66,7 +31,7 @@ DEAD_BAND = Quantity(
     None,
     0.0,
     0.99,
-    follows=(NOMINAL["dead_band"],),
+    follows=(nominal_term("dead_band"),),
 )
 BelievedBand = Annotated[float, DEAD_BAND]
 """Setting of a law that opens the valve beyond its dead band, by ``control.torque_loop.beyond_dead_band``."""

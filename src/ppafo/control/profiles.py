@@ -151,8 +151,9 @@ def next_segment(segment: ProfileSegment, place: float, time: float, value: floa
     )
 
 
-def segment_at(profile: TabulatedProfile, place: float) -> ProfileSegment:
-    """The segment in which a place [s] of a repetition lies; its end is later than the place."""
+def table_value(profile: TabulatedProfile, time: float) -> tuple[float, float, float]:
+    """Value, rate and second derivative (0 also at the corners) at a time [s] from 0 on."""
+    place = time - profile.period * float(int(time / profile.period))
     # Every knot is looked at: a search would branch, and 32 selects cost little in vector code.
     segment = ProfileSegment(start=0.0, first=profile.value_01, end=profile.knots[0].time, last=profile.knots[0].value)
     for knot in profile.knots[1:]:
@@ -160,19 +161,8 @@ def segment_at(profile: TabulatedProfile, place: float) -> ProfileSegment:
     segment = next_segment(segment, place, profile.period, profile.value_01)
     # An unused knot lies at or beyond the end of a repetition: the line then ends at the first knot of the next.
     is_last = segment.end >= profile.period
-    return ProfileSegment(
-        start=segment.start,
-        first=segment.first,
-        end=profile.period if is_last else segment.end,
-        last=profile.value_01 if is_last else segment.last,
-    )
-
-
-def table_value(profile: TabulatedProfile, time: float) -> tuple[float, float, float]:
-    """Value, rate and second derivative (0 also at the corners) at a time [s] from 0 on."""
-    place = time - profile.period * float(int(time / profile.period))
-    segment = segment_at(profile, place)
-    rate = (segment.last - segment.first) / (segment.end - segment.start)
+    end, last = profile.period if is_last else segment.end, profile.value_01 if is_last else segment.last
+    rate = (last - segment.first) / (end - segment.start)
     return profile.level + segment.first + rate * (place - segment.start), rate, 0.0
 
 
@@ -201,17 +191,17 @@ class KnotWindow(NamedTuple):
     later: Knot
 
 
-def next_stretch(stretch: KnotWindow, place: float, knot: Knot) -> KnotWindow:
-    """The stretch, or the next one, after which ``knot`` comes, where ``place`` [s] has passed its end."""
-    passed = place >= stretch.end.time
-    earlier, start, end, later = stretch.start, stretch.end, stretch.later, knot
+def next_window(window: KnotWindow, place: float, knot: Knot) -> KnotWindow:
+    """The window, or the next one, after which ``knot`` comes, where ``place`` [s] has passed its end."""
+    passed = place >= window.end.time
+    earlier, start, end, later = window.start, window.end, window.later, knot
     return KnotWindow(
         earlier=Knot(
-            earlier.time if passed else stretch.earlier.time, earlier.value if passed else stretch.earlier.value
+            earlier.time if passed else window.earlier.time, earlier.value if passed else window.earlier.value
         ),
-        start=Knot(start.time if passed else stretch.start.time, start.value if passed else stretch.start.value),
-        end=Knot(end.time if passed else stretch.end.time, end.value if passed else stretch.end.value),
-        later=Knot(later.time if passed else stretch.later.time, later.value if passed else stretch.later.value),
+        start=Knot(start.time if passed else window.start.time, start.value if passed else window.start.value),
+        end=Knot(end.time if passed else window.end.time, end.value if passed else window.end.value),
+        later=Knot(later.time if passed else window.later.time, later.value if passed else window.later.value),
     )
 
 
@@ -229,29 +219,25 @@ def repeated_knot(profile: TabulatedProfile, before: Knot, knot: Knot) -> Knot:
     )
 
 
-def last_knot(profile: TabulatedProfile) -> Knot:
-    """The last knot that is used, a repetition earlier."""
+def window_at(profile: TabulatedProfile, place: float) -> KnotWindow:
+    """The knots about a place [s] of a repetition, whose end is later than the place."""
+    first = Knot(0.0, profile.value_01)
+    second = repeated_knot(profile, first, profile.knots[0])
+    third = repeated_knot(profile, second, profile.knots[1])
+    # The last knot that is used, a repetition earlier.
     time, value = 0.0, profile.value_01
     for knot in profile.knots:
         is_used = knot.time < profile.period
         time, value = (knot.time if is_used else time), (knot.value if is_used else value)
-    return Knot(time - profile.period, value)
-
-
-def stretch_at(profile: TabulatedProfile, place: float) -> KnotWindow:
-    """The stretch in which a place [s] of a repetition lies; its end is later than the place."""
-    first = Knot(0.0, profile.value_01)
-    second = repeated_knot(profile, first, profile.knots[0])
-    third = repeated_knot(profile, second, profile.knots[1])
-    stretch = KnotWindow(earlier=last_knot(profile), start=first, end=second, later=third)
+    window = KnotWindow(earlier=Knot(time - profile.period, value), start=first, end=second, later=third)
     before = third
     for knot in profile.knots[2:]:
         found = repeated_knot(profile, before, knot)
-        stretch = next_stretch(stretch, place, found)
+        window = next_window(window, place, found)
         before = found
     closing = repeated_knot(profile, before, Knot(profile.period, profile.value_01))
-    stretch = next_stretch(stretch, place, closing)
-    return next_stretch(stretch, place, repeated_knot(profile, closing, Knot(profile.period, profile.value_01)))
+    window = next_window(window, place, closing)
+    return next_window(window, place, repeated_knot(profile, closing, Knot(profile.period, profile.value_01)))
 
 
 def smooth_value(profile: TabulatedProfile, time: float) -> tuple[float, float, float]:
@@ -260,7 +246,7 @@ def smooth_value(profile: TabulatedProfile, time: float) -> tuple[float, float, 
     Each has at its ends the slope of the parabola through a knot and its two neighbours, so that the rate has no jump.
     """
     place = time - profile.period * float(int(time / profile.period))
-    at = stretch_at(profile, place)
+    at = window_at(profile, place)
     length = at.end.time - at.start.time
     chord = (at.end.value - at.start.value) / length
     # Slope of the parabola through three knots: both chords, each weighted with the other's length.
@@ -279,7 +265,7 @@ def smooth_value(profile: TabulatedProfile, time: float) -> tuple[float, float, 
 def until_knot(profile: TabulatedProfile, time: float) -> float:
     """Time [s] from one at 0 or later to the next knot, where the second derivative of the cubic curves jumps."""
     place = time - profile.period * float(int(time / profile.period))
-    return stretch_at(profile, place).end.time - place
+    return window_at(profile, place).end.time - place
 
 
 def smooth_bounds(profile: TabulatedProfile) -> tuple[float, float]:

@@ -46,7 +46,8 @@ def table(name: str, fields: dict[str, Any]) -> type[BaseModel]:
 
 def optional(annotation: Any, description: str) -> Any:
     """Return the field of a value that a file may leave out."""
-    return annotation, Field(default_factory=_no_value, description=description)
+    # A factory keeps 'null' out of the published schema.
+    return annotation, Field(default_factory=lambda: None, description=description)
 
 
 def one_of(models: list[Any]) -> Any:
@@ -84,7 +85,3 @@ def validate(
 def make_schema(model: type[BaseModel], title: str) -> dict[str, Any]:
     """Return the JSON Schema of a file with this layout."""
     return {"$schema": SCHEMA, **model.model_json_schema(), "title": title}
-
-
-def _no_value() -> None:
-    """Stand in for a value that a file may leave out; keeps 'null' out of the published schema."""

@@ -74,13 +74,24 @@ def _spot(model: Any, location: Iterable[int | str]) -> _Spot:
     """Return the spot at a location; in a union pydantic puts the kind into it, where the file has no such key."""
     keys: list[str] = []
     holder = wanted = model
-    for part in location:
-        kinds = _kinds(wanted)
-        if kinds:
-            wanted = kinds.get(str(part))
+    for part in map(str, location):
+        if kinds := _kinds(wanted):
+            wanted = kinds.get(part)
             continue
-        holder, wanted = wanted, _below(wanted, str(part))
+        holder = wanted
         keys.append(one_line(part))
+        if not _is_model(holder):
+            # A table or list by names or numbers has the same at any.
+            members = [member for member in get_args(holder) if member is not Ellipsis]
+            wanted = members[-1] if members else None
+        elif part not in holder.model_fields:
+            wanted = None
+        else:
+            wanted = holder.model_fields[part].annotation
+            # What may be left out, as X | None, is an X where it is there.
+            members = [member for member in get_args(wanted) if member is not type(None)]
+            if get_origin(wanted) in (Union, UnionType) and len(members) == 1:
+                wanted = members[0]
     return _Spot(".".join(keys), holder, wanted)
 
 
@@ -88,19 +99,6 @@ def _kinds(node: Any) -> dict[str, Any]:
     """Return the members of a union of kinds by kind, nothing for any other type."""
     tables = [table for table in _models_in(node) if "kind" in table.model_fields]
     return {get_args(table.model_fields["kind"].annotation)[0]: table for table in tables}
-
-
-def _below(node: Any, part: str) -> Any:
-    """Return the type of what a table has at a key, or a table or list by names or numbers at any; None if unknown."""
-    if not _is_model(node):
-        members = [member for member in get_args(node) if member is not Ellipsis]
-        return members[-1] if members else None
-    if part not in node.model_fields:
-        return None
-    annotation = node.model_fields[part].annotation
-    # What may be left out, as X | None, is an X where it is there.
-    members = [member for member in get_args(annotation) if member is not type(None)]
-    return members[0] if get_origin(annotation) in (Union, UnionType) and len(members) == 1 else annotation
 
 
 def _is_model(node: Any) -> bool:

@@ -34,12 +34,6 @@ def beside(name: str, folder: Path, known: Collection[str] = ()) -> str:
     return str(folder / name) if is_path else name
 
 
-def _of_backslash(error: tomllib.TOMLDecodeError) -> str:
-    """Remedy for a path of Windows in double quotation marks, as the end of a message; empty for other mistakes."""
-    is_escape = "\\" in str(error) or "escape" in str(error) or "hex" in str(error)
-    return "; write a path with / or in single quotation marks, 'C:\\data\\run.csv'" if is_escape else ""
-
-
 @dataclass(frozen=True, slots=True)
 class TomlKind:
     """A kind of file: what messages call it, its name for ``--schema``, the files of the package, the error raised.
@@ -96,9 +90,10 @@ class TomlKind:
             # A copy, since overrides are written into a document and the parsed one is kept.
             document = copy.deepcopy(_document(text))
         except tomllib.TOMLDecodeError as error:
-            raise self.error(
-                f"{file}: is not valid TOML: {one_line(error)}{_of_backslash(error)}{self._remedy(file)}"
-            ) from error
+            # A path of Windows in double quotation marks.
+            is_escape = any(word in str(error) for word in ("\\", "escape", "hex"))
+            remedy = "; write a path with / or in single quotation marks, 'C:\\data\\run.csv'" * is_escape
+            raise self.error(f"{file}: is not valid TOML: {one_line(error)}{remedy}{self._remedy(file)}") from error
         except (RecursionError, ValueError) as error:
             raise self.error(f"{file}: is not usable TOML: nested too deeply or a number too long") from error
         self.check_depth(document, file)

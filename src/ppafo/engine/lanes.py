@@ -203,7 +203,10 @@ def run_blocks(
     workers = 1 if len(starts) == 1 else min(len(starts), threads or os.cpu_count() or 1)
     if not isinstance(module, ModuleType):
         workers = 1  # threads of Python take turns
-        _say_how_long(runs * batch.clock.step_count)
+        seconds = runs * batch.clock.step_count * PYTHON_STEP
+        if seconds > LONGEST_UNSAID:
+            slow = "ppafo: Python runs these models, which takes about %s; compiled it takes seconds: %s"
+            logger.warning(slow, time_text(seconds), HOW_TO_INSTALL)
 
     # One iterator for all threads: a range iterator hands each start to one of them.
     waiting = iter(starts)
@@ -242,17 +245,6 @@ def _run_block(module: RunnableProgram, batch: Batch, members: slice, stop: thre
         interrupts.check()
         block.advance(min(STEPS_PER_CALL, clock.step_count - first_step))
     return None if stop.is_set() else block.result()
-
-
-def _say_how_long(steps: int) -> None:
-    """Say before it begins that Python takes minutes for so many steps."""
-    seconds = steps * PYTHON_STEP
-    if seconds > LONGEST_UNSAID:
-        logger.warning(
-            "ppafo: Python runs these models, which takes about %s; compiled it takes seconds: %s",
-            time_text(seconds),
-            HOW_TO_INSTALL,
-        )
 
 
 def join_results(results: Sequence[BatchResult]) -> BatchResult:

@@ -98,26 +98,24 @@ class LoopText:
 
     def branch(self, node: ast.If) -> list[ast.stmt]:
         """A decision: of the parts, of a question to all runs, or of numbers that all have."""
-        condition = _question_to_all(node.test)
-        if condition is not None:
-            lines, answer = self.rows.any_of(condition, is_none=isinstance(node.test, ast.UnaryOp))
-            test = parse_expression(answer)
-            return [*_parsed(lines), ast.If(test, self.block(node.body), self.block(node.orelse))]
+        question = node.test.operand if isinstance(node.test, ast.UnaryOp) else node.test
+        if isinstance(question, ast.Call) and question.args and isinstance(question.args[0], ast.GeneratorExp):
+            # ``any(CONDITION for lane in lanes)``, or ``not any(...)``.
+            lines, answer = self.rows.any_of(question.args[0].elt, is_none=question is not node.test)
+            asked = parse_expression(answer)
+            return [*_parsed(lines), ast.If(asked, self.block(node.body), self.block(node.orelse))]
         own = self.decided(node)
         if own is None:
-            return self.undecided(node)
+            # A decision of numbers that all runs have alike; nothing where neither side does anything.
+            test = self.expression(node.test)
+            if isinstance(test, ast.Constant):
+                return self.block(node.body if test.value else node.orelse)
+            body, otherwise = self.block(node.body), self.block(node.orelse)
+            return [ast.If(test, body or [ast.Pass()], otherwise)] if body or otherwise else []
         if self.other is None:
             return self.block(own)
         other = self.other.decided(node)
         return self.block(own) if other is own else self.either(self.block(own), self.other.branch(node))
-
-    def undecided(self, node: ast.If) -> list[ast.stmt]:
-        """A decision of numbers that all runs have alike; nothing where neither side does anything."""
-        test = self.expression(node.test)
-        if isinstance(test, ast.Constant):
-            return self.block(node.body if test.value else node.orelse)
-        body, otherwise = self.block(node.body), self.block(node.orelse)
-        return [ast.If(test, body or [ast.Pass()], otherwise)] if body or otherwise else []
 
     def decided(self, node: ast.If) -> list[ast.stmt] | None:
         """The side that a decision of the parts takes; None for any other decision."""
@@ -189,14 +187,6 @@ class LoopText:
             if not isinstance(value, ast.Name) or value.id != name
         ]
         return [*begin, *self.rows.heading(function), *inner.lines()]
-
-
-def _question_to_all(test: ast.expr) -> ast.expr | None:
-    """The condition of ``any(CONDITION for lane in lanes)``, or of ``not any(...)``; None for any other test."""
-    question = test.operand if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not) else test
-    if isinstance(question, ast.Call) and question.args and isinstance(question.args[0], ast.GeneratorExp):
-        return question.args[0].elt
-    return None
 
 
 def _is_lanes(node: ast.expr) -> bool:

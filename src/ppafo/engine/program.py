@@ -1,6 +1,6 @@
 """Program: the components (valve, controller, gas, ...) that one compiled model consists of."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from types import ModuleType
@@ -31,9 +31,6 @@ from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY, WALK, MeterKind, R
 if TYPE_CHECKING:
     from ppafo.engine.scheme.thermal_gas import WarmFunctions
     from ppafo.engine.step.lane import Lane
-
-Rows = Mapping[str, type]
-"""Groups of rows by their names."""
 
 
 class GasPhases(Protocol):

@@ -425,16 +425,12 @@ class Reduction:
             return
         (loop,) = node.value.generators
         assert isinstance(loop.target, ast.Name)
-        for element in self.items_of(loop.iter):
-            yield self.with_known({loop.target.id: element}, node.value.elt)
-
-    def with_known(self, more: Mapping[str, Any], node: ast.expr) -> ast.expr:
-        """An expression with some more names known."""
         before, running = self.known, self.running
-        self.known, self.running = {**before, **more}, running - more.keys()
-        made = self.visit(node)
-        self.known, self.running = before, running
-        return made
+        for element in self.items_of(loop.iter):
+            self.known, self.running = {**before, loop.target.id: element}, running - {loop.target.id}
+            made = self.visit(node.value.elt)
+            self.known, self.running = before, running
+            yield made
 
     def items_of(self, node: ast.expr) -> list[Any]:
         """The items of what is gone through, which must be known."""
@@ -527,7 +523,10 @@ class Reduction:
         left = [self.set_target(target, fields) for target in targets]
         row = self.collector.rows.get(left[0].id.removeprefix(_GROUP)) if left[0].id.startswith(_GROUP) else None
         if len(left) == 1 and isinstance(written, ast.IfExp) and row is not None and not is_number(row):
-            written = self.number_by_number(row, written)
+            # The row of the choices between their numbers: no branch, by any compiler.
+            pairs = zip(self.numbers_of(row, written.body), self.numbers_of(row, written.orelse), strict=True)
+            test = written.test
+            written = self.row_of(row, (ast.IfExp(test, yes, other) for yes, other in pairs))
         if len(left) == 1 and isinstance(written, ast.Name) and written.id == left[0].id:
             return []
         return [ast.Assign([ast.Tuple([*left], ast.Store()) if isinstance(target, ast.Tuple) else left[0]], written)]
@@ -574,11 +573,6 @@ class Reduction:
             return None
         is_part = value.func.attr == "_replace" and self.group(target) == self.group(value.func.value) != ""
         return frozenset(keyword.arg for keyword in value.keywords if keyword.arg is not None) if is_part else None
-
-    def number_by_number(self, row: Any, choice: ast.IfExp) -> ast.expr:
-        """A choice between two rows as the row of the choices between their numbers: no branch, by any compiler."""
-        pairs = zip(self.numbers_of(row, choice.body), self.numbers_of(row, choice.orelse), strict=True)
-        return self.row_of(row, (ast.IfExp(choice.test, yes, other) for yes, other in pairs))
 
     def row_of(self, kind: Any, numbers: Iterator[ast.expr]) -> ast.expr:
         """A row, nested or not, of the next of some numbers, as ``rebuilt`` makes it."""

@@ -89,8 +89,11 @@ def _smooth(values: Floats, name: str) -> Floats:
     return fit_curve(values, HARMONICS[name])[0].values_at(_FINE)
 
 
-def delays(walk: MeanStride) -> dict[str, float]:
-    """Return how far [s] each curve is behind the vertical force, or behind the shank where there is no force."""
+def delay_remarks(walk: MeanStride) -> list[str]:
+    """Return the curves of a mean stride that are on another clock than the force, or the shank, with their delays.
+
+    Curves of one file are on one clock, so that nothing is said of them.
+    """
     share = walk.stance_share
     # Of the shank the largest lean backwards, which is its minimum.
     shank = _peak(-_smooth(walk.curves["shank_angle"], "shank_angle"), share) - _USUALLY["shank_angle"]
@@ -101,7 +104,22 @@ def delays(walk: MeanStride) -> dict[str, float]:
         moment = _end(_smooth(walk.curves["ankle_moment"], "ankle_moment")) - _USUALLY["ankle_moment"]
         force = _end(_smooth(walk.curves["vertical_force"], "vertical_force")) if has_force else share + _FORCE_ENDS
         delays_by_curve["ankle_moment"] = moment - force - (0.0 if has_force else shank)
-    return {name: walk.stride_time * strides for name, strides in delays_by_curve.items()}
+    other = "vertical_force" if has_force else "shank_angle"
+    seconds = {name: walk.stride_time * strides for name, strides in delays_by_curve.items()}
+    late = {name: delay for name, delay in seconds.items() if abs(delay) > LARGEST_DELAY}
+    late = {name: delay for name, delay in late.items() if walk.file[name] != walk.file[other]}
+    # Curves that are late by the same time are on one other clock, and are named together.
+    together = max(late.values(), default=0.0) - min(late.values(), default=0.0) < LARGEST_DELAY
+    groups = [tuple(late)] if late and together else [(name,) for name in late]
+    said = []
+    for names in groups:
+        delay, which = float(np.mean([late[name] for name in names])), " and ".join(names)
+        way = "behind" if delay > 0.0 else "ahead of"
+        said.append(
+            f"{which}: about {1000.0 * abs(delay):.0f} ms {way} {other}, by healthy walking; are they on one clock, "
+            f"with the same filters? Adding {-delay:+.3f} s to their times would bring them together"
+        )
+    return said
 
 
 def _peak(values: Floats, share: float) -> float:
@@ -119,48 +137,8 @@ def _end(values: Floats) -> float:
     return float(_FINE[first + fallen[0]]) if fallen.size else 1.0
 
 
-def delay_remarks(walk: MeanStride) -> list[str]:
-    """Return which curves of a mean stride are on another clock than the force, or the shank, and by how much.
-
-    Curves of one file are on one clock, so that nothing is said of them.
-    """
-    other = "vertical_force" if "vertical_force" in walk.curves else "shank_angle"
-    late = {name: seconds for name, seconds in delays(walk).items() if abs(seconds) > LARGEST_DELAY}
-    late = {name: seconds for name, seconds in late.items() if walk.file[name] != walk.file[other]}
-    # Curves that are late by the same time are on one other clock, and are named together.
-    together = max(late.values(), default=0.0) - min(late.values(), default=0.0) < LARGEST_DELAY
-    groups = [tuple(late)] if late and together else [(name,) for name in late]
-    said = []
-    for names in groups:
-        seconds, which = float(np.mean([late[name] for name in names])), " and ".join(names)
-        way = "behind" if seconds > 0.0 else "ahead of"
-        said.append(
-            f"{which}: about {1000.0 * abs(seconds):.0f} ms {way} {other}, by healthy walking; are they on one clock, "
-            f"with the same filters? Adding {-seconds:+.3f} s to their times would bring them together"
-        )
-    return said
-
-
-def following(walk: MeanStride) -> float:
-    """Return by how much the ankle turns for each turn of the shank while the foot stands; 1 for a foot that rests."""
-    shank, ankle = (walk.curves[name][MIDSTANCE] for name in ("shank_angle", "ankle_angle"))
-    lean = shank - np.mean(shank)
-    return float(np.sum(lean * ankle) / np.sum(lean**2))
-
-
-def lever(walk: MeanStride) -> float | None:
-    """Return the lever [m] of the vertical force about the ankle at the largest moment.
-
-    None where one of them is missing, or the scale of the force is in doubt itself.
-    """
-    if not {"ankle_moment", "vertical_force"} <= set(walk.curves) or force_remarks(walk.curves["vertical_force"]):
-        return None
-    at = int(np.argmax(walk.curves["ankle_moment"]))
-    return float(walk.curves["ankle_moment"][at] / (STANDARD_GRAVITY * walk.curves["vertical_force"][at]))
-
-
 def size_remarks(walk: MeanStride) -> list[str]:
-    """Return which curves of a mean stride are larger or smaller than the others let expect, with the numbers."""
+    """Return the curves of a mean stride that are larger or smaller than the others let expect, with the numbers."""
     said = []
     for name, usual in (("shank_angle", USUAL_SHANK), ("ankle_angle", USUAL_ANKLE)):
         turns = float(np.ptp(np.degrees(walk.curves[name])))
@@ -169,22 +147,31 @@ def size_remarks(walk: MeanStride) -> list[str]:
                 f"{name} covers {turns:.0f} deg in a stride, usual are {usual[0]:g} to {usual[1]:g} deg: "
                 "check its scale"
             )
-    follows, (low, high) = following(walk), USUAL_FOLLOWING
+    # The turn of the ankle for each turn of the shank while the foot stands; 1 for a foot that rests.
+    shank, ankle = (walk.curves[name][MIDSTANCE] for name in ("shank_angle", "ankle_angle"))
+    lean = shank - np.mean(shank)
+    follows, (low, high) = float(np.sum(lean * ankle) / np.sum(lean**2)), USUAL_FOLLOWING
     if follows > high or _RESTS < follows < low:
         said.append(
             f"ankle_angle turns {follows:.2g} times as far as shank_angle while the foot stands, usual are {low:g} to "
             f"{high:g}: check the scale of both"
         )
-    moment = float(np.max(walk.curves["ankle_moment"])) if "ankle_moment" in walk.curves else 0.0
-    arm, why = lever(walk), "check its scale: N m/kg is per body mass, not per stature or weight"
+    if "ankle_moment" not in walk.curves:
+        return said
+    moment, why = walk.curves["ankle_moment"], "check its scale: N m/kg is per body mass, not per stature or weight"
+    peak, force = float(np.max(moment)), walk.curves.get("vertical_force")
+    # The lever of the vertical force about the ankle, unless the scale of the force is in doubt itself.
+    arm = None
+    if force is not None and not force_remarks(force):
+        arm = peak / (STANDARD_GRAVITY * float(force[np.argmax(moment)]))
     if arm is not None and not USUAL_LEVER[0] <= arm <= USUAL_LEVER[1]:
         said.append(
-            f"ankle_moment reaches {moment:.3g} N m/kg, which is the vertical force at {100.0 * arm:.0f} cm from the "
+            f"ankle_moment reaches {peak:.3g} N m/kg, which is the vertical force at {100.0 * arm:.0f} cm from the "
             f"ankle, usual are {100.0 * USUAL_LEVER[0]:.0f} to {100.0 * USUAL_LEVER[1]:.0f} cm: {why}"
         )
-    elif arm is None and moment > 0.0 and not USUAL_MOMENT[0] <= moment <= USUAL_MOMENT[1]:
+    elif arm is None and peak > 0.0 and not USUAL_MOMENT[0] <= peak <= USUAL_MOMENT[1]:
         said.append(
-            f"ankle_moment reaches {moment:.3g} N m/kg, usual are {USUAL_MOMENT[0]:g} to {USUAL_MOMENT[1]:g} N m/kg: "
+            f"ankle_moment reaches {peak:.3g} N m/kg, usual are {USUAL_MOMENT[0]:g} to {USUAL_MOMENT[1]:g} N m/kg: "
             f"{why}"
         )
     return said

@@ -302,13 +302,9 @@ def supply_rates(
 
 
 def _content(table: FluidTable, supply: ColdSupply, state: SupplyState, near: float) -> BottleContent:
-    temperature = _temperature_near(table, state.mass, supply.volume, state.energy, near)
-    return bottle_content(table, state.mass, supply.volume, temperature)
-
-
-def _temperature_near(table: FluidTable, mass: float, volume: float, energy: float, near: float) -> float:
-    """Temperature [K] of a content as ``content_temperature``, by secants from one that is ``near``."""
+    """Content of the bottle, whose temperature [K] is found by secants from one that is ``near``."""
     # A step changes the temperature by little: two or three secants find it without a search in the whole table.
+    mass, volume, energy = state.mass, supply.volume, state.energy
     before, after = near, near + _FIRST_SECANT
     miss = content_energy(table, mass, volume, before) - energy
     for _ in range(_MAXIMUM_SECANTS):
@@ -318,6 +314,6 @@ def _temperature_near(table: FluidTable, mass: float, volume: float, energy: flo
             break
         found = after - next_miss * (after - before) / (next_miss - miss)
         if abs(found - after) <= _SAME_TEMPERATURE and table.temperatures[0] < found < table.temperatures[-1]:
-            return found
+            return bottle_content(table, mass, volume, found)
         before, after, miss = after, found, next_miss
-    return content_temperature(table, mass, volume, energy)
+    return bottle_content(table, mass, volume, content_temperature(table, mass, volume, energy))

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from types import CodeType
-from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, NamedTuple, Protocol, get_args, get_origin, get_type_hints
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +67,10 @@ def number_of(hint: Any) -> Quantity | None:
 def range_rule(quantity: Quantity, limits: str) -> str:
     """Return what a value out of range must be, such as "must be at least 0 m^2 (open area)"."""
     return f"must be {limits}" + (f" ({quantity.summary})" if quantity.summary else "")
+
+
+class EmptyRow(NamedTuple):
+    """Row without a number: settings of a component that has none, or state of one that remembers nothing."""
 
 
 class PlainFunction(Protocol):

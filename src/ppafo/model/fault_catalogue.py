@@ -1,6 +1,6 @@
 """Every fault that the plant of a walk may have, as its file names it, with the numbers that it takes."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ppafo.model.declaration import Quantity
@@ -127,13 +127,8 @@ _FAULTS = (
     ),
 )
 
-
-def _by_part(faults: Iterable[PlantFault]) -> dict[str, dict[str, PlantFault]]:
-    by_part: dict[str, dict[str, PlantFault]] = {}
-    for fault in faults:
-        by_part.setdefault(fault.part, {})[fault.kind] = fault
-    return by_part
-
-
-PLANT_FAULTS = _by_part(_FAULTS)
+PLANT_FAULTS = {
+    part: {fault.kind: fault for fault in _FAULTS if fault.part == part}
+    for part in dict.fromkeys(fault.part for fault in _FAULTS)
+}
 """Every fault of the plant, by part and by kind."""

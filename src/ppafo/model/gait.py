@@ -7,7 +7,7 @@ the speed, stairs, stopping.
 from typing import Annotated, NamedTuple
 
 from ppafo.model.elementary import QUARTER_TURN, TURN, TURNS_OF_RADIAN, sine_and_cosine_of_turns
-from ppafo.model.leg import LegParameters, ShankNow, foot_inertia_about_ankle, torque_of_shank
+from ppafo.model.leg import LegParameters, ShankNow, foot_load, torque_of_shank
 
 HARMONICS = 8
 """Harmonics that the engine follows; higher ones of the built-in gait are below 0.04 deg and 0.4 % of body weight."""
@@ -243,45 +243,29 @@ def shank_in_gait(gait: ShankSeries, time: float) -> ShankNow:
     )
 
 
-class FootInGait(NamedTuple):
-    """Angles of a foot and of the measured one over the horizontal [rad], and how much higher its toes are [m]."""
+def foot_in_gait(gait: ShankSeries, time: float, angle: float) -> tuple[float, float, float]:
+    """Angles of a foot and of the measured one over the horizontal [rad], and how much higher its toes are [m].
 
-    angle: float
-    measured_angle: float
-    toe_difference: float
-
-
-def foot_in_gait(gait: ShankSeries, time: float, angle: float) -> FootInGait:
-    """The foot on the shank of a gait, with an ankle angle [rad] at a time [s], beside the foot that was measured."""
+    The foot stands on the shank of a gait, with an ankle angle [rad] at a time [s].
+    """
     at = harmonics(gait.start + gait.frequency * time)
     shank = value_at(gait.shank, at)
     own, measured = shank - angle, shank - value_at(gait.ankle, at)
     sine, _ = sine_and_cosine_of_turns(own * TURNS_OF_RADIAN + 0.25)
     measured_sine, _ = sine_and_cosine_of_turns(measured * TURNS_OF_RADIAN + 0.25)
-    return FootInGait(
-        angle=own + QUARTER_TURN,
-        measured_angle=measured + QUARTER_TURN,
-        toe_difference=gait.toe_lever * (sine - measured_sine),
-    )
+    return own + QUARTER_TURN, measured + QUARTER_TURN, gait.toe_lever * (sine - measured_sine)
 
 
 def gait_of(leg: LegParameters, now: GaitMeasured) -> GaitNow:
     """The measured gait with what follows from it for this leg."""
     sine_shank, cosine_shank = sine_and_cosine_of_turns(now.shank * TURNS_OF_RADIAN)
     sine_foot, cosine_foot = sine_and_cosine_of_turns((now.shank - now.ankle) * TURNS_OF_RADIAN + 0.25)
+    load, rate, acceleration = foot_load(leg), now.shank_rate, now.shank_acceleration
     carried = torque_of_shank(
-        leg,
-        sine_shank,
-        cosine_shank,
-        sine_foot,
-        cosine_foot,
-        now.shank_rate,
-        now.shank_acceleration,
-        now.knee_forward,
-        now.knee_up,
+        load, sine_shank, cosine_shank, sine_foot, cosine_foot, rate, acceleration, now.knee_forward, now.knee_up
     )
     # What the measured motion itself takes, with the wearer's own damping.
-    moving = foot_inertia_about_ankle(leg) * now.ankle_acceleration + leg.ankle_damping * now.ankle_rate
+    moving = load.inertia * now.ankle_acceleration + leg.ankle_damping * now.ankle_rate
     return GaitNow(
         phase=now.phase,
         shank=now.shank,
@@ -348,10 +332,10 @@ class TimedSequence(NamedTuple):
     parts: Annotated[tuple[SequencePart, ...], PARTS]
 
 
-class AngleMotion(NamedTuple):
-    """An angle [rad] with its rate [rad/s] and acceleration [rad/s^2]."""
+class Kinematics(NamedTuple):
+    """A value with its first and second derivative: an angle [rad] with its own by time, or a fraction."""
 
-    angle: float
+    value: float
     rate: float
     acceleration: float
 
@@ -369,7 +353,7 @@ class PhaseMotion(NamedTuple):
     stride_rate: float
     stride_acceleration: float
     load: float
-    slope: AngleMotion
+    slope: Kinematics
     tilt: float
     scuff: float
 
@@ -381,19 +365,11 @@ class Marks(NamedTuple):
     forefoot: float
 
 
-class Blend(NamedTuple):
-    """A value that goes from 0 to 1, and its first and second derivative."""
-
-    value: float
-    rate: float
-    acceleration: float
-
-
-def blend(fraction: float) -> Blend:
+def blend(fraction: float) -> Kinematics:
     """Rise from 0 to 1 over a fraction from 0 to 1, with both derivatives 0 at both ends."""
     rest = 1.0 - fraction
     square = fraction * fraction
-    return Blend(
+    return Kinematics(
         value=square * fraction * (10.0 + fraction * (6.0 * fraction - 15.0)),
         rate=30.0 * square * rest * rest,
         acceleration=60.0 * fraction * rest * (1.0 - 2.0 * fraction),
@@ -440,8 +416,8 @@ def pace_in(part: SequencePart, time: float) -> PhaseMotion:
         stride_rate=part.stride_gain * shape.rate / part.length,
         stride_acceleration=part.stride_gain * shape.acceleration / (part.length * part.length),
         load=part.load + part.load_gain * shape.value,
-        slope=AngleMotion(
-            angle=part.slope + part.slope_gain * shape.value,
+        slope=Kinematics(
+            value=part.slope + part.slope_gain * shape.value,
             rate=part.slope_gain * shape.rate / part.length,
             acceleration=part.slope_gain * shape.acceleration / (part.length * part.length),
         ),
@@ -450,20 +426,20 @@ def pace_in(part: SequencePart, time: float) -> PhaseMotion:
     )
 
 
-def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: PhaseMotion, standing: float) -> AngleMotion:
+def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: PhaseMotion, standing: float) -> Kinematics:
     """An angle between its value in standing [rad] and the gait's."""
     away = value_at(series, at) - standing
     rate = rate_at(series, at, pace.frequency)
     # A changing cadence adds its own term to the second derivative, with the shape of the rate.
     turning = acceleration_at(series, at, pace.frequency) + rate_at(series, at, pace.frequency_rate)
-    return AngleMotion(
-        angle=standing + pace.stride * away,
+    return Kinematics(
+        value=standing + pace.stride * away,
         rate=pace.stride_rate * away + pace.stride * rate,
         acceleration=pace.stride_acceleration * away + 2.0 * pace.stride_rate * rate + pace.stride * turning,
     )
 
 
-def tilt_of_shank(timing: GaitTiming, phase: float, pace: PhaseMotion) -> AngleMotion:
+def tilt_of_shank(timing: GaitTiming, phase: float, pace: PhaseMotion) -> Kinematics:
     """Forward lean of the shank for a strike with the toes: largest at the strike, zero at toe-off and standing."""
     standing = STANDS_AT * timing.heel_off
     # Counted from standing, the lean rises from toe-off to the strike and falls to standing without a wrap in between.
@@ -474,8 +450,8 @@ def tilt_of_shank(timing: GaitTiming, phase: float, pace: PhaseMotion) -> AngleM
     place = (since - lifted) * slope if rises else 1.0 + (since - strike) * slope
     shape = blend(max(0.0, min(1.0, place)))
     rate = slope * pace.frequency
-    return AngleMotion(
-        angle=pace.tilt * shape.value,
+    return Kinematics(
+        value=pace.tilt * shape.value,
         rate=pace.tilt * shape.rate * rate,
         acceleration=pace.tilt * (shape.acceleration * rate * rate + shape.rate * slope * pace.frequency_rate),
     )
@@ -510,10 +486,10 @@ def gait_in_task_sequence(
     upright = blended_angle(gait.shank, at, pace, 0.0)
     ankle = blended_angle(gait.ankle, at, pace, QUARTER_TURN - timing.ground_angle)
     slope = pace.slope
-    shank = upright.angle - tilt.angle - slope.angle
+    shank = upright.value - tilt.value - slope.value
     shank_rate = upright.rate - tilt.rate - slope.rate
     shank_acceleration = upright.acceleration - tilt.acceleration - slope.acceleration
-    ankle_angle = ankle.angle - slope.angle
+    ankle_angle = ankle.value - slope.value
     ankle_rate = ankle.rate - slope.rate
     ankle_acceleration = ankle.acceleration - slope.acceleration
     # Accelerations go with the square of the cadence and with the stride.
@@ -524,8 +500,9 @@ def gait_in_task_sequence(
     carried = pace.load + walks * (value_at(gait.force, at) - pace.load)
     sine_shank, cosine_shank = sine_and_cosine_of_turns(shank * TURNS_OF_RADIAN)
     sine_foot, cosine_foot = sine_and_cosine_of_turns((shank - ankle_angle) * TURNS_OF_RADIAN + 0.25)
+    load = foot_load(leg)
     torque = torque_of_shank(
-        leg, sine_shank, cosine_shank, sine_foot, cosine_foot, shank_rate, shank_acceleration, forward, up
+        load, sine_shank, cosine_shank, sine_foot, cosine_foot, shank_rate, shank_acceleration, forward, up
     )
     now = GaitNow(
         phase=phase,
@@ -542,16 +519,6 @@ def gait_in_task_sequence(
         sine_shank=sine_shank,
         cosine_shank=cosine_shank,
         sine_healthy_foot=sine_foot,
-        healthy_torque=torque + foot_inertia_about_ankle(leg) * ankle_acceleration + leg.ankle_damping * ankle_rate,
+        healthy_torque=torque + load.inertia * ankle_acceleration + leg.ankle_damping * ankle_rate,
     )
     return now, marks_at(timing, leg, phase, pace)
-
-
-def shown_toe_force(toe_force: float, marks: Marks, follow_rate: float, step: float) -> float:
-    """Toe force [N] that the sensor shows at the end of a step [s], with a scuff; it follows at a rate [1/s]."""
-    return toe_force + marks.scuff_force * follow_rate * step / (1.0 + follow_rate * step)
-
-
-def stands_on_toes(toes_first: float, marks: Marks) -> float:
-    """1 where the stride began with the toes, or where only the forefoot meets the ground: on the edge of a stair."""
-    return max(toes_first, marks.forefoot)

@@ -64,21 +64,6 @@ class FootLoad(NamedTuple):
     gravity: float
 
 
-class MassMatrix(NamedTuple):
-    """The symmetric matrix M of equation (11) [kg m^2]: shank, coupling, foot."""
-
-    shank: float
-    coupling: float
-    foot: float
-
-
-class LegTorques(NamedTuple):
-    """Torques on shank angle and ankle angle [N m]."""
-
-    knee: float
-    ankle: float
-
-
 def foot_inertia_about_ankle(leg: LegParameters) -> float:
     """Inertia of the foot about the ankle [kg m^2]; the lower right entry of M in equation (11)."""
     return leg.foot_inertia + leg.foot_mass * leg.foot_mass_centre * leg.foot_mass_centre
@@ -89,23 +74,26 @@ def link_product(leg: LegParameters) -> float:
     return leg.foot_mass * leg.shank_length * leg.foot_mass_centre
 
 
-def mass_matrix(leg: LegParameters, cosine_theta: float) -> MassMatrix:
-    """The inertia matrix M [kg m^2] at an ankle angle, of which the cosine is given. Equations (11), (12)."""
+def mass_matrix(leg: LegParameters, cosine_theta: float) -> tuple[float, float, float]:
+    """Entries of the symmetric inertia matrix M [kg m^2], shank, coupling and foot. Equations (11), (12).
+
+    ``cosine_theta`` [-] is the cosine of the ankle angle.
+    """
     foot = foot_inertia_about_ankle(leg)
     product = link_product(leg) * cosine_theta
     shank = leg.shank_inertia + leg.shank_mass * leg.shank_mass_centre * leg.shank_mass_centre
     # The foot's mass turns with the shank at the end of its length (parallel axes).
     shank += leg.foot_mass * leg.shank_length * leg.shank_length
-    return MassMatrix(shank + foot - 2.0 * product, product - foot, foot)
+    return shank + foot - 2.0 * product, product - foot, foot
 
 
 def centrifugal_torques(
     leg: LegParameters, sine_theta: float, shank_rate: float, angular_velocity: float
-) -> LegTorques:
-    """The centrifugal and Coriolis torques C q' [N m]; rates of shank and ankle [rad/s]. Equations (11), (12)."""
+) -> tuple[float, float]:
+    """Centrifugal and Coriolis torques C q' on knee and ankle [N m]; rates [rad/s]. Equations (11), (12)."""
     product = link_product(leg) * sine_theta
     knee = product * angular_velocity * (2.0 * shank_rate - angular_velocity)
-    return LegTorques(knee, -product * shank_rate * shank_rate)
+    return knee, -product * shank_rate * shank_rate
 
 
 def gravity_torques(
@@ -116,20 +104,26 @@ def gravity_torques(
     cosine_alpha: float,
     knee_forward: float,
     knee_up: float,
-) -> LegTorques:
-    """The vector G [N m], with the acceleration of the knee forward and up [m/s^2] in it. Equations (11), (12).
+) -> tuple[float, float]:
+    """The vector G on knee and ankle [N m], with the knee's acceleration [m/s^2] in it. Equations (11), (12).
 
-    phi is the shank angle, alpha the foot's angle over the horizontal.
+    phi is the shank angle, alpha the foot's angle over the horizontal; the knee accelerates forward and up.
     """
     # A knee that accelerates upwards acts as more gravity.
     up = leg.gravity + knee_up
     shank = leg.shank_mass * leg.shank_mass_centre + leg.foot_mass * leg.shank_length
     foot = leg.foot_mass * leg.foot_mass_centre * (cosine_alpha * up - sine_alpha * knee_forward)
-    return LegTorques(shank * (sine_phi * up + cosine_phi * knee_forward) + foot, -foot)
+    return shank * (sine_phi * up + cosine_phi * knee_forward) + foot, -foot
+
+
+def foot_load(leg: LegParameters) -> FootLoad:
+    """Foot of a leg about its ankle, without a device."""
+    moment = leg.foot_mass * leg.foot_mass_centre
+    return FootLoad(moment, foot_inertia_about_ankle(leg), leg.shank_length, leg.gravity)
 
 
 def torque_of_shank(
-    leg: LegParameters,
+    load: FootLoad,
     sine_phi: float,
     cosine_phi: float,
     sine_alpha: float,
@@ -139,83 +133,38 @@ def torque_of_shank(
     knee_forward: float,
     knee_up: float,
 ) -> float:
-    """Torque [N m] of shank, knee and weight about the ankle, beside the foot's own acceleration.
+    """Torque [N m] that shank, knee and weight ask of a body that turns with the foot, beside its own acceleration.
 
     The ankle's row of equation (11) without the term in theta''; angles as in ``gravity_torques``, rates [rad/s],
     accelerations [rad/s^2], [m/s^2].
     """
-    return torque_of_shank_on(
-        leg.foot_mass * leg.foot_mass_centre,
-        foot_inertia_about_ankle(leg),
-        leg.shank_length,
-        leg.gravity,
-        sine_phi,
-        cosine_phi,
-        sine_alpha,
-        cosine_alpha,
-        shank_rate,
-        shank_acceleration,
-        knee_forward,
-        knee_up,
-    )
-
-
-def torque_of_shank_on(
-    mass_moment: float,
-    inertia: float,
-    shank_length: float,
-    gravity: float,
-    sine_phi: float,
-    cosine_phi: float,
-    sine_alpha: float,
-    cosine_alpha: float,
-    shank_rate: float,
-    shank_acceleration: float,
-    knee_forward: float,
-    knee_up: float,
-) -> float:
-    """Torque [N m] that shank, knee and weight ask of a body that turns with the foot. Equation (11), ankle's row.
-
-    ``mass_moment`` [kg m] is its mass times the distance along the foot, ``inertia`` [kg m^2] about the ankle.
-    """
     # theta is phi less alpha, plus 90 deg.
     sine_theta = cosine_phi * cosine_alpha + sine_phi * sine_alpha
     cosine_theta = cosine_phi * sine_alpha - sine_phi * cosine_alpha
-    product = mass_moment * shank_length
-    weight = cosine_alpha * (gravity + knee_up) - sine_alpha * knee_forward
-    turning = (product * cosine_theta - inertia) * shank_acceleration
-    return turning - product * sine_theta * shank_rate * shank_rate - mass_moment * weight
+    product = load.mass_moment * load.shank_length
+    weight = cosine_alpha * (load.gravity + knee_up) - sine_alpha * knee_forward
+    turning = (product * cosine_theta - load.inertia) * shank_acceleration
+    return turning - product * sine_theta * shank_rate * shank_rate - load.mass_moment * weight
 
 
 def torque_on_foot(load: FootLoad, now: ShankNow, angle: float) -> float:
     """Torque [N m] that shank, knee and weight put on what turns about the ankle, positive in plantarflexion.
 
-    T_shank of docs/equations.md: equation (11), its ankle's row without the term in theta''. ``angle`` [rad] of
-    the ankle. It is the torque of ``torque_of_shank_on`` about the ankle, with the sign of a torque that drives.
+    T_shank of docs/equations.md: ``torque_of_shank`` at an angle [rad] of the ankle, with the sign of a torque that
+    drives. Equation (11).
     """
     # alpha = phi - theta + a quarter turn: the foot is level at an ankle angle of 90 deg below an upright shank.
     sine_phi, cosine_phi = sine_and_cosine_of_turns(now.angle * TURNS_OF_RADIAN)
     sine_alpha, cosine_alpha = sine_and_cosine_of_turns((now.angle - angle) * TURNS_OF_RADIAN + 0.25)
-    return -torque_of_shank_on(
-        load.mass_moment,
-        load.inertia,
-        load.shank_length,
-        load.gravity,
-        sine_phi,
-        cosine_phi,
-        sine_alpha,
-        cosine_alpha,
-        now.rate,
-        now.acceleration,
-        now.knee_forward,
-        now.knee_up,
+    return -torque_of_shank(
+        load, sine_phi, cosine_phi, sine_alpha, cosine_alpha, now.rate, now.acceleration, now.knee_forward, now.knee_up
     )
 
 
 def torque_on_resting_foot(load: FootLoad, shank: float, angle: float) -> float:
     """Torque [N m] of the weight on a foot whose shank rests at an angle [rad]; to the bit as ``torque_on_foot``."""
     _, cosine_alpha = sine_and_cosine_of_turns((shank - angle) * TURNS_OF_RADIAN + 0.25)
-    # Grouped as torque_of_shank_on groups it, or the last bits would differ.
+    # Grouped as torque_of_shank groups it, or the last bits would differ.
     return load.mass_moment * (cosine_alpha * load.gravity)
 
 

@@ -3,20 +3,15 @@
 Both forms are one curve, ``mass_flow = conductance * upstream_pressure * flow_function(pressure_ratio)``,
 with a flow function that is 1 when the flow is choked. ``conductance`` [kg/(s Pa)] is ``Cd A C1`` in the paper's
 form and ``C rho_0 sqrt(T_0 / T)`` in the standard's. The exact flow functions stand here beside the fitted one
-that the time stepping uses: a square root times a polynomial, free of powers.
-
-Curves are fitted and conductances found by plain arithmetic and square roots alone, so that a run begins with the same
-bits on every machine.
+that the time stepping uses: a square root times a polynomial, free of powers (``flow_curve.py`` fits it).
 """
 
 import math
-from functools import lru_cache
 from typing import Annotated, NamedTuple
 
 from ppafo.constants import STANDARD_REFERENCE_DENSITY_AIR, STANDARD_REFERENCE_TEMPERATURE
-from ppafo.model.columns import over_runs, root
-from ppafo.model.elementary import power
-from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio
+from ppafo.model.columns import root
+from ppafo.model.gas import choked_flow_constant
 
 TERMS = 7
 """Coefficients of the polynomial of a flow curve."""
@@ -71,43 +66,29 @@ class ExactOrifice(NamedTuple):
     linear_ratio: float
 
 
-def exact_flow_function(pressure_ratio: float, orifice: ExactOrifice) -> float:
-    """Flow over choked flow [-] with the straight line near a ratio of 1. Equations (6), (7)."""
-    inside = min(pressure_ratio, orifice.linear_ratio)
+def exact_flow(pressure_a: float, pressure_b: float, conductance: float, orifice: ExactOrifice) -> float:
+    """Mass flow from a to b [kg/s] through a conductance [kg/(s Pa)] with the flow function of an orifice.
+
+    Positive from a to b, with a straight line near equal pressures. Equations (6), (7).
+    """
+    upstream = max(pressure_a, pressure_b)
+    ratio = min(pressure_a, pressure_b) / upstream
+    inside = min(ratio, orifice.linear_ratio)
     if orifice.is_iso6358 > 0.5:
         value = iso6358_flow_function(inside, orifice.number)
     else:
         value = isentropic_flow_function(inside, orifice.number)
     # The slope of both functions is infinite at equal pressures: ISO 6358 has a straight line there, and so the gas no
     # infinite stiffness.
-    return value * min((1.0 - pressure_ratio) / (1.0 - orifice.linear_ratio), 1.0)
-
-
-def exact_flow(pressure_a: float, pressure_b: float, conductance: float, orifice: ExactOrifice) -> float:
-    """Mass flow from a to b [kg/s] through a conductance [kg/(s Pa)] with the flow function of an orifice.
-
-    Positive from a to b. Equations (6), (7).
-    """
-    upstream = max(pressure_a, pressure_b)
-    ratio = min(pressure_a, pressure_b) / upstream
-    flow = conductance * upstream * exact_flow_function(ratio, orifice)
+    value = value * min((1.0 - ratio) / (1.0 - orifice.linear_ratio), 1.0)
+    flow = conductance * upstream * value
     return flow if pressure_a >= pressure_b else -flow
 
 
 def fitted_flow_function(pressure_ratio: float, curve: FlowCurve) -> float:
     """Flow over choked flow [-], 0 to 1, from a fitted curve; ratio is downstream over upstream, at most 1."""
-    gap = 1.0 - pressure_ratio
-    linear_gap = 1.0 - curve.linear_ratio
-    inside = max(min(gap, 1.0 - curve.critical_ratio), linear_gap)
-    # Even and odd powers apart: half as many operations wait for one another.
-    square = inside * inside
-    even = curve.coefficients[6] * square + curve.coefficients[4]
-    even = even * square + curve.coefficients[2]
-    even = even * square + curve.coefficients[0]
-    odd = curve.coefficients[5] * square + curve.coefficients[3]
-    odd = odd * square + curve.coefficients[1]
-    polynomial = even + inside * odd
-    return math.sqrt(inside) * polynomial * min(gap * curve.linear_slope, 1.0)
+    value, _ = fitted_flow_slope(pressure_ratio, curve)
+    return value
 
 
 def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, float]:
@@ -119,6 +100,7 @@ def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, f
     linear_gap = 1.0 - curve.linear_ratio
     choked_gap = 1.0 - curve.critical_ratio
     inside = max(min(gap, choked_gap), linear_gap)
+    # Even and odd powers apart: half as many operations wait for one another.
     square = inside * inside
     even = curve.coefficients[6] * square + curve.coefficients[4]
     even_slope = curve.coefficients[6] * square + even
@@ -180,77 +162,6 @@ def check_valve_flow_slopes(
     return signed, by_a, by_b
 
 
-Terms = tuple[float, float, float, float, float, float, float]
-"""Coefficients of a series, ``TERMS`` in number."""
-NODES: Terms = (0.01371, 0.117149, 0.300253, 0.522087, 0.735768, 0.900391, 0.988845)
-"""Nodes at which a curve meets the exact function: 1 - r over its value at the critical ratio.
-
-A curve that is best by relative least squares crosses the exact function of helium here, and of other gases nearby.
-"""
-
-
-def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCurve:
-    """Fitted curve [-] of equations (6), (7) for a gas, within 3e-7 of the exact function below ``linear_ratio``."""
-    return FlowCurve(
-        critical_ratio=critical_pressure_ratio(heat_capacity_ratio),
-        linear_ratio=linear_ratio,
-        linear_slope=1.0 / (1.0 - linear_ratio),
-        coefficients=over_runs(_remembered_coefficients, heat_capacity_ratio),
-    )
-
-
-def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
-    """Fitted curve [-] of ISO 6358 for a critical ratio b; within 1e-5 of the exact function below ``linear_ratio``.
-
-    The exact function depends on (1 - r) / (1 - b) alone, so one fit, scaled, serves every b.
-    """
-    # A factor on 1 - r scales the n-th coefficient by its n-th power, and the root in front by its own root.
-    scale = 1.0 / (1.0 - critical_ratio)
-    factor = root(scale)
-    unscaled = _remembered_iso6358_coefficients()
-    coefficients = unscaled
-    for place in range(TERMS):
-        coefficients = _with_item(coefficients, place, unscaled[place] * factor)
-        factor = factor * scale
-    return FlowCurve(
-        critical_ratio=critical_ratio,
-        linear_ratio=linear_ratio,
-        linear_slope=1.0 / (1.0 - linear_ratio),
-        coefficients=coefficients,
-    )
-
-
-def _isentropic_coefficients(heat_capacity_ratio: float) -> Terms:
-    """Coefficients of a gas, through the exact function of equation (7) at nodes in the subsonic region."""
-    k = heat_capacity_ratio
-    critical_gap = 1.0 - critical_pressure_ratio(k)
-    # Choked flow over the factor in front of the subsonic form: the curve is 1 where the flow is choked.
-    choked = math.sqrt(0.5 * (k - 1.0) * power(2.0 / (k + 1.0), (k + 1.0) / (k - 1.0)))
-    gaps, values = NODES, NODES
-    for place in range(TERMS):
-        gap = critical_gap * NODES[place]
-        # Divided by the root of the gap, which the curve has as a factor: what is left to fit is smooth at equal
-        # pressures.
-        value = power(1.0 - gap, 1.0 / k) * math.sqrt((1.0 - power(1.0 - gap, (k - 1.0) / k)) / gap)
-        gaps, values = _with_item(gaps, place, gap), _with_item(values, place, value / choked)
-    return _polynomial_through(gaps, values)
-
-
-# A study asks for the few gases of its runs again and again.
-_remembered_coefficients = lru_cache(maxsize=4096)(_isentropic_coefficients)
-
-
-def _iso6358_coefficients() -> Terms:
-    """Coefficients for a critical ratio of 0, where the function is the root of (1 - r)(1 + r)."""
-    values = NODES
-    for place in range(TERMS):
-        values = _with_item(values, place, math.sqrt(2.0 - NODES[place]))
-    return _polynomial_through(NODES, values)
-
-
-_remembered_iso6358_coefficients = lru_cache(maxsize=1)(_iso6358_coefficients)
-
-
 def area_conductance(
     area: float, discharge_coefficient: float, heat_capacity_ratio: float, gas_constant: float, temperature: float
 ) -> float:
@@ -278,38 +189,3 @@ def conductance_in_series(conductance: float, resistance: float) -> float:
     is choked, up to 12 % low for a second orifice as narrow as the first, 5 % for one three times as wide (ISO 6358-3).
     """
     return conductance / math.sqrt(1.0 + conductance * conductance * resistance)
-
-
-def _polynomial_through(places: Terms, values: Terms) -> Terms:
-    """Coefficients, from the constant one upwards, of the polynomial that has some values at some places (Newton)."""
-    differences = values
-    for order in range(1, TERMS):
-        for number in range(order, TERMS):
-            index = TERMS - 1 + order - number
-            # Divided differences in place, from the end, so that each still finds its neighbour of the order before.
-            rise = differences[index] - differences[index - 1]
-            differences = _with_item(differences, index, rise / (places[index] - places[index - order]))
-    # Tuples of fixed length, no lists: an exported library fits its curves itself, from this text in C.
-    coefficients = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    for number in range(TERMS):
-        place = places[TERMS - 1 - number]
-        # The polynomial so far times (x - place), and the next difference.
-        lower = coefficients
-        for index in range(TERMS):
-            raised = lower[index - 1] if index > 0 else 0.0
-            coefficients = _with_item(coefficients, index, raised - place * lower[index])
-        coefficients = _with_item(coefficients, 0, coefficients[0] + differences[TERMS - 1 - number])
-    return coefficients
-
-
-def _with_item(items: Terms, place: int, value: float) -> Terms:
-    """Some numbers with another one at a place."""
-    return (
-        value if place == 0 else items[0],
-        value if place == 1 else items[1],
-        value if place == 2 else items[2],
-        value if place == 3 else items[3],
-        value if place == 4 else items[4],
-        value if place == 5 else items[5],
-        value if place == 6 else items[6],
-    )

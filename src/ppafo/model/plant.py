@@ -165,12 +165,7 @@ def gravity_torque(angle: float, largest_torque: float) -> float:
     return (largest_torque if is_upside_down else -largest_torque) * cosine
 
 
-def net_driving_torque(actuator: float, gravity: float, external: float) -> float:
-    """Torque [N m] that drives the vane before friction and damping: actuator less gravity less T_ex. Equation (1)."""
-    return actuator - gravity - external
-
-
-def loaded(torque: float, angle: float) -> float:
+def torque_less_loads(torque: float, angle: float) -> float:
     """Torque [N m] less what loads take at an angle [rad] from a joint at rest. Equation (1)."""
     return torque - load_torque(0.0, angle, 0.0)
 
@@ -183,9 +178,9 @@ def viscous_torque(viscous_damping: float, angular_velocity: float) -> float:
 def net_torque(driving: float, friction: float, damping: float, angle: float, angular_velocity: float) -> float:
     """Torque [N m] that is left to accelerate the joint: the right-hand side of equation (1), and its only home.
 
-    ``driving`` [N m] is less what loads take at rest (``loaded``): what they take of a joint that moves is subtracted
-    here, with ``friction`` [N m] and viscous ``damping`` [N m], along the motion; the latter is 0 for an implicit step,
-    which finds it with its end.
+    ``driving`` [N m] is less what loads take at rest (``torque_less_loads``): what they take of a joint that moves is
+    subtracted here, with ``friction`` [N m] and viscous ``damping`` [N m], along the motion; the latter is 0 for an
+    implicit step, which finds it with its end.
     """
     moving = load_torque(0.0, angle, angular_velocity) - load_torque(0.0, angle, 0.0)
     return driving - friction - moving - damping
@@ -221,7 +216,7 @@ def driving_torque(
     """Torque on a vane at rest before friction [N m], positive in plantarflexion. Equations (1), (2)."""
     actuator = parts.torque(plant, angle, pressure_1, pressure_2)
     gravity = gravity_torque(angle, plant.gravity_torque)
-    return loaded(net_driving_torque(actuator, gravity, plant.external_torque), angle)
+    return torque_less_loads(actuator - gravity - plant.external_torque, angle)
 
 
 def chamber_1_volume(angle: Numeric, angle_min: float, displacement_per_radian: float, dead_volume: float) -> Numeric:

@@ -212,16 +212,7 @@ class GaitSeen(NamedTuple):
 HALF = 0.5
 """Fraction of its period in which a fault that comes and goes is there."""
 
-NOTHING_SEEN = GaitSeen(
-    heel_force=0.0,
-    toe_force=0.0,
-    angle=0.0,
-    pressure_1=0.0,
-    pressure_2=0.0,
-    smooth_angle=0.0,
-    smooth_pressure_1=0.0,
-    smooth_pressure_2=0.0,
-)
+NOTHING_SEEN = GaitSeen._make((0.0,) * len(GaitSeen._fields))
 
 
 def is_active(fault: Fault, time: float) -> bool:
@@ -232,20 +223,15 @@ def is_active(fault: Fault, time: float) -> bool:
     return (time >= fault.time) & (not away)
 
 
-def distorted(fault: Fault, reading: float, other: float, last: float, time: float) -> float:
-    """A reading at ``time`` [s] with gain, offset, drift, lag and some of the other sensor in it, in its unit."""
-    mixed = reading + fault.crosstalk * (other - reading)
-    # The lag acts last, on what the distorted sensor tends to.
-    target = fault.gain * mixed + fault.offset + fault.drift * (time - fault.time)
-    return target + fault.memory * (last - target)
-
-
-def faulty(fault: Fault, reading: float, other: float, last: float, time: float, draw: float) -> float:
+def faulty_reading(fault: Fault, reading: float, other: float, last: float, time: float, draw: float) -> float:
     """A reading at ``time`` [s] as a faulty sensor gives it, in its unit; ``other`` is the other sensor's.
 
     ``draw`` from 0 to 1 decides whether the sample is lost.
     """
-    wrong = distorted(fault, reading, other, last, time)
+    mixed = reading + fault.crosstalk * (other - reading)
+    # The lag acts last, on what the distorted sensor tends to.
+    target = fault.gain * mixed + fault.offset + fault.drift * (time - fault.time)
+    wrong = target + fault.memory * (last - target)
     wrong = last if draw < fault.lost_fraction else wrong
     stuck = last if fault.holds > 0.5 else fault.reading
     shown = wrong if fault.distorts > 0.5 else stuck
@@ -257,11 +243,6 @@ def force_reading(sensors: GaitSensors, force: float, seed: int, sample: int, ch
     noisy = force + sensors.force_noise * standard_noise(seed, sample, channel)
     # A force sensor under a foot does not pull.
     return max(quantise(noisy, sensors.force_resolution), 0.0)
-
-
-def previous_reading(last: float, reading: float, sample: int) -> float:
-    """The reading before, in the sensor's unit; before the first sample the same, as of a sensor that has settled."""
-    return last if sample > 0 else reading
 
 
 def hold_if_lost(last: float, reading: float, lost_share: float, seed: int, sample: int, channel: int) -> float:
@@ -286,7 +267,7 @@ def measure_gait(
 ) -> tuple[GaitMeasurement, GaitSeen]:
     """Measurement [SI] of a sample with bandwidth, noise, steps, loss and faults, and what to remember of it."""
     seed = int(sensors.seed)
-    # A sensor has settled before the walk begins.
+    # A sensor has settled before the walk begins: its reading before the first sample is the same.
     angle_memory = gait_sensors.angle_memory if sample > 0 else 0.0
     pressure_memory = gait_sensors.pressure_memory if sample > 0 else 0.0
     # Bandwidth before noise and rounding: what the amplifier adds is not filtered by the sensor.
@@ -298,11 +279,11 @@ def measure_gait(
     seen = measure(sensors, smooth_angle, smooth_1, smooth_2, plant, sample, parts=parts)
     heel = force_reading(gait_sensors, heel_force, seed, sample, 3)
     toe = force_reading(gait_sensors, toe_force, seed, sample, 4)
-    was_angle = previous_reading(last.angle, seen.angle, sample)
-    was_1 = previous_reading(last.pressure_1, seen.pressure_1, sample)
-    was_2 = previous_reading(last.pressure_2, seen.pressure_2, sample)
-    was_heel = previous_reading(last.heel_force, heel, sample)
-    was_toe = previous_reading(last.toe_force, toe, sample)
+    was_angle = last.angle if sample > 0 else seen.angle
+    was_1 = last.pressure_1 if sample > 0 else seen.pressure_1
+    was_2 = last.pressure_2 if sample > 0 else seen.pressure_2
+    was_heel = last.heel_force if sample > 0 else heel
+    was_toe = last.toe_force if sample > 0 else toe
     kept_angle = hold_if_lost(was_angle, seen.angle, gait_sensors.angle_lost_share, seed, sample, 7)
     kept_1 = hold_if_lost(was_1, seen.pressure_1, gait_sensors.pressure_lost_share, seed, sample, 8)
     kept_2 = hold_if_lost(was_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
@@ -310,11 +291,11 @@ def measure_gait(
     kept_toe = hold_if_lost(was_toe, toe, gait_sensors.lost_share, seed, sample, 6)
     # One draw for all: sensors with a common cause lose the same samples.
     draw = unit_noise(seed, sample, 10)
-    shown_angle = faulty(gait_sensors.angle_fault, kept_angle, kept_angle, was_angle, time, draw)
-    shown_1 = faulty(gait_sensors.pressure_1_fault, kept_1, kept_2, was_1, time, draw)
-    shown_2 = faulty(gait_sensors.pressure_2_fault, kept_2, kept_1, was_2, time, draw)
-    shown_heel = faulty(gait_sensors.heel_fault, kept_heel, kept_toe, was_heel, time, draw)
-    shown_toe = faulty(gait_sensors.toe_fault, kept_toe, kept_heel, was_toe, time, draw)
+    shown_angle = faulty_reading(gait_sensors.angle_fault, kept_angle, kept_angle, was_angle, time, draw)
+    shown_1 = faulty_reading(gait_sensors.pressure_1_fault, kept_1, kept_2, was_1, time, draw)
+    shown_2 = faulty_reading(gait_sensors.pressure_2_fault, kept_2, kept_1, was_2, time, draw)
+    shown_heel = faulty_reading(gait_sensors.heel_fault, kept_heel, kept_toe, was_heel, time, draw)
+    shown_toe = faulty_reading(gait_sensors.toe_fault, kept_toe, kept_heel, was_toe, time, draw)
     remembered = GaitSeen(
         heel_force=shown_heel,
         toe_force=shown_toe,

@@ -66,9 +66,7 @@ def is_silenced(shut_off: ShutOff, unpowered: Unpowered) -> bool:
 def next_unpowered(
     shut_off: ShutOff, unpowered: Unpowered, runs: bool, stopped: bool, brown_out: bool, period: float
 ) -> Unpowered:
-    """Time for which the valve has been without power, one sample ``period`` [s] on;
-
-    ``runs`` if the controller is alive.
+    """Time without power one sample ``period`` [s] on; ``runs`` is true of a controller that is alive.
 
     The power is gone where the controller has ``stopped`` the device, and at once in a ``brown_out``. A watchdog that
     has acted stays: what the controller would do when it comes back is not known.

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.errors import ParameterError, UnitError, refused_as
+from ppafo.errors import ParameterError
 from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.columns import Problem, at, first, larger, smaller
-from ppafo.model.declaration import Quantity, range_rule
+from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.gas import SPECIES
 from ppafo.parameters import declaration
@@ -33,9 +33,9 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH, DISPLACEMENT_PATH, PRESSURE_
 from ppafo.parameters.overrides import FORMS, either, in_two_forms
 from ppafo.parameters.parameter_set import (
     ParameterSet,
+    allowed_number,
     atmospheric_pressure,
     chosen_valve,
-    entry_in_si,
     links_of_set,
     number_text,
     with_followers,
@@ -70,7 +70,12 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
         raise ParameterError(f"{parameter_set.file}: the device lacks {', '.join(missing)}; {remedy}")
     read, kind = _reader(parameter_set), parameter_set.valve_kinds[name]
     relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
-    species = _species(parameter_set)
+    species = parameter_set.texts[declaration.SPECIES_PATH].value
+    if species not in SPECIES:
+        raise ParameterError(
+            f"{parameter_set.file}: gas.species = '{one_line(species)}' is unknown{nearest_name(species, SPECIES)}; "
+            f"available: {', '.join(SPECIES)}"
+        )
     named_effects = {path.split(".")[1] for path in parameter_set.numbers if path.startswith(f"{SECTION}.")}
 
     device = Device(
@@ -216,25 +221,10 @@ def _reader(parameter_set: ParameterSet) -> Reader:
                 continue
             entry = parameter_set.numbers[path]
             written = f"{parameter_set.file}: {path} = {number_text(entry)}"
-            with refused_as(ParameterError, written, UnitError):
-                numbers[member.name] = entry_in_si(entry, declared[path], atmosphere)
-            if not declaration.is_within(numbers[member.name], declared[path]):
-                allowed = declaration.limits_text(declared[path], entry.unit)
-                raise ParameterError(f"{written}: {range_rule(declared[path], allowed)}")
+            numbers[member.name] = allowed_number(written, entry, declared[path], atmosphere)
         return numbers
 
     return read
-
-
-def _species(parameter_set: ParameterSet) -> str:
-    name = parameter_set.texts[declaration.SPECIES_PATH].value
-    if name not in SPECIES:
-        hint = nearest_name(name, SPECIES)
-        known = ", ".join(SPECIES)
-        raise ParameterError(
-            f"{parameter_set.file}: gas.species = '{one_line(name)}' is unknown{hint}; available: {known}"
-        )
-    return name
 
 
 def _orifice(parameter_set: ParameterSet, read: Reader, section: str) -> Orifice | SonicOrifice:

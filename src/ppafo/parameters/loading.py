@@ -129,19 +129,6 @@ _JOINT = table(
 )
 
 
-def _joint_of(words: Any, file: str) -> JointNames:
-    """Return the words for a joint; ParameterError for a movement whose opposite is not known and not given."""
-    if words is None:
-        return ANKLE
-    negative = words.negative or OPPOSITES.get(words.positive)
-    if negative is None:
-        hint = nearest_name(words.positive, OPPOSITES)
-        raise ParameterError(
-            f"{file}: joint.positive = '{words.positive}': its opposite is not known{hint}; give joint.negative too"
-        )
-    return JointNames(words.name, words.positive, negative)
-
-
 @functools.lru_cache(maxsize=4)
 def _parameter_file(_kinds: Any) -> type[BaseModel]:
     fields: dict[str, Any] = {
@@ -294,6 +281,15 @@ def _flatten(parsed: Any, file: str, folder: Path) -> ParameterSet:
         # A file of another form, of another package's kind, has no reader here.
         if ACTUATORS[actuator.kind].model.table is Table:
             measured = read_actuator_table(folder / actuator.file)
+    joint = ANKLE
+    if (words := parsed.joint) is not None:
+        negative = words.negative or OPPOSITES.get(words.positive)
+        if negative is None:
+            hint = nearest_name(words.positive, OPPOSITES)
+            raise ParameterError(
+                f"{file}: joint.positive = '{words.positive}': its opposite is not known{hint}; give joint.negative too"
+            )
+        joint = JointNames(words.name, words.positive, negative)
     return ParameterSet(
         file=file,
         name=parsed.name,
@@ -311,7 +307,7 @@ def _flatten(parsed: Any, file: str, folder: Path) -> ParameterSet:
         texts={path: leaf for path, leaf in leaves.items() if isinstance(leaf, TextEntry)},
         flags={path: leaf for path, leaf in leaves.items() if isinstance(leaf, FlagEntry)},
         accepted={finding.finding: finding.reason for finding in parsed.accepted},
-        joint=_joint_of(parsed.joint, file),
+        joint=joint,
     )
 
 

@@ -100,31 +100,20 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
     )
 
 
-class _Line(NamedTuple):
-    number: int
-    cells: list[str]
-
-
-def _lines(text: str, file: str) -> list[_Line]:
-    """Return the lines of a file that are neither empty nor comments, the header first."""
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
-    if not lines:
-        raise ParameterError(f"{file}: is empty; its header is 'angle [deg],pressure [kPa_g],volume_1 [mL]'")
-    header = lines[0][1]
-    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
-        if separator in header and "," not in header:
-            raise ParameterError(f"{file}: its columns are separated by {name}; commas are needed")
-    return [_Line(number, [cell.strip().strip('"') for cell in line.split(",")]) for number, line in lines]
-
-
 def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float]]:
     """Return the columns of a file by name, each (lines,), and their steps in which they are written, in SI units.
 
     Pressures are above the atmosphere.
     """
-    header, *lines = _lines(text, file)
-    units = _units(header.cells, file)
-    rows = [_numbers(line, tuple(units), file) for line in lines]
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
+    if not lines:
+        raise ParameterError(f"{file}: is empty; its header is 'angle [deg],pressure [kPa_g],volume_1 [mL]'")
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        if separator in lines[0][1] and "," not in lines[0][1]:
+            raise ParameterError(f"{file}: its columns are separated by {name}; commas are needed")
+    (_, header), *below = ((number, [cell.strip().strip('"') for cell in line.split(",")]) for number, line in lines)
+    units = _units(header, file)
+    rows = [_numbers(cells, tuple(units), f"{file}, line {number}") for number, cells in below]
     if not rows:
         raise ParameterError(f"{file}: has a header and no line of numbers")
     columns: dict[str, Floats] = {}
@@ -136,11 +125,11 @@ def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float]]
         worst = int(np.argmax(np.abs(column)))
         if abs(column[worst]) > declared.largest:
             raise ParameterError(
-                f"{file}, line {lines[worst].number}: {name} = {rows[worst][index]:g} {unit} is beyond "
+                f"{file}, line {below[worst][0]}: {name} = {rows[worst][index]:g} {unit} is beyond "
                 f"{declared.largest:g} {declared.unit.removesuffix('_a')}"
             )
         columns[name] = column
-        step = _step([Decimal(number_text(line.cells[index])) for line in lines])
+        step = _step([Decimal(number_text(cells[index])) for _, cells in below])
         digits[name] = abs(to_si(step, unit, declared.unit, 0.0) - to_si(0.0, unit, declared.unit, 0.0))
     return columns, digits
 
@@ -179,19 +168,19 @@ def _units(header: Sequence[str], file: str) -> dict[str, str]:
     return units
 
 
-def _numbers(line: _Line, names: Sequence[str], file: str) -> list[float]:
+def _numbers(cells: Sequence[str], names: Sequence[str], line: str) -> list[float]:
     """Return the numbers of a line, as they are written, in the order of the columns ``names``."""
-    if len(line.cells) != len(names):
-        raise ParameterError(f"{file}, line {line.number}: has {len(line.cells)} values, the header has {len(names)}")
+    if len(cells) != len(names):
+        raise ParameterError(f"{line}: has {len(cells)} values, the header has {len(names)}")
     numbers = []
-    for name, cell in zip(names, line.cells, strict=True):
+    for name, cell in zip(names, cells, strict=True):
         try:
             number = float(number_text(cell)) if len(cell) <= _LONGEST else math.nan
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
             shown = one_line(cell)[:_LONGEST]
-            raise ParameterError(f"{file}, line {line.number}: {name} = '{shown}' is not a finite number")
+            raise ParameterError(f"{line}: {name} = '{shown}' is not a finite number")
         numbers.append(number)
     return numbers
 

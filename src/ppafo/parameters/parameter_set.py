@@ -4,15 +4,15 @@ import contextlib
 import math
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import StrictTable, Text, Texts
-from ppafo.errors import ParameterError, UnitError
-from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import SPECIES_PATH, alternatives, fits, quantities
+from ppafo.errors import ParameterError, UnitError, refused_as
+from ppafo.model.declaration import Quantity, range_rule
+from ppafo.parameters.declaration import SPECIES_PATH, alternatives, fits, is_within, limits_text, quantities
 from ppafo.parameters.graph import (
     ATMOSPHERE_PATH,
     DISPLACEMENT_PATH,
@@ -296,6 +296,18 @@ def entry_in_si(entry: Entry, quantity: Quantity, atmosphere: float) -> float:
         except UnitError as error:
             refused = refused or error
     raise refused or UnitError(f"'{quantity.name}' has no unit")
+
+
+def allowed_number(written: str, entry: Any, quantity: Quantity, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+    """Return the value in SI of an entry or a figure of a part, which messages begin with as it is ``written``.
+
+    ParameterError where the unit does not fit, and where no device can have the value.
+    """
+    with refused_as(ParameterError, written, UnitError):
+        value = entry_in_si(entry, quantity, atmosphere)
+    if not is_within(value, quantity):
+        raise ParameterError(f"{written}: {range_rule(quantity, limits_text(quantity, entry.unit))}")
+    return value
 
 
 def number_in_si(parameter_set: ParameterSet, path: str) -> float | None:

@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import final
+from typing import Any, final
 
 from ppafo.errors import ScenarioError
 from ppafo.processor.console import UNTOUCHED, Console, depth_of_stack
-from ppafo.processor.images import Decision, EmulatedMachine, Image, MemoryRegion, Target
+from ppafo.processor.images import Decision, Image, Target
 from ppafo.processor.qemu import QemuSimulator
 from ppafo.storage.files import write_file
+from ppafo.wording import nearest_name
 
 # mspdebug's simulator of an MSP430, driven by its console.
 
@@ -30,7 +31,7 @@ class _MspdebugSimulator:
         self._console = Console(["mspdebug", "-n", "-q", "sim"], self._folder)
         self.close: Callable[[], object] = self._console.close
         self._start = target.ram.start + image.sizes.data
-        self._free = target.ram.size - image.sizes.data
+        self._free = len(target.ram) - image.sizes.data
         self._say(f"prog {image.file.name}\nfill {self._start} {self._free} {UNTOUCHED:x}")
         self._say(f"simio add tracer counter\nsetbreak board_wait\nrun\n{_SAID_OUTPUTS}")
         self._answer()
@@ -96,8 +97,8 @@ MSP430F2013 = Target(
     processor="MSP430F2013",
     board="an eZ430-F2013",
     clock=16.0e6,
-    flash=MemoryRegion(0xF800, 0x800),
-    ram=MemoryRegion(0x200, 0x80),
+    flash=range(0xF800, 0x10000),
+    ram=range(0x200, 0x280),
     interrupt_stack=4,
     converter_bits=16,
     words={
@@ -127,10 +128,13 @@ MSP430F2013 = Target(
 )
 
 
-def _words_of_cortex(name: str, part: str, pins: Mapping[str, str]) -> dict[str, str]:
-    """Template variables for a Cortex-M on a micro:bit, whose compiler may be gcc, clang or zig."""
+def _cortex(name: str, part: str, pins: Mapping[str, str], flash: int, ram: int, **more: Any) -> Target:
+    """A Cortex-M on a micro:bit with some flash and RAM [bytes], whose compiler may be gcc, clang or zig."""
     for_zig = f"zig cc -target thumb-freestanding-eabi -mcpu={name.replace('-', '_')}"
-    return {
+    copied = _FLASH.format(
+        said="Onto the drive that the board is", needs="firmware.hex", command='cp firmware.hex "$(MICROBIT)"'
+    )
+    words = {
         "needs": "gcc for ARM without a system",
         "variables": _VARIABLES.format(name=name, zig=for_zig),
         "compiler": "$(COMPILER)",
@@ -141,77 +145,67 @@ def _words_of_cortex(name: str, part: str, pins: Mapping[str, str]) -> dict[str,
         "board_files": f"`board_microbit.c` and `converter_{part}.c`",
         "not_run": "timer and outputs run in QEMU's micro:bit V1, converter and watchdog have no simulator",
         "script": f"{part}.ld",
-        "flash": _FLASH.format(
-            said="Onto the drive that the board is", needs="firmware.hex", command='cp firmware.hex "$(MICROBIT)"'
-        )
-        + _HEX,
+        "flash": copied + _HEX,
         "flash_said": "onto the drive that the board is, as in make flash MICROBIT=/media/MICROBIT",
-        **pins,
+        **{f"pin_{pin}": place for pin, place in pins.items()},
     }
+    return Target(
+        name=name,
+        flash=range(flash),
+        ram=range(0x20000000, 0x20000000 + ram),
+        interrupt_stack=40,
+        words=words,
+        templates=("board_microbit.c", "start_cortex.c", f"converter_{part}.c", f"{part}.ld"),
+        wiring="wiring_microbit.md",
+        tools=("make", "arm-none-eabi-gcc", "qemu-system-arm"),
+        packages="make, gcc-arm-none-eabi and qemu-system-arm",
+        counted="instructions",
+        simulator=QemuSimulator,
+        **more,
+    )
 
 
-_OF_CORTEX = ("board_microbit.c", "start_cortex.c")
-_TOOLS = ("make", "arm-none-eabi-gcc", "qemu-system-arm")
-_PACKAGES = "make, gcc-arm-none-eabi and qemu-system-arm"
-CORTEX_M0 = Target(
-    name="cortex-m0",
+CORTEX_M0 = _cortex(
+    "cortex-m0",
+    "nrf51822",
+    {
+        "pressure_1": "P0.03, AIN4",
+        "pressure_2": "P0.02, AIN3",
+        "reference": "P0.01, AIN2",
+        "a": "23",
+        "b": "22",
+        "pulse": "21",
+        "enable": "20",
+    },
+    flash=256 * 1024,
+    ram=16 * 1024,
     processor="nRF51822, a Cortex-M0",
     board="a BBC micro:bit V1",
     clock=16.0e6,
-    flash=MemoryRegion(0, 256 * 1024),
-    ram=MemoryRegion(0x20000000, 16 * 1024),
-    interrupt_stack=40,
     converter_bits=10,
-    words=_words_of_cortex(
-        "cortex-m0",
-        "nrf51822",
-        {
-            "pin_pressure_1": "P0.03, AIN4",
-            "pin_pressure_2": "P0.02, AIN3",
-            "pin_reference": "P0.01, AIN2",
-            "pin_a": "23",
-            "pin_b": "22",
-            "pin_pulse": "21",
-            "pin_enable": "20",
-        },
-    ),
-    templates=(*_OF_CORTEX, "converter_nrf51822.c", "nrf51822.ld"),
-    wiring="wiring_microbit.md",
-    tools=_TOOLS,
-    packages=_PACKAGES,
-    counted="instructions",
-    simulator=QemuSimulator,
-    machine=EmulatedMachine("microbit", 16.0e6),
+    machine="microbit",
+    machine_clock=16.0e6,
 )
-CORTEX_M4 = Target(
-    name="cortex-m4",
+CORTEX_M4 = _cortex(
+    "cortex-m4",
+    "nrf52833",
+    {
+        "pressure_1": "P0.02, AIN0",
+        "pressure_2": "P0.03, AIN1",
+        "reference": "P0.04, AIN2",
+        "a": "17",
+        "b": "01",
+        "pulse": "13",
+        "enable": "12",
+    },
+    flash=512 * 1024,
+    ram=128 * 1024,
     processor="nRF52833, a Cortex-M4",
     board="a BBC micro:bit V2",
     clock=64.0e6,
-    flash=MemoryRegion(0, 512 * 1024),
-    ram=MemoryRegion(0x20000000, 128 * 1024),
-    interrupt_stack=40,
     converter_bits=14,
-    words=_words_of_cortex(
-        "cortex-m4",
-        "nrf52833",
-        {
-            "pin_pressure_1": "P0.02, AIN0",
-            "pin_pressure_2": "P0.03, AIN1",
-            "pin_reference": "P0.04, AIN2",
-            "pin_a": "17",
-            "pin_b": "01",
-            "pin_pulse": "13",
-            "pin_enable": "12",
-        },
-    ),
-    templates=(*_OF_CORTEX, "converter_nrf52833.c", "nrf52833.ld"),
-    wiring="wiring_microbit.md",
-    tools=_TOOLS,
-    packages=_PACKAGES,
-    counted="instructions",
-    simulator=QemuSimulator,
-    machine=EmulatedMachine("mps2-an386", 25.0e6),
+    machine="mps2-an386",
+    machine_clock=25.0e6,
 )
 CATALOG: dict[str, Target] = {target.name: target for target in (MSP430F2013, CORTEX_M0, CORTEX_M4)}
 TARGETS = tuple(CATALOG)
@@ -221,5 +215,6 @@ TARGETS = tuple(CATALOG)
 def target_of(name: str) -> Target:
     """The target of a name; ScenarioError where there is none."""
     if name not in CATALOG:
-        raise ScenarioError(f"no firmware for '{name}'; targets: {', '.join(CATALOG)}")
+        hint = nearest_name(name, CATALOG)
+        raise ScenarioError(f"there is no target '{name}'{hint}; available: {', '.join(CATALOG)}")
     return CATALOG[name]

@@ -4,10 +4,10 @@ import shlex
 from collections.abc import Sequence
 
 from ppafo.arguments import Count, Folder, Name, Overrides, Scenario
+from ppafo.arguments.door import argument_text
 from ppafo.cli import output
 from ppafo.cli.output import CommandOutput
 from ppafo.errors import ScenarioError
-from ppafo.wording import nearest_name
 
 MOST_SAMPLES = 10_000_000
 """Drawn samples that are compared at most."""
@@ -43,18 +43,16 @@ def export_firmware(
     written: firmware (LICENSE, Makefile, README.md, board.h, board_msp430f2013.c, board_simulated.c, controller.c,
     controller.h, host.c, main.c, msp430.h, msp430f2013.ld, parameters.h, start_msp430.c); next: make -C firmware
     """
-    from ppafo.processor.catalog import TARGETS
+    from ppafo.processor.catalog import TARGETS, target_of
 
-    if target is not None and target not in TARGETS:
-        hint = nearest_name(target, TARGETS)
-        raise ScenarioError(f"there is no target '{target}'{hint}; available: {', '.join(TARGETS)}")
+    chosen = target_of(target or TARGETS[0]).name
+    trial = argument_text("try_", option="--try")
     if not (try_ or table or samples is not None):
         if len(scenarios) != 1 or out is None:
-            raise ScenarioError("give one SCENARIO and --out DIR, or --try; see 'ppafo export firmware --help'")
+            raise ScenarioError(f"give one scenario and {argument_text('out')}, or {trial}")
         from ppafo.processor.firmware import firmware
         from ppafo.simulation.loading import load_scenario
 
-        chosen = target or TARGETS[0]
         return output.export(
             out,
             COMMAND,
@@ -62,21 +60,24 @@ def export_firmware(
             lambda _: f"make -C {shlex.quote(str(out))}",
             target=chosen,
         )
-    if samples is not None and samples > MOST_SAMPLES:
-        raise ScenarioError(f"--samples {samples}: must be 1 to {MOST_SAMPLES}")
+    if not (scenarios or table):
+        raise ScenarioError(f"{trial} needs a scenario, or {argument_text('table')}")
     if table and (scenarios or overrides):
-        raise ScenarioError("--table runs a fixed list of scenarios: remove SCENARIO and --set")
-    if not table and not scenarios:
-        raise ScenarioError("give a SCENARIO, or --table; see 'ppafo export firmware --help'")
+        sets = argument_text("overrides", option="--set")
+        raise ScenarioError(f"{argument_text('table')} has scenarios of its own: give no scenario and no {sets}")
+    if samples is not None and samples > MOST_SAMPLES:
+        raise ScenarioError(f"{argument_text('samples', str(samples))}: must be 1 to {MOST_SAMPLES}")
+    if samples is not None and len(scenarios) > 1:
+        raise ScenarioError(f"{argument_text('samples')} takes one scenario; without it several are drawn together")
     output.check_output(out, COMMAND)
     from ppafo.processor import words
 
     if table:
-        tried = words.table(TARGETS if target is None else (target,), samples)
+        said = words.verify_table(TARGETS if target is None else (chosen,), samples)
+    elif samples is not None:
+        said = words.verify_samples(scenarios[0], chosen, samples, tuple(overrides))
     else:
-        tried = words.tried(scenarios, target or TARGETS[0], samples, tuple(overrides))
-    code = output.EXIT_GOOD if tried.agrees else output.EXIT_CHECK_FAILED
-    said = CommandOutput(tried.text, tried.document, "processor", code, draw=tried.draw)
+        said = words.verify_runs(scenarios, chosen, tuple(overrides))
     if out is not None:
         output.write_files(out, output.said_files(said), COMMAND)
     return said

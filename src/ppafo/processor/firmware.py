@@ -14,7 +14,14 @@ from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
 from ppafo.processor.catalog import TARGETS, target_of
-from ppafo.processor.fixed_point import COMMAND_STEPS, LARGEST_READING, SETTINGS, ConverterCounts, converter_with
+from ppafo.processor.fixed_point import (
+    COMMAND_STEPS,
+    LARGEST_READING,
+    SETTINGS,
+    ConverterCounts,
+    ConverterLimits,
+    CountResolution,
+)
 from ppafo.processor.torque_laws.catalog import FIXED_LAWS
 from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.simulation.nominal import converter_range
@@ -113,9 +120,10 @@ def macro(quantity: Quantity) -> str:
     return f"CONTROLLER_{quantity.name.upper()}"
 
 
-def parameters_header(scenario: Scenario, fixed: "FixedPointController") -> str:
+def parameters_header(fixed: "FixedPointController") -> str:
     """``parameters.h``: every number of a law, its unit, meaning and origin; one beyond its range is refused in C."""
-    control, law = scenario.controller, fixed.law
+    scenario, law = fixed.scenario, fixed.law
+    control = scenario.controller
     declared: dict[str, Quantity] = {quantity.name: quantity for quantity in CONTROLLERS[control.kind].quantities}
     source = scenario.origin.file or "a scenario without a file"
     settings = (
@@ -166,11 +174,13 @@ _TEMPLATES = ("Makefile", "README.md", "board.h", "board_simulated.c", "controll
 
 
 class FixedPointController(NamedTuple):
-    """The integer controller of a scenario: law, whole numbers by name, converter, ticks of a sample."""
+    """Integer controller: scenario in integer form, law, whole numbers by name, converter, ticks of a sample."""
 
+    scenario: Scenario
     law: FixedLaw
     numbers: Mapping[str, float]
-    converter: Any
+    steps: CountResolution
+    limits: ConverterLimits
     ticks: int
 
 
@@ -213,16 +223,14 @@ def fixed_point_controller(scenario: Scenario) -> FixedPointController:
     law = FIXED_LAWS[scenario.controller.kind]
     row = plan_run(scenario).controller
     numbers = dict(zip((quantity.name for quantity in law.number_quantities), leaves(row.numbers), strict=True))
-    converter = converter_with(row.steps, row.numbers.limits)
-    return FixedPointController(law=law, numbers=numbers, converter=converter, ticks=ticks)
+    return FixedPointController(scenario, law, numbers, row.steps, row.numbers.limits, ticks)
 
 
 def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
     """Files of the firmware of a scenario's controller, by name. ScenarioError where it has no integer form."""
     chosen = target_of(target)
-    scenario = integer_form(scenario)
     fixed = fixed_point_controller(scenario)
-    converter = fixed.converter
+    scenario, steps, (top, middle) = fixed.scenario, fixed.steps, fixed.limits
     words = {
         "title": scenario.name,
         "description": in_markdown(scenario.description),
@@ -234,10 +242,10 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
         "version": __version__,
         "period": written_text(scenario.controller.period, "s"),
         "range": f"{scenario.controller.settings[SETTINGS[1].name] / 1.0e3:.6g} kPa",
-        "step": f"{converter.pressure_step:.4g} Pa",
-        "torque_step": f"{converter.torque_step * 1.0e3:.4g} mN m",
-        "lowest": f"{-converter.middle * converter.torque_step:.4g} N m",
-        "highest": f"{(converter.top - converter.middle) * converter.torque_step:.4g} N m",
+        "step": f"{steps.pressure_step:.4g} Pa",
+        "torque_step": f"{steps.torque_step * 1.0e3:.4g} mN m",
+        "lowest": f"{-middle * steps.torque_step:.4g} N m",
+        "highest": f"{(top - middle) * steps.torque_step:.4g} N m",
         "silence": f"{(2 * fixed.ticks * TICK + 2.05e-3) * 1.0e3:.4g} ms",
         **chosen.words,
     }
@@ -245,5 +253,5 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
     texts = {name: filled(template("ppafo.processor", name), words) for name in (*_TEMPLATES, *chosen.templates)}
     texts["LICENSE"] = template("ppafo.exports.c_library", "LICENSE")
     texts["controller.c"] = law_source(fixed.law)
-    texts["parameters.h"] = parameters_header(scenario, fixed)
+    texts["parameters.h"] = parameters_header(fixed)
     return {name: text.encode() for name, text in sorted(texts.items())}

@@ -6,7 +6,7 @@ A gain is a fraction of 15 bits and a number of places: ``(value * fraction >> 1
 import math
 from typing import NamedTuple
 
-from ppafo.control.kind import NOMINAL
+from ppafo.control.kind import nominal_term
 from ppafo.control.torque_loop import SHARPNESS
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
@@ -19,13 +19,6 @@ MOST_PLACES = 30
 """Places that a product of 32 bits is shifted right by at most."""
 SHARPENED = int(1.0 / SHARPNESS)
 """Openings that pass a dead band in full are this part of full opening or more."""
-
-
-class FixedPointGain(NamedTuple):
-    """A factor from 0 up as a fraction of 15 bits and the places by which the product is shifted right."""
-
-    fraction: float
-    places: float
 
 
 def fraction_of(value: int, fraction: int) -> int:
@@ -64,10 +57,13 @@ def limited(value: int, limit: int) -> int:
     return max(min(value, limit), -limit)
 
 
-def gain_of(factor: float) -> FixedPointGain:
-    """A factor from 0 to 32767 times 2^15 as a gain: as many bits as there are, the largest one where it is larger."""
+def gain_of(factor: float) -> tuple[float, float]:
+    """A factor from 0 to 32767 times 2^15 as a fraction of 15 bits and the places by which a product is shifted right.
+
+    It has as many bits as there are, and is the largest one where the factor is larger.
+    """
     if not factor > 0.0:
-        return FixedPointGain(0.0, 0.0)
+        return 0.0, 0.0
     _, exponent = math.frexp(factor)
     places = min(MOST_PLACES, max(0, FRACTION_BITS - exponent))
     fraction = math.floor(math.ldexp(factor, places) + 0.5)
@@ -75,7 +71,7 @@ def gain_of(factor: float) -> FixedPointGain:
     if fraction > LARGEST_FRACTION and places > 0:
         places -= 1
         fraction = math.floor(math.ldexp(factor, places) + 0.5)
-    return FixedPointGain(float(min(fraction, LARGEST_FRACTION)), float(places))
+    return float(min(fraction, LARGEST_FRACTION)), float(places)
 
 
 FEWEST_BITS, MOST_BITS = 8, 14
@@ -92,19 +88,10 @@ SETTINGS = (
         None,
         1.0e4,
         1.0e8,
-        follows=(NOMINAL["converter_range"],),
+        follows=(nominal_term("converter_range"),),
     ),
 )
 """Settings of the converter of an integer controller."""
-
-
-class Converter(NamedTuple):
-    """Pressure and torque of one count [Pa], [N m]; the largest reading, and the one that stands for a torque of 0."""
-
-    pressure_step: float
-    torque_step: float
-    top: float
-    middle: float
 
 
 class ConverterLimits(NamedTuple):
@@ -137,26 +124,19 @@ OF_LIMITS = (
     Quantity("top", "", "largest reading of the converter", None, 0.0, float(LARGEST_READING)),
     Quantity("middle", "", "reading that stands for a reference of 0 N m", None, 0.0, float(2 ** (MOST_BITS - 1))),
 )
-"""The numbers of ``Converter``, in order: its steps, and then its limits."""
+"""Fields of ``CountResolution`` and of ``ConverterLimits``, in order."""
 
 
-def converter_of(bits: float, pressure_range: float, torque_constant: float) -> Converter:
-    """The converter with some bits that shows ``pressure_range`` [Pa] as its largest number.
+def converter_of(
+    bits: float, pressure_range: float, torque_constant: float
+) -> tuple[CountResolution, tuple[float, float]]:
+    """Steps and limits of a converter with some bits that shows ``pressure_range`` [Pa] as its largest number.
 
     The reference has its 0 N m in the middle, and a count of it is the torque of a count of pressure.
     """
-    top = float(2 ** int(bits) - 1)
+    top, middle = float(2 ** int(bits) - 1), float(2 ** (int(bits) - 1))
     step = pressure_range / top
-    return Converter(
-        pressure_step=step, torque_step=torque_constant * step, top=top, middle=float(2 ** (int(bits) - 1))
-    )
-
-
-def converter_with(steps: CountResolution, limits: ConverterLimits) -> Converter:
-    """The converter with these steps and limits, as the lanes keep both."""
-    return Converter(
-        pressure_step=steps.pressure_step, torque_step=steps.torque_step, top=limits.top, middle=limits.middle
-    )
+    return CountResolution(pressure_step=step, torque_step=torque_constant * step), (top, middle)
 
 
 def count_of(value: float, step: float, top: float) -> int:
@@ -165,12 +145,14 @@ def count_of(value: float, step: float, top: float) -> int:
     return int(max(0.0, min(top, value / step + 0.5)))
 
 
-def read(converter: Converter, reference: float, measurement: Measurement) -> ConverterCounts:
+def read(
+    steps: CountResolution, limits: ConverterLimits, reference: float, measurement: Measurement
+) -> ConverterCounts:
     """Converter readings of a reference [N m] and of the measured pressures [Pa]."""
     return ConverterCounts(
-        reference=count_of(reference + converter.middle * converter.torque_step, converter.torque_step, converter.top),
-        pressure_1=count_of(measurement.pressure_1, converter.pressure_step, converter.top),
-        pressure_2=count_of(measurement.pressure_2, converter.pressure_step, converter.top),
+        reference=count_of(reference + limits.middle * steps.torque_step, steps.torque_step, limits.top),
+        pressure_1=count_of(measurement.pressure_1, steps.pressure_step, limits.top),
+        pressure_2=count_of(measurement.pressure_2, steps.pressure_step, limits.top),
     )
 
 

@@ -14,28 +14,6 @@ from ppafo.translation.compiling import asked
 from ppafo.wording import one_line
 
 
-class MemoryRegion(NamedTuple):
-    """A range of addresses: its first one, and its size [bytes]."""
-
-    start: int
-    size: int
-
-    def holds(self, address: int) -> bool:
-        """True for an address within it."""
-        return self.start <= address < self.start + self.size
-
-
-class EmulatedMachine(NamedTuple):
-    """Machine of QEMU: its name, and the clock of its processor [Hz]."""
-
-    name: str
-    clock: float
-
-
-NO_MACHINE = EmulatedMachine("", 0.0)
-"""Simulator of a target which QEMU does not simulate."""
-
-
 class Decision(NamedTuple):
     """Command in steps, 1 while all readings have been sound, and the cycles or instructions of the sample."""
 
@@ -84,22 +62,23 @@ class ProcessorSimulator(Protocol):
 class Target:
     """A processor that firmware is written for.
 
-    ``processor`` and ``board`` say what it is, ``clock`` is the processor's [Hz], ``interrupt_stack`` what an
-    interrupt of the board puts on the stack [bytes], ``converter_bits`` the bits of its converter. ``words`` fill the
-    templates: how it is compiled, linked and written, which pins it has. ``templates`` are the files that belong to
-    this target alone, ``wiring`` is the one with the part of README.md that says what is wired to it.
+    ``processor`` and ``board`` say what it is, ``clock`` is the processor's [Hz], ``flash`` and ``ram`` are ranges of
+    addresses, ``interrupt_stack`` is what an interrupt of the board puts on the stack [bytes], ``converter_bits`` the
+    bits of its converter. ``words`` fill the templates: how it is compiled, linked and written, which pins it has.
+    ``templates`` are the files that belong to this target alone, ``wiring`` is the one with the part of README.md that
+    says what is wired to it.
 
     ``tools`` are the programs that building and simulating need, ``packages`` Debian's packages that have them.
-    ``simulator`` starts one with an image, ``machine`` is what QEMU has to know, ``counted`` what is counted of a
-    sample: cycles or instructions.
+    ``simulator`` starts one with an image; ``machine`` is QEMU's name of a machine with the processor, which has the
+    clock ``machine_clock`` [Hz]. ``counted`` is what is counted of a sample: cycles or instructions.
     """
 
     name: str
     processor: str
     board: str
     clock: float
-    flash: MemoryRegion
-    ram: MemoryRegion
+    flash: range
+    ram: range
     interrupt_stack: int
     converter_bits: int
     words: Mapping[str, str]
@@ -109,7 +88,8 @@ class Target:
     packages: str
     counted: str
     simulator: Callable[["Target", Image], ProcessorSimulator]
-    machine: EmulatedMachine = NO_MACHINE
+    machine: str = ""
+    machine_clock: float = 0.0
 
 
 _LOADED = 2
@@ -156,13 +136,6 @@ def processor_simulator(contents: Mapping[str, bytes], target: Target) -> Iterat
             simulator.close()
 
 
-def read_image(folder: Path, target: Target) -> Image:
-    """The image for the simulator in a folder where a firmware was built."""
-    file, shipped = folder / "simulated.elf", folder / "firmware.elf"
-    own = sizes(file, target)
-    return Image(file, own, sizes(shipped, target) if shipped.is_file() else own, _symbols(file.read_bytes()))
-
-
 class _Section(NamedTuple):
     """A section of an ELF file."""
 
@@ -189,17 +162,18 @@ def _sections(content: bytes) -> list[_Section]:
 def sizes(image: Path, target: Target) -> ImageSizes:
     """Flash and RAM that a program takes of a target."""
     loaded = [section for section in _sections(image.read_bytes()) if section.flags & _LOADED]
-    in_ram = [section for section in loaded if target.ram.holds(section.address)]
+    in_ram = [section for section in loaded if section.address in target.ram]
     values = sum(section.size for section in in_ram if section.kind == _WITH_VALUES)
-    flash = sum(section.size for section in loaded if target.flash.holds(section.address))
+    flash = sum(section.size for section in loaded if section.address in target.flash)
     # Initial values of RAM lie in flash too, from where the start-up code copies them.
     return ImageSizes(flash + values, sum(section.size for section in in_ram))
 
 
-def _symbols(content: bytes) -> dict[str, int]:
-    """Addresses of the symbols of an ELF file, by name."""
-    sections = _sections(content)
-    symbols = {}
+def read_image(folder: Path, target: Target) -> Image:
+    """The image for the simulator in a folder where a firmware was built."""
+    file, shipped = folder / "simulated.elf", folder / "firmware.elf"
+    content = file.read_bytes()
+    sections, symbols = _sections(content), {}
     for section in sections:
         if section.kind == _SYMBOL_TABLE:
             names = sections[section.link].offset
@@ -207,4 +181,5 @@ def _symbols(content: bytes) -> dict[str, int]:
                 name, address, *_ = _SYMBOL.unpack_from(content, at)
                 begin = names + name
                 symbols[content[begin : content.index(b"\0", begin)].decode()] = address
-    return symbols
+    own = sizes(file, target)
+    return Image(file, own, sizes(shipped, target) if shipped.is_file() else own, symbols)

@@ -10,15 +10,14 @@ import numpy as np
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import SimulationError
 from ppafo.processor.catalog import TARGETS, target_of
-from ppafo.processor.firmware import FixedPointController, firmware, fixed_point_controller, integer_form
-from ppafo.processor.fixed_point import COMMAND_STEPS, Converter, ConverterCounts, read
+from ppafo.processor.firmware import FixedPointController, firmware, fixed_point_controller
+from ppafo.processor.fixed_point import COMMAND_STEPS, ConverterCounts, read
 from ppafo.processor.images import Decision, Image, ImageSizes, ProcessorSimulator, Target, processor_simulator
 from ppafo.report.style import BLACK, REFERENCE, FigureMargins, figure_of_panels, house_style, look_of_valve, mark_kind
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -51,9 +50,9 @@ class PythonProcessor:
 class _SimulatedController:
     """The simulated processor as a controller of a scenario; it keeps the decision of every sample."""
 
-    def __init__(self, simulator: ProcessorSimulator, converter: Converter) -> None:
+    def __init__(self, simulator: ProcessorSimulator, fixed: FixedPointController) -> None:
         self.simulator = simulator
-        self.converter = converter
+        self.fixed = fixed
         self.decisions: list[Decision] = []
 
     def reset(self) -> None:
@@ -64,7 +63,8 @@ class _SimulatedController:
     def update(self, time: float, reference: float, measurement: Any) -> float:
         """Command from -1 to 1, from what the converter shows; the processor needs no time [s], it counts samples."""
         del time
-        (decision,) = self.simulator.samples((read(self.converter, reference, measurement),))
+        readings = read(self.fixed.steps, self.fixed.limits, reference, measurement)
+        (decision,) = self.simulator.samples((readings,))
         self.decisions.append(decision)
         return decision.command / COMMAND_STEPS
 
@@ -104,17 +104,16 @@ def run_on_processor(scenario: Scenario, target: str = TARGETS[0]) -> ProcessorR
 
     ScenarioError where the controller has no integer form, SimulationError where a tool is missing.
     """
-    scenario = integer_form(scenario)
-    fixed = fixed_point_controller(scenario)
-    with processor_simulator(firmware(scenario, target), target_of(target)) as (simulator, image):
-        law = _SimulatedController(simulator, fixed.converter)
-        fixed_point_kind = simulate(scenario.controlled_by(law))
-        cost = cost_of(target_of(target), image, simulator.stack(), law.decisions)
-    in_lanes = simulate(scenario)
-    mine, theirs = fixed_point_kind.recording.channels, in_lanes.recording.channels
+    fixed, chosen = fixed_point_controller(scenario), target_of(target)
+    with processor_simulator(firmware(scenario, target), chosen) as (simulator, image):
+        law = _SimulatedController(simulator, fixed)
+        on_processor = simulate(fixed.scenario.controlled_by(law))
+        cost = cost_of(chosen, image, simulator.stack(), law.decisions)
+    in_lanes = simulate(fixed.scenario)
+    mine, theirs = on_processor.recording.channels, in_lanes.recording.channels
     same = all(np.array_equal(mine[name].values, theirs[name].values) for name in theirs)
     differ = int(np.count_nonzero(mine["command"].values != theirs["command"].values))
-    return ProcessorRun(scenario, fixed_point_kind, in_lanes, cost, len(law.decisions), differ, same)
+    return ProcessorRun(fixed.scenario, on_processor, in_lanes, cost, len(law.decisions), differ, same)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +134,7 @@ def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str =
     asked: list[ConverterCounts] = []
     decisions: list[Decision] = []
     with processor_simulator(firmware(scenario, target), chosen) as (simulator, image):
-        for number, readings in enumerate(drawn_readings(int(fixed.converter.top), samples, seed)):
+        for number, readings in enumerate(drawn_readings(int(fixed.limits.top), samples, seed)):
             begins = number % EPISODE == 0
             if begins or len(asked) == TURN:
                 decisions += simulator.samples(asked)
@@ -193,55 +192,32 @@ _LANES = (0, (1, 3))
 def processor_figure(runs: Sequence[ProcessorRun]) -> "Figure":
     """Return the figure of some runs, two panels for each: torque with its reference, and the command to the valve.
 
-    With ``torque-task-solenoid`` and ``torque-task-proportional`` it is figure 8 of the paper.
+    The run in the lanes is drawn as dots on the lines of the processor. With ``torque-task-solenoid`` and
+    ``torque-task-proportional`` it is figure 8 of the paper.
     """
     heights = [_TORQUE, _COMMAND] * len(runs)
     gaps = _MARGINS.row_gap * (len(heights) - 1)
     size = (_WIDTH, _MARGINS.top + _MARGINS.bottom + gaps + sum(heights))
     with house_style():
         figure, rows = figure_of_panels(size, _MARGINS, rows=len(heights), heights=heights)
-        grid = [axes for (axes,) in rows]
-        for row, run in enumerate(runs):
-            _draw(grid[2 * row], grid[2 * row + 1], run)
-        grid[-1].set_xlabel("Time (s)")
-        grid[-1].set_xlim(0.0, max(run.processor.recording.duration for run in runs))
+        panels = [axes for (axes,) in rows]
+        for torque, command, run in zip(panels[::2], panels[1::2], runs, strict=True):
+            colour = look_of_valve(run.scenario.device.valve.kind).colour
+            fixed, lanes = run.processor.recording, run.lanes.recording
+            bits = "same bits as in the simulation" if run.same_bits else "NOT the bits of the simulation"
+            torque.set_title(f"{run.scenario.name}: {run.differences} of {run.samples} decisions differ, {bits}")
+            line: dict[str, Any] = {"color": REFERENCE.colour, "linewidth": 1.3, "label": "reference"}
+            torque.plot(fixed.time, fixed["reference"], REFERENCE.line, **line)
+            label = f"{run.cost.target.name} in its simulator"
+            dots: dict[str, Any] = {"color": BLACK, "linewidth": 0.9, "linestyle": _LANES, "label": "simulation"}
+            for axes, name, step in ((torque, "torque", "default"), (command, "command", "steps-post")):
+                axes.plot(fixed.time, fixed[name], color=colour, drawstyle=step, label=label)
+                axes.plot(lanes.time, lanes[name], drawstyle=step, **dots)
+            torque.set_ylabel("Torque (N m)")
+            torque.legend(loc="lower right")
+            command.set_ylabel("Valve")
+            command.set_ylim(-1.1, 1.1)
+        panels[-1].set_xlabel("Time (s)")
+        panels[-1].set_xlim(0.0, max(run.processor.recording.duration for run in runs))
         mark_kind(figure, runs[0].processor.recording.kind)
         return figure
-
-
-def _draw(torque: "Axes", command: "Axes", run: ProcessorRun) -> None:
-    """Draw a run, and that in the lanes as dots on its lines."""
-    colour = look_of_valve(run.scenario.device.valve.kind).colour
-    fixed, lanes, target = run.processor.recording, run.lanes.recording, run.cost.target.name
-    bits = "same bits as in the simulation" if run.same_bits else "NOT the bits of the simulation"
-    torque.set_title(f"{run.scenario.name}: {run.differences} of {run.samples} decisions differ, {bits}")
-    torque.plot(
-        fixed.time, fixed["reference"], REFERENCE.line, color=REFERENCE.colour, linewidth=1.3, label="reference"
-    )
-    for axes, name in ((torque, "torque"), (command, "command")):
-        step = "steps-post" if name == "command" else "default"
-        axes.plot(fixed.time, fixed[name], color=colour, drawstyle=step, label=f"{target} in its simulator")
-        axes.plot(
-            lanes.time, lanes[name], color=BLACK, linewidth=0.9, linestyle=_LANES, drawstyle=step, label="simulation"
-        )
-    torque.set_ylabel("Torque (N m)")
-    torque.legend(loc="lower right")
-    command.set_ylabel("Valve")
-    command.set_ylim(-1.1, 1.1)
-
-
-class TriedLaw(NamedTuple):
-    """A controller in words, and the scenario with the settings that it is tried with."""
-
-    said: str
-    scenario: str
-    overrides: tuple[str, ...]
-
-
-TRIED = (
-    TriedLaw("`pid`", "torque-task-proportional", ()),
-    TriedLaw("`pid`, with filter and anti-windup", "torque-task-anti-windup", ()),
-    TriedLaw("`on_off`", "torque-task-solenoid", ()),
-    TriedLaw("`on_off_dead_zone`", "torque-task-proportional", ("controller.kind=on_off_dead_zone",)),
-)
-"""Rows of the table, for each target."""

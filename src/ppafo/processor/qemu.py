@@ -95,9 +95,9 @@ class QemuSimulator:
     def __init__(self, target: Target, image: Image) -> None:
         self._stop = image.symbols["simulated_stop"] & ~_THUMB
         self._readings, self._outputs = (image.symbols[f"simulated_{name}"] for name in ("readings", "outputs"))
-        self._ticks = target.machine.clock * _NANOSECONDS * 1.0e-9
-        self._bottom = target.ram.start + target.ram.size - DEEPEST
-        self.debugger = Debugger(target.machine.name, image)
+        self._ticks = target.machine_clock * _NANOSECONDS * 1.0e-9
+        self._bottom = target.ram.stop - DEEPEST
+        self.debugger = Debugger(target.machine, image)
         self.close: Callable[[], object] = self.debugger.close
         self.debugger.write(self._bottom, bytes([UNTOUCHED]) * DEEPEST)
         self.debugger.stop_at(self._stop)

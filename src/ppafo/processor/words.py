@@ -1,15 +1,13 @@
-"""Results of controllers on the simulator of a processor, in words and as data."""
+"""Controllers on the simulator of a processor: results as text, data and figure."""
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ppafo.errors import ScenarioError
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, CommandOutput
 from ppafo.processor.catalog import target_of
 from ppafo.processor.images import missing_tools
 from ppafo.processor.lock_step import (
-    TRIED,
     Cost,
     DecisionComparison,
     ProcessorRun,
@@ -18,7 +16,6 @@ from ppafo.processor.lock_step import (
     run_on_processor,
 )
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.scenario import Scenario
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,26 +24,18 @@ _SHOWN = {"rms_error": ("N m", 1.0), "gas_supplied": ("g", 1.0e3)}
 SAMPLES_OF_TABLE = 1000
 """Samples of each controller in the table, unless another number is given."""
 
-
-@dataclass(frozen=True, slots=True)
-class VerifiedFirmware:
-    """Text, document, whether every decision is the integer controller's, and what draws it where it is drawn."""
-
-    text: str
-    document: dict[str, Any]
-    agrees: bool
-    draw: "Callable[[], Figure] | None" = None
+TABLE = (
+    ("pid", "torque-task-proportional", ()),
+    ("pid, with filter and anti-windup", "torque-task-anti-windup", ()),
+    ("on_off", "torque-task-solenoid", ()),
+    ("on_off_dead_zone", "torque-task-proportional", ("controller.kind=on_off_dead_zone",)),
+)
+"""Controllers of the table, each with the scenario and the overrides that it is tried with."""
 
 
-def tried(names: Sequence[str], target: str, samples: int | None, overrides: Sequence[str]) -> VerifiedFirmware:
-    """Scenarios on one target."""
-    scenarios = [load_scenario(name, overrides) for name in names]
-    if len(scenarios) > 1 and samples is not None:
-        raise ScenarioError("--samples takes one SCENARIO; several are run in turn and drawn in one figure")
-    if samples is None:
-        return _runs(scenarios, target)
-    # Drawn samples on the processor and in Python.
-    scenario = scenarios[0]
+def verify_samples(name: str, target: str, samples: int, overrides: Sequence[str]) -> CommandOutput:
+    """Compare the decisions on drawn samples, on the simulator of a target and in Python."""
+    scenario = load_scenario(name, overrides)
     comparison = compare_drawn(scenario, samples, target=target)
     lines = [
         f"{comparison.samples} drawn samples of the controller of {scenario.name} on the processor's simulator",
@@ -56,14 +45,13 @@ def tried(names: Sequence[str], target: str, samples: int | None, overrides: Seq
         "Python",
         *([f"the first: {comparison.first_difference}"] if comparison.differences else []),
     ]
-    about = {"scenario": scenario.name, "target": target}
-    document = {**about, **_compared(comparison), **_cost_document(comparison.cost)}
-    return VerifiedFirmware("\n".join(lines), document, not comparison.differences)
+    document = {"scenario": scenario.name, "target": target, **_document(comparison)}
+    return _output("\n".join(lines), document, not comparison.differences)
 
 
-def _runs(scenarios: Sequence[Scenario], target: str) -> VerifiedFirmware:
-    """Scenarios with the processor in charge, one after the other, and their figure."""
-    runs = [run_on_processor(scenario, target) for scenario in scenarios]
+def verify_runs(names: Sequence[str], target: str, overrides: Sequence[str]) -> CommandOutput:
+    """Run scenarios with the processor in charge, one after the other, and draw them in one figure."""
+    runs = [run_on_processor(load_scenario(name, overrides), target) for name in names]
     texts, documents = [], []
     for run in runs:
         metrics = {name: run.processor.metrics[name].value for name in _SHOWN if name in run.processor.metrics}
@@ -76,17 +64,9 @@ def _runs(scenarios: Sequence[Scenario], target: str) -> VerifiedFirmware:
             *(f"{name:<12} {value * _SHOWN[name][1]:.4f} {_SHOWN[name][0]}" for name, value in metrics.items()),
         ]
         texts.append("\n".join(lines))
-        documents.append(
-            {
-                "scenario": run.scenario.name,
-                "target": run.cost.target.name,
-                **_compared(run),
-                "same_bits": run.same_bits,
-                **_cost_document(run.cost),
-                "metrics": metrics,
-            }
-        )
-    return VerifiedFirmware(
+        about = {"scenario": run.scenario.name, "target": run.cost.target.name}
+        documents.append({**about, **_document(run), "same_bits": run.same_bits, "metrics": metrics})
+    return _output(
         "\n\n".join(texts),
         documents[0] if len(documents) == 1 else {"runs": documents},
         all(run.same_bits and not run.differences for run in runs),
@@ -94,33 +74,33 @@ def _runs(scenarios: Sequence[Scenario], target: str) -> VerifiedFirmware:
     )
 
 
-def table(targets: Sequence[str], samples: int | None) -> VerifiedFirmware:
-    """Every controller on every target, as a table."""
+def verify_table(targets: Sequence[str], samples: int | None) -> CommandOutput:
+    """Compare every controller on every target, as a table."""
     lines = ["| target | controller | flash | data + stack | worst and mean | drawn samples | other decisions |"]
     lines.append("|---|---|---|---|---|---|---|")
-    documents = []
-    for target, law in itertools.product(map(target_of, targets), TRIED):
-        own: dict[str, Any] = {"target": target.name, "controller": law.said.replace("`", "")}
+    documents: list[dict[str, Any]] = []
+    for target, (controller, name, overrides) in itertools.product(map(target_of, targets), TABLE):
+        kind, comma, options = controller.partition(",")
+        row, own = f"| {target.name} | `{kind}`{comma}{options} |", {"target": target.name, "controller": controller}
         missing = missing_tools(target)
         if missing:
-            lines.append(f"| {target.name} | {law.said} | not run: {', '.join(missing)} is missing | | | | |")
+            lines.append(f"{row} not run: {', '.join(missing)} is missing | | | | |")
             documents.append({**own, "missing": list(missing)})
             continue
-        scenario = load_scenario(law.scenario, law.overrides)
-        comparison = compare_drawn(scenario, samples or SAMPLES_OF_TABLE, target=target.name)
+        comparison = compare_drawn(load_scenario(name, overrides), samples or SAMPLES_OF_TABLE, target=target.name)
         cost = comparison.cost
         lines.append(
-            f"| {target.name} | {law.said} | {cost.sizes.flash:,} | {cost.sizes.data} + {cost.stack} "
+            f"{row} {cost.sizes.flash:,} | {cost.sizes.data} + {cost.stack} "
             f"| {cost.worst:,}, {cost.mean:,.0f} {target.counted} | {comparison.samples:,} | {comparison.differences} |"
         )
-        documents.append({**own, **_compared(comparison), **_cost_document(cost)})
-    return VerifiedFirmware(
-        "\n".join(lines), {"rows": documents}, not any(document.get("differences") for document in documents)
-    )
+        documents.append({**own, **_document(comparison)})
+    return _output("\n".join(lines), {"rows": documents}, not any(item.get("differences") for item in documents))
 
 
-def _compared(run: ProcessorRun | DecisionComparison) -> dict[str, Any]:
-    return {"samples": run.samples, "differences": run.differences}
+def _output(
+    text: str, document: dict[str, Any], agrees: bool, draw: "Callable[[], Figure] | None" = None
+) -> CommandOutput:
+    return CommandOutput(text, document, "processor", EXIT_GOOD if agrees else EXIT_CHECK_FAILED, draw=draw)
 
 
 def _cost_lines(cost: Cost, period: float) -> list[str]:
@@ -128,9 +108,9 @@ def _cost_lines(cost: Cost, period: float) -> list[str]:
     share = f"{worst / target.clock / period:.2%} of a sample at {target.clock / 1.0e6:g} MHz"
     interrupt = target.interrupt_stack
     return [
-        f"flash       {cost.sizes.flash} of {target.flash.size} bytes, the whole program",
+        f"flash       {cost.sizes.flash} of {len(target.flash)} bytes, the whole program",
         f"RAM         {cost.sizes.data} bytes of data, {cost.stack} of stack, {interrupt} for the timer's interrupt, "
-        f"of {target.ram.size}",
+        f"of {len(target.ram)}",
         f"cycles      {worst} at worst, {mean:.0f} on average; {share}"
         if target.counted == "cycles"
         else f"cycles      not known to the simulator; {worst} {target.counted} at worst, {mean:.0f} on average; "
@@ -138,8 +118,11 @@ def _cost_lines(cost: Cost, period: float) -> list[str]:
     ]
 
 
-def _cost_document(cost: Cost) -> dict[str, Any]:
+def _document(run: ProcessorRun | DecisionComparison) -> dict[str, Any]:
+    cost = run.cost
     return {
+        "samples": run.samples,
+        "differences": run.differences,
         "flash": cost.sizes.flash,
         "data": cost.sizes.data,
         "stack": cost.stack,

@@ -7,9 +7,9 @@ chamber with its own orifice, a laminar part of the leak, friction that grows wi
 from typing import NamedTuple
 
 from ppafo.engine.scheme.actuators import VANE_FUNCTIONS
-from ppafo.model.effects.seal_friction import SealFriction, pressed_at_rest, pressed_in_motion
+from ppafo.model.effects.seal_friction import SealFriction, dynamic_seal_friction, static_seal_friction
 from ppafo.model.effects.second_virial import gas_enthalpy, real_density, real_pressure
-from ppafo.model.effects.stribeck import Stribeck, more_near_standstill
+from ppafo.model.effects.stribeck import Stribeck, stribeck_friction
 from ppafo.model.gas import energy_rate, gas_temperature, heat_from_wall, temperature_flow_factor
 from ppafo.model.orifice import ExactOrifice, exact_flow
 from ppafo.model.plant import (
@@ -214,7 +214,7 @@ def observables(given: RigNumbers, state: RigState, inputs: Inputs) -> Observabl
         pressure_1=node_1.pressure,
         pressure_2=node_2.pressure,
         torque=torque + vane.added_torque,
-        static_limit=pressed_at_rest(plant.static_torque, node_1.pressure, node_2.pressure, rig.seal_friction),
+        static_limit=static_seal_friction(plant.static_torque, node_1.pressure, node_2.pressure, rig.seal_friction),
     )
 
 
@@ -270,8 +270,8 @@ def rig_rates(given: RigNumbers, state: RigState, inputs: Inputs, direction: flo
     leak = leak_exchange(rig, node_1, node_2, given.leak_orifice)
     torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure, parts=VANE_FUNCTIONS)
     torque = torque + inputs.vane.added_torque
-    pressed = pressed_in_motion(plant.dynamic_torque, speed, node_1.pressure, node_2.pressure, rig.seal_friction)
-    friction = direction * more_near_standstill(pressed, speed, node_1.pressure, node_2.pressure, rig.stribeck)
+    pressed = dynamic_seal_friction(plant.dynamic_torque, speed, node_1.pressure, node_2.pressure, rig.seal_friction)
+    friction = direction * stribeck_friction(pressed, speed, node_1.pressure, node_2.pressure, rig.stribeck)
     acceleration = vane_acceleration(torque, friction, plant.viscous_damping, plant.inertia, angle, speed)
     grows = plant.displacement_per_radian * (speed if direction != 0.0 else inputs.vane.rate)
     heat_1, heat_2 = wall_heat(rig, node_1, volume_1), wall_heat(rig, node_2, volume_2)

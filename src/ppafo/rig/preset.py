@@ -34,8 +34,8 @@ from ppafo.model.plant import PlantParameters
 from ppafo.model.sensors import quantise
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.device import Device, SonicOrifice
+from ppafo.parameters.effects import switches_of
 from ppafo.parameters.overrides import override_set, read_overrides
-from ppafo.parameters.plant import switches_of
 from ppafo.rig.dynamics import RigPhysics
 from ppafo.signals.recording import Recording
 from ppafo.units import parse_quantity, to_si

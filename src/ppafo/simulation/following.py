@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
+from ppafo.parameters.effects import number_under
 from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
-from ppafo.parameters.plant import number_under
 from ppafo.simulation.declaration import SUPPLY_LINES, line_paths
 from ppafo.simulation.document import DocumentReader, value_at
 

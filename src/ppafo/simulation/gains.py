@@ -7,8 +7,8 @@ from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.model.ports import load_torque
+from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import LinkFunction
-from ppafo.parameters.plant import effects_of
 from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PrescribedMotion, Scenario

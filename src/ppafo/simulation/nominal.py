@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
-from ppafo.control.kind import NOMINAL
+from ppafo.control.kind import nominal_term
 from ppafo.model.actuators.kind import Range
 from ppafo.model.binding import made_of
 from ppafo.model.catalog import VALVES
@@ -138,7 +138,7 @@ def rest_of(volume: float, growth: float, stops: Range) -> float:
 
 
 def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, LinkFunction]:
-    """Return what each ``nominal_`` setting follows, by the names of ``NOMINAL``.
+    """Return what each ``nominal_`` setting follows, by the names of ``nominal_term``.
 
     The valve of another package is not known: then ``nominal_flow`` is 0, and the observer off.
     """
@@ -186,7 +186,7 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Link
             f"{name}_{number}": LinkFunction(_ANY, no) if lines is None else term for name, term in of_line.items()
         }
     terms["line_relieving"] = LinkFunction(_ANY, yes if lines is not None and first(lines.relieving) else no)
-    return {NOMINAL[name]: term for name, term in terms.items()}
+    return {nominal_term(name): term for name, term in terms.items()}
 
 
 def _conductance(device: Device, section: str) -> LinkFunction:

@@ -14,9 +14,9 @@ from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, is_within, limits_text, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
+from ppafo.parameters.effects import number_under, part_of
 from ppafo.parameters.graph import Graph, holding, in_other_forms, left, paths_in, resolved
 from ppafo.parameters.overrides import one_path
-from ppafo.parameters.plant import number_under, part_of
 from ppafo.simulation.declaration import LOCKED_ANGLE, changes_reach
 from ppafo.simulation.scenario import (
     Control,

@@ -45,14 +45,8 @@ from ppafo.model.ports import gas_density
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
-from ppafo.parameters.plant import (
-    effect_rows,
-    effects_of,
-    first_settings,
-    orifice_conductance,
-    plant_parameters,
-    valve_settings,
-)
+from ppafo.parameters.effects import effect_rows, effects_of
+from ppafo.parameters.plant import first_settings, orifice_conductance, plant_parameters, valve_settings
 from ppafo.simulation.profiles import profile_bounds, profile_parameters
 from ppafo.simulation.scenario import GasModel, ProfileChoice, Scenario, vane_motion
 

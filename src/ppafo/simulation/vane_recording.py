@@ -15,7 +15,7 @@ from ppafo.metrics import evaluate
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.gas import energy_per_content
-from ppafo.model.plant import gravity_torque, loaded, net_torque, sliding_friction, viscous_torque
+from ppafo.model.plant import gravity_torque, net_torque, sliding_friction, torque_less_loads, viscous_torque
 from ppafo.model.ports import friction_in_motion
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.parameters.device import Gas
@@ -126,7 +126,7 @@ def net_torques(run: Run, rows: Mapping[str, Floats], torque: Floats) -> Floats:
         pressures = pressures_of(run.program.actuator, run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
         largest = _with_effects(run, rows, friction_in_motion, largest, rate, *pressures)
     friction = over_samples(sliding_friction, rate, 1.0) * largest
-    driving = _with_effects(run, rows, loaded, torque, angle)
+    driving = _with_effects(run, rows, torque_less_loads, torque, angle)
     damping = over_samples(viscous_torque, run.plant.viscous_damping, rate)
     return np.asarray(_with_effects(run, rows, net_torque, driving, friction, damping, angle, rate))
 

@@ -336,9 +336,7 @@ def c_source(
     the file with what stands before all of them.
     """
     # What returns nothing but empty rows is never called: an empty value is not written.
-    functions = [
-        function for function in module.functions if function.returns is None or not is_empty(function.returns)
-    ]
+    functions = [function for function in module if function.returns is None or not is_empty(function.returns)]
     names: dict[str, str] = {}
     if reading is not None:
         for function in functions:

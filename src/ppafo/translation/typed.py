@@ -3,7 +3,7 @@
 The typed walk (``walk.py``) makes them of Python's syntax trees; writers of C, of expressions and of ranges read them.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
@@ -149,11 +149,8 @@ class Function:
     """True where it returns nothing and is called from outside."""
 
 
-@dataclass(slots=True)
-class Module:
-    """All functions of a translated text, each after those that it calls."""
-
-    functions: list[Function] = field(default_factory=list)
+Module: TypeAlias = list[Function]
+"""All functions of a translated text, each after those that it calls."""
 
 
 def converted(term: Term, kind: Type) -> Term:

@@ -450,7 +450,7 @@ class _ModuleWalk:
     open: set[tuple[str, tuple[Type, ...]]] = field(default_factory=set)
     names: set[str] = field(default_factory=set)
     found: dict[str, ScopeNames] = field(default_factory=dict)
-    module: Module = field(default_factory=Module)
+    module: Module = field(default_factory=list)
 
     def function(self, name: str, types: tuple[Type, ...]) -> Function:
         """A function for some types of its parameters."""
@@ -468,7 +468,7 @@ class _ModuleWalk:
             # The name is taken before the body is walked, in which the same function may be met for other types.
             self.names.add(own)
             self.done[key] = _FunctionWalk(self, definition).walked(own, types)
-            self.module.functions.append(self.done[key])
+            self.module.append(self.done[key])
         return self.done[key]
 
     def refused(self, where: ast.AST, problem: str) -> ProgramError:

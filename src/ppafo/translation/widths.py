@@ -44,11 +44,11 @@ def narrowed(module: Module, given: Mapping[str, Range]) -> Narrowed:
 
     ProgramError for what may leave 32 bits, and for what is no sum, shift, choice or product with a power of two.
     """
-    ranges = _Ranges({function.name: function for function in module.functions})
-    entry = module.functions[-1]
+    ranges = _Ranges({function.name: function for function in module})
+    entry = module[-1]
     returned = ranges.call(entry, tuple(given[name] for name, _ in entry.parameters))
-    called = [function for function in module.functions if function.name in ranges.returned]
-    return Narrowed(Module([_Narrowing(ranges, function).function() for function in called]), returned)
+    called = [function for function in module if function.name in ranges.returned]
+    return Narrowed([_Narrowing(ranges, function).function() for function in called], returned)
 
 
 def hull(first: Range, other: Range) -> Range:

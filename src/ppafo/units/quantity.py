@@ -1,5 +1,6 @@
 """Conversion between texts with a unit and SI floats."""
 
+import contextlib
 import difflib
 import functools
 import math
@@ -16,7 +17,7 @@ from ppafo.units.spelling import as_product, quote, spellings, split_pressure_ki
 # What may be meant by a unit that does not exist or does not fit: only what would be taken in its place.
 
 _NEAR, _TRIED = 0.6, 12
-_LEVEL, _DIFFERENCE = "Pa_a", "Pa_d"
+LEVEL, DIFFERENCE = "Pa_a", "Pa_d"
 
 
 def hint(unknown: UnknownUnitError, kind: str, si_unit: str | None) -> str:
@@ -34,16 +35,6 @@ def hint(unknown: UnknownUnitError, kind: str, si_unit: str | None) -> str:
     return _did_you_mean(meant or _that_fit(near, unknown.name, unknown.unit, kind, si_unit)[:1])
 
 
-def _hint_of_case(unit: str, si_unit: str) -> str:
-    """Return ``, did you mean 'kHz'?`` for ``KHz``, kelvin times hertz: what fits ``si_unit`` with the same letters."""
-    meant = [
-        other
-        for name in re.findall(r"[A-Za-zµ]+", unit)
-        for other in _that_fit(_in_other_case(name), name, unit, "", si_unit)
-    ]
-    return _did_you_mean(meant)
-
-
 def _in_other_case(name: str) -> list[str]:
     return sorted(known for known in spellings() if known.lower() == name.lower() and known != name)
 
@@ -54,7 +45,8 @@ def _that_fit(names: Iterable[str], name: str, unit: str, kind: str, si_unit: st
     All that are units where it is None.
     """
     wanted = None if si_unit is None else parse_unit(si_unit)[0].dimensions
-    found = []
+    usual = {LEVEL: ("_g", "_a"), DIFFERENCE: ("_d",)}.get(str(si_unit), ("_g", "_a", "_d"))
+    endings, found = (f"_{kind}",) if kind else usual, []
     for known in dict.fromkeys(names):
         meant = re.sub(rf"(?<![A-Za-zµ]){re.escape(name)}(?![A-Za-zµ])", known, unit)
         try:
@@ -62,8 +54,8 @@ def _that_fit(names: Iterable[str], name: str, unit: str, kind: str, si_unit: st
         except UnitError:
             continue
         if wanted is None or dimensions == wanted:
-            is_pressure = dimensions == PRESSURE and si_unit in (_LEVEL, _DIFFERENCE, None)
-            found.append(tuple(f"'{meant}{suffix}'" for suffix in (_kinds(kind, si_unit) if is_pressure else ("",))))
+            is_pressure = dimensions == PRESSURE and si_unit in (LEVEL, DIFFERENCE, None)
+            found.append(tuple(f"'{meant}{suffix}'" for suffix in (endings if is_pressure else ("",))))
     return found
 
 
@@ -72,20 +64,13 @@ def _did_you_mean(meant: Iterable[tuple[str, ...]]) -> str:
     return f", did you mean {' or '.join(filter(None, (', '.join(others), last)))}?" if last else ""
 
 
-def _kinds(kind: str, si_unit: str | None) -> tuple[str, ...]:
-    if kind:
-        return (f"_{kind}",)
-    return {_LEVEL: ("_g", "_a"), _DIFFERENCE: ("_d",)}.get(str(si_unit), ("_g", "_a", "_d"))
-
-
 def pressures_to_write(unit: str, si_unit: str) -> str:
     """Return the forms of a pressure unit where a level or a difference is required."""
-    if si_unit == _DIFFERENCE:
+    if si_unit == DIFFERENCE:
         return f"write {unit}_d for a difference"
     return f"write {unit}_g for gauge or {unit}_a for absolute"
 
 
-LEVEL, DIFFERENCE = "Pa_a", "Pa_d"
 SI = "SI"
 """Unit of a number that is in SI already, whatever its quantity: set by programs."""
 
@@ -224,7 +209,11 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     if unit == SI:
         return Decimal(1), Decimal(0), False
     wanted, _ = read_unit(si_unit)
-    if _is_flow_without_mass(unit):
+    is_volume = False
+    with contextlib.suppress(UnitError):
+        # Without the gas and condition that make it a mass flow.
+        is_volume = not flow_of(unit)[1] and is_volume_flow(unit)
+    if is_volume:
         if wanted.dimensions == MASS_FLOW:
             raise UnitError(without_condition(unit))
         if flow_of(unit)[2]:
@@ -232,8 +221,10 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     given, kind = _read(unit, si_unit)
     if given.dimensions != wanted.dimensions:
         given_text = f"unit '{unit}'" if unit else "a number without a unit"
-        case = "" if kind else _hint_of_case(unit, si_unit)
-        raise UnitError(f"{given_text} does not fit{case}: {_describe_unit(si_unit)}")
+        # KHz, kelvin times hertz, is meant as kHz.
+        names = [] if kind else re.findall(r"[A-Za-zµ]+", unit)
+        meant = [near for name in names for near in _that_fit(_in_other_case(name), name, unit, "", si_unit)]
+        raise UnitError(f"{given_text} does not fit{_did_you_mean(meant)}: {_describe_unit(si_unit)}")
     is_pressure = si_unit in (LEVEL, DIFFERENCE)
     if is_pressure and not kind:
         raise UnitError(f"'{unit}' does not say which pressure: {pressures_to_write(unit, si_unit)}")
@@ -244,14 +235,6 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
         return given.scale, given.offset, counts_from_atmosphere
     scale = DECIMALS.divide(given.scale, wanted.scale)
     return scale, DECIMALS.divide(DECIMALS.subtract(given.offset, wanted.offset), wanted.scale), counts_from_atmosphere
-
-
-def _is_flow_without_mass(unit: str) -> bool:
-    """Tell whether a unit is a volume per time without the gas and condition that make it a mass flow."""
-    try:
-        return not flow_of(unit)[1] and is_volume_flow(unit)
-    except UnitError:
-        return False
 
 
 def _describe_unit(si_unit: str) -> str:

@@ -85,11 +85,9 @@ def is_volume_flow(unit: str) -> bool:
 def with_condition(unit: str, condition: str, gas: str) -> str:
     """Return a unit of volume flow, completed by the known condition and gas."""
     flow, words, is_normal = flow_of(unit)
-    said = [word.strip() for word in _split(words) if word.strip()]
-    own = [word for word in said if _is_gas(word)]
-    place = ", ".join([word for word in said if word not in own]) or condition
+    place, own = _condition_and_gases(words)
     name = unit.strip() if not words else unit.strip().removesuffix(")").removesuffix(words).rstrip(" (_")
-    whole = ", ".join(filter(None, (place, *(own or (gas,)))))
+    whole = ", ".join(filter(None, (place or condition, *(own or (gas,)))))
     return f"{name if is_normal else flow} ({whole})" if whole else unit
 
 
@@ -108,18 +106,16 @@ def read_unit(unit: str) -> tuple[ParsedUnit, str]:
         raise UnitError(f"'{unit}': a reference condition belongs to a volume flow, such as 'L/min (ANR, air)'")
     if not words:
         raise UnitError(without_condition(unit))
-    said = [word.strip() for word in _split(words) if word.strip()]
-    gases = [word for word in said if _is_gas(word)]
-    condition = condition_of(", ".join(word for word in said if word not in gases), unit)
+    place, gases = _condition_and_gases(words)
+    condition = condition_of(place, unit)
     if len(gases) != 1:
         example = with_condition(unit, "", "air") if not gases else "L/min (ANR, air)"
-        raise UnitError(f"'{unit}' {'does not say the gas' if not gases else 'says two gases'}: {_write(example)}")
+        raise UnitError(
+            f"'{unit}' {'does not say the gas' if not gases else 'says two gases'}: write '{example}', or with another "
+            f"of the gases {', '.join(MOLAR_MASSES)}, or a molar mass in kg/mol"
+        )
     factor = Decimal(repr(density(condition, _molar_mass(gases[0]))))
     return ParsedUnit(DECIMALS.multiply(parsed.scale, factor), Decimal(0), MASS_FLOW), ""
-
-
-def _write(example: str) -> str:
-    return f"write '{example}', or with another of the gases {', '.join(MOLAR_MASSES)}, or a molar mass in kg/mol"
 
 
 def without_condition(unit: str) -> str:
@@ -179,8 +175,12 @@ def _split(words: str) -> list[str]:
     return re.split(r"(?<!\d),|,(?!\d)|;|\band\b|&|@", words)
 
 
-def _is_gas(word: str) -> bool:
-    return word.lower() in map(str.lower, MOLAR_MASSES) or word.endswith("/mol")
+def _condition_and_gases(words: str) -> tuple[str, list[str]]:
+    """Return the reference condition in the words behind a flow, and the gases or molar masses."""
+    said = [word.strip() for word in _split(words) if word.strip()]
+    known = [name.lower() for name in MOLAR_MASSES]
+    gases = [word for word in said if word.lower() in known or word.endswith("/mol")]
+    return ", ".join(word for word in said if word not in gases), gases
 
 
 def _molar_mass(word: str) -> float:

@@ -32,9 +32,9 @@ def swing_knee_torque(leg: LegParameters, time: Floats, record: Mapping[str, Any
     rate = record["state.angular_velocity"]
     # A walk that fails at once has one sample, and no acceleration is known of it.
     ankle_acceleration = np.gradient(rate, time) if len(time) > 1 else np.zeros_like(rate)
-    matrix = mass_matrix(leg, np.cos(theta))
-    turning = centrifugal_torques(leg, np.sin(theta), record["walk.now.shank_rate"], record["state.angular_velocity"])
+    shank, coupling, _ = mass_matrix(leg, np.cos(theta))
+    turning, _ = centrifugal_torques(leg, np.sin(theta), record["walk.now.shank_rate"], rate)
     forward, up = record["walk.now.knee_forward"], record["walk.now.knee_up"]
-    weight = gravity_torques(leg, np.sin(phi), np.cos(phi), np.sin(alpha), np.cos(alpha), forward, up)
-    inertial = matrix.shank * record["walk.now.shank_acceleration"] + matrix.coupling * ankle_acceleration
-    return np.where(record["walk.contact"] == SWING, inertial + turning.knee + weight.knee, 0.0)
+    weight, _ = gravity_torques(leg, np.sin(phi), np.cos(phi), np.sin(alpha), np.cos(alpha), forward, up)
+    inertial = shank * record["walk.now.shank_acceleration"] + coupling * ankle_acceleration
+    return np.where(record["walk.contact"] == SWING, inertial + turning + weight, 0.0)

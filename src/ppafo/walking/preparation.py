@@ -16,7 +16,7 @@ from ppafo.model.columns import larger, rounded_up, smaller, truncated
 from ppafo.model.contact import FLAT, HEEL
 from ppafo.model.elementary import exponential
 from ppafo.model.gait import GaitNow
-from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
+from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, foot_load, torque_of_shank
 from ppafo.model.plant import PlantParameters, PlantState
 from ppafo.model.sensors import Fault, GaitSensors
 from ppafo.model.shut_off import NEVER
@@ -160,7 +160,7 @@ def standing_on(
         sine_shank=upright,
         cosine_shank=1.0 + upright,
         sine_healthy_foot=sine_foot,
-        healthy_torque=torque_of_shank(leg, 0.0, 1.0, sine_foot, cosine_foot, 0.0, 0.0, 0.0, 0.0),
+        healthy_torque=torque_of_shank(foot_load(leg), 0.0, 1.0, sine_foot, cosine_foot, 0.0, 0.0, 0.0, 0.0),
     )
 
 

@@ -137,18 +137,18 @@ def _task_sequence_channels(
     """
     sequence = led_leg(run).task_sequence
     assert sequence is not None, "of a task sequence"
-    gait, pace = walk_of(configuration).gait, pace_in_time(sequence, time)
+    gait, (_, frequency, stride) = walk_of(configuration).gait, pace_in_time(sequence, time)
     phase, shank = record["walk.now.phase"], record["walk.now.shank"]
     healthy = path.toe_height(
         phase, truncate(gait.shank_angle).values_at(phase), truncate(gait.ankle_angle).values_at(phase)
     )
     above = path.toes_over_ankle(shank, record["state.angle"]) - path.toes_over_ankle(shank, record["walk.now.ankle"])
     channels: dict[str, tuple[Any, str]] = {
-        "toe_height": (pace.stride * healthy + above, "m"),
-        "stride_frequency": (pace.frequency, "Hz"),
+        "toe_height": (stride * healthy + above, "m"),
+        "stride_frequency": (frequency, "Hz"),
     }
     if gait.walking_speed is not None:
-        channels["walking_speed"] = (gait.walking_speed * pace.stride * pace.frequency * gait.stride_time, "m/s")
+        channels["walking_speed"] = (gait.walking_speed * stride * frequency * gait.stride_time, "m/s")
     return channels
 
 

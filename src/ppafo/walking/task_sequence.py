@@ -384,24 +384,18 @@ def _title(segment: TaskSegment) -> str:
     return segment.kind
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _PhaseOverTime:
-    """Phase [turns], strides per second [Hz] and stride over the recorded one [-] at many times."""
+def pace_in_time(sequence: TimedSequence, time: Floats) -> tuple[Floats, Floats, Floats]:
+    """Pace of one wearer in a task sequence at times [s]; the same polynomials as ``model.gait``, for arrays.
 
-    turns: Floats
-    frequency: Floats
-    stride: Floats
-
-
-def pace_in_time(sequence: TimedSequence, time: Floats) -> _PhaseOverTime:
-    """Pace of one wearer in a task sequence at times [s]; the same polynomials as ``model.gait``, for arrays."""
+    These are the phase [turns], strides per second [Hz] and the stride over the recorded one [-].
+    """
     table = np.array([leaves(part) for part in sequence.parts], dtype=np.float64)
     row = table[np.searchsorted(table[:, 0], time, side="right") - 1].T
     start, length, turns, frequency, frequency_gain, stride, stride_gain = row[:7]
     fraction = np.minimum((time - start) / length, 1.0)
     value = fraction**3 * (10.0 + fraction * (6.0 * fraction - 15.0))
     integral = fraction**4 * (2.5 + fraction * (fraction - 3.0))
-    return _PhaseOverTime(
+    return (
         turns + frequency * (time - start) + frequency_gain * length * integral,
         frequency + frequency_gain * value,
         stride + stride_gain * value,

@@ -45,8 +45,6 @@ from ppafo.walking.wearer import draw_builds
 
 Progress = Callable[[float, float], None]
 
-Say = Callable[[str], None]
-
 
 def silent(done: float, total: float) -> None:  # both are there for those who listen
     """Ignore how far a walk is, where nobody wants to see it."""

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import ppafo
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.controllers.feedback import KNOTS, SlidingModeParameters, SlidingModeState, learnt_command
+from ppafo.control.controllers.damped_proportional import KNOTS, learnt_command
 from ppafo.control.controllers.model_based import (
     NOMINAL_QUANTITIES,
     NominalChambers,
@@ -19,7 +19,12 @@ from ppafo.control.controllers.model_based import (
     opening_for_rate,
     torque_rates,
 )
-from ppafo.control.controllers.switching import OnOffDeadZoneParameters, OnOffDeadZoneState
+from ppafo.control.controllers.switching import (
+    OnOffDeadZoneParameters,
+    OnOffDeadZoneState,
+    SlidingModeParameters,
+    SlidingModeState,
+)
 from ppafo.control.profiles import KNOTS as TABLE_KNOTS
 from ppafo.control.profiles import NEVER, TABLE, TabulatedProfile, table_bounds, table_value, used_knots
 from ppafo.engine.rows import rebuilt

@@ -6,7 +6,7 @@ import pytest
 import ppafo
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.controllers.switching import CONSTANT, ON_OFF, ON_OFF_DEAD_ZONE
-from ppafo.control.kind import NOMINAL
+from ppafo.control.kind import nominal_term
 from ppafo.control.torque_loop import OPENING
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.engine.loading import PYTHON
@@ -30,7 +30,7 @@ def test_every_law_that_asks_for_openings_follows_the_dead_band_of_its_valve() -
     for name, kind in laws.items():
         follows = {quantity.name: quantity.follows for quantity in kind.quantities}
         # The opening of a law with a dead zone is a number that has the band in it.
-        assert follows.get("dead_band") == (NOMINAL["dead_band"],) or follows.get("opening") == (OPENING,), name
+        assert follows.get("dead_band") == (nominal_term("dead_band"),) or follows.get("opening") == (OPENING,), name
 
 
 @pytest.mark.parametrize("kind", ["pid", "sliding_mode", "pid_fixed_point"])

@@ -35,7 +35,7 @@ from ppafo.processor.torque_laws.pid import FULL, PID, largest_pid
 TORQUE_CONSTANT = 1.451e-5
 PERIOD = 1.0e-3
 BITS, RANGE = 12.0, 1.0e6
-CONVERTER = converter_of(BITS, RANGE, TORQUE_CONSTANT)
+STEPS, LIMITS = converter_of(BITS, RANGE, TORQUE_CONSTANT)
 WIDEST = 2**30
 """Size of the largest value that ``fraction_of`` takes without leaving 32 bits."""
 
@@ -94,7 +94,7 @@ def test_limits_hold_to_both_sides() -> None:
 
 def test_the_converter_rounds_and_stays_in_its_range() -> None:
     assert [count_of(value, 2.0, 255.0) for value in (-1.0, 0.9, 1.0, 300.0, 1.0e9)] == [0, 0, 1, 150, 255]
-    shown = read(CONVERTER, 0.0, Measurement(0.0, RANGE, 0.0, 0.0))
+    shown = read(STEPS, ConverterLimits(*map(int, LIMITS)), 0.0, Measurement(0.0, RANGE, 0.0, 0.0))
     assert shown == ConverterCounts(reference=2048, pressure_1=4095, pressure_2=0)
 
 
@@ -138,7 +138,7 @@ def test_pid_on_whole_numbers_follows_the_float_form(settings: dict[str, float])
         if sample % 500:
             largest = max(largest, abs(found - command))
         # Whole counts of torque, so that the slope of both is the same.
-        torque += CONVERTER.torque_step * 2 * draw.choice((-1, 0, 1, 1 if torque < reference else -1))
+        torque += STEPS.torque_step * 2 * draw.choice((-1, 0, 1, 1 if torque < reference else -1))
     assert largest < 0.02
     assert not settings or clipped
 
@@ -184,9 +184,9 @@ def test_a_reading_at_an_end_of_its_range_commands_nothing_for_good(law: FixedLa
 
 def test_a_gain_beyond_its_number_is_told_from_one_within() -> None:
     settings = {item.name: PAPER.get(item.name, item.default or 0.0) for item in CONTROLLERS["pid"].quantities}
-    assert largest_pid(settings, PERIOD, CONVERTER.torque_step) < 1.0
-    assert largest_pid(settings | {"derivative_gain": 10.0}, PERIOD, CONVERTER.torque_step) > 1.0
-    assert largest_pid(settings | {"anti_windup": 1001.0}, PERIOD, CONVERTER.torque_step) > 1.0
+    assert largest_pid(settings, PERIOD, STEPS.torque_step) < 1.0
+    assert largest_pid(settings | {"derivative_gain": 10.0}, PERIOD, STEPS.torque_step) > 1.0
+    assert largest_pid(settings | {"anti_windup": 1001.0}, PERIOD, STEPS.torque_step) > 1.0
 
 
 def test_a_full_command_is_as_many_steps_as_the_pulse_has_to_each_side() -> None:

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.control.controllers import feedback
+from ppafo.control.controllers import pid, switching
 from ppafo.control.walking import assistance
 from ppafo.control.walking.timing import TimingParts, threshold_time
 from ppafo.engine.package_key import package_key
@@ -23,7 +23,7 @@ def test_every_scenario_of_the_package_has_a_key(name: str) -> None:
 
 def test_the_key_of_a_law_tells_what_its_parts_are() -> None:
     frame = assistance.timed_phase
-    follows: Any = (feedback.pid_update, feedback.sliding_update)
+    follows: Any = (pid.pid_update, switching.sliding_update)
     laws = [made_of(frame, "timed", TimingParts(part, threshold_time)) for part in follows]
     first: Any = threshold_time
     other = made_of(frame, "timed", TimingParts(first, follows[0]))

@@ -111,7 +111,7 @@ def test_the_c_of_a_law_decides_as_python_does_under_the_sanitizer(tmp_path: Pat
     make_firmware(tmp_path, ("host", "checked"))
     fixed = PythonProcessor(fixed_point_controller(scenario))
     lines, wanted = [], []
-    for number, readings in enumerate(drawn_readings(int(fixed_point_controller(scenario).converter.top), 20_000, 5)):
+    for number, readings in enumerate(drawn_readings(int(fixed_point_controller(scenario).limits.top), 20_000, 5)):
         if number % 200 == 0:
             fixed.begin()
             lines.append("begin")
@@ -133,7 +133,7 @@ def test_the_processor_decides_as_python_does_within_its_memory_and_time(law: st
     assert found.first_difference == ""
     assert found.differences == 0
     cost = found.cost
-    assert 0 < cost.sizes.flash <= min(2048, target.flash.size)
+    assert 0 < cost.sizes.flash <= min(2048, len(target.flash))
     assert cost.stack > 0
     # The controller and its layer, without the vectors of a Cortex-M and the words that it puts on the stack at once.
     assert cost.sizes.data + cost.stack + target.interrupt_stack <= (128 if target is MSP430 else 160)
@@ -246,5 +246,5 @@ def test_what_has_no_firmware_is_refused(name: str, overrides: tuple[str, ...], 
 
 
 def test_an_unknown_target_is_refused() -> None:
-    with pytest.raises(ScenarioError, match="no firmware for 'avr'; targets: msp430f2013, cortex-m0, cortex-m4"):
+    with pytest.raises(ScenarioError, match="there is no target 'avr'; available: msp430f2013, cortex-m0, cortex-m4"):
         firmware(scenario_of("pid"), "avr")

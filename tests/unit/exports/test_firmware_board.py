@@ -47,7 +47,7 @@ class Board:
         (folder / "firmware.elf").replace(folder / "simulated.elf")
         image = read_image(folder, CORTEX_M0)
         self.symbols = {name: address & ~1 for name, address in image.symbols.items()}
-        self.debugger = Debugger(CORTEX_M0.machine.name, image)
+        self.debugger = Debugger(CORTEX_M0.machine, image)
         for name in ("board_read", "board_tick"):
             self.debugger.stop_at(self.symbols[name])
         self.ticks_to_sample()

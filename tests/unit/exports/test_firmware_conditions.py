@@ -147,7 +147,7 @@ def test_a_small_decision_is_measured_as_one_counts_it_by_hand(given: str, missi
 
 def samples_of(law: str, count: int) -> str:
     """Drawn samples as the program for this computer takes them."""
-    top = int(fixed_point_controller(scenario_of(law)).converter.top)
+    top = int(fixed_point_controller(scenario_of(law)).limits.top)
     lines = []
     for number, readings in enumerate(drawn_readings(top, count, 1)):
         lines += ["begin"] if number % EPISODE == 0 else []

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from ppafo.engine.rows import leaves
 from ppafo.model.columns import over_runs
+from ppafo.model.flow_curve import isentropic_curve, iso6358_curve
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio
-from ppafo.model.orifice import isentropic_curve, iso6358_curve, sonic_conductance_mass
+from ppafo.model.orifice import sonic_conductance_mass
 
 
 class Pair(NamedTuple):

@@ -38,14 +38,14 @@ def torques_needed(leg: LegParameters, state: dict[str, float]) -> tuple[float, 
     """M q'' + C q' + G [N m] of the package."""
     phi, theta = state["phi"], state["theta"]
     alpha = phi - theta + math.pi / 2
-    matrix = pendulum.mass_matrix(leg, math.cos(theta))
+    shank, coupling, foot = pendulum.mass_matrix(leg, math.cos(theta))
     turning = pendulum.centrifugal_torques(leg, math.sin(theta), state["phi_rate"], state["theta_rate"])
     weight = pendulum.gravity_torques(
         leg, math.sin(phi), math.cos(phi), math.sin(alpha), math.cos(alpha), state["forward"], state["up"]
     )
-    knee = matrix.shank * state["phi_acceleration"] + matrix.coupling * state["theta_acceleration"]
-    ankle = matrix.coupling * state["phi_acceleration"] + matrix.foot * state["theta_acceleration"]
-    return knee + turning.knee + weight.knee, ankle + turning.ankle + weight.ankle
+    knee = shank * state["phi_acceleration"] + coupling * state["theta_acceleration"]
+    ankle = coupling * state["phi_acceleration"] + foot * state["theta_acceleration"]
+    return knee + turning[0] + weight[0], ankle + turning[1] + weight[1]
 
 
 @pytest.fixture(scope="module")
@@ -117,16 +117,16 @@ def test_energy_is_conserved_without_friction_damping_and_input() -> None:
         phi, theta, phi_rate, theta_rate = y
         rest = {"phi": phi, "theta": theta, "phi_rate": phi_rate, "theta_rate": theta_rate, "forward": 0.0, "up": 0.0}
         at_rest = torques_needed(leg, rest | {"phi_acceleration": 0.0, "theta_acceleration": 0.0})
-        matrix = pendulum.mass_matrix(leg, math.cos(theta))
-        full = np.array([[matrix.shank, matrix.coupling], [matrix.coupling, matrix.foot]])
+        shank, coupling, foot = pendulum.mass_matrix(leg, math.cos(theta))
+        full = np.array([[shank, coupling], [coupling, foot]])
         return [phi_rate, theta_rate, *np.linalg.solve(full, -np.array(at_rest))]
 
     def energy(y: np.ndarray) -> float:
         phi, theta, phi_rate, theta_rate = y
         alpha = phi - theta + math.pi / 2
-        matrix = pendulum.mass_matrix(leg, math.cos(theta))
-        moving = 0.5 * (matrix.shank * phi_rate**2 + matrix.foot * theta_rate**2)
-        moving += matrix.coupling * phi_rate * theta_rate
+        shank, coupling, foot = pendulum.mass_matrix(leg, math.cos(theta))
+        moving = 0.5 * (shank * phi_rate**2 + foot * theta_rate**2)
+        moving += coupling * phi_rate * theta_rate
         height = -(leg.shank_mass * leg.shank_mass_centre + leg.foot_mass * leg.shank_length) * math.cos(phi)
         height += leg.foot_mass * leg.foot_mass_centre * math.sin(alpha)
         return moving + leg.gravity * height

@@ -7,14 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
+from ppafo.model.flow_curve import isentropic_curve, iso6358_curve
 from ppafo.model.gas import SPECIES, choked_flow_constant, critical_pressure_ratio, subsonic_flow_constant
 from ppafo.model.orifice import (
     area_conductance,
     fitted_flow_function,
     fitted_flow_slope,
-    isentropic_curve,
     isentropic_flow_function,
-    iso6358_curve,
     iso6358_flow_function,
     orifice_flow,
     orifice_flow_slopes,

@@ -11,9 +11,9 @@ from ppafo.model.catalog import EFFECTS
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.parameters import apply_overrides, load_device, load_parameter_set
 from ppafo.parameters.device import Orifice
+from ppafo.parameters.effects import settings_of
 from ppafo.parameters.overrides import over
 from ppafo.parameters.parameter_set import number_in_si
-from ppafo.parameters.plant import settings_of
 
 COMPLETED = load_parameter_set("ppafo2011")
 PATHS = sorted(COMPLETED.numbers)

@@ -6,8 +6,8 @@ import pytest
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.c_library import c_library
 from ppafo.model.sensors import Measurement
-from ppafo.processor.firmware import fixed_point_controller, integer_form
-from ppafo.processor.fixed_point import Converter, read
+from ppafo.processor.firmware import FixedPointController, fixed_point_controller, integer_form
+from ppafo.processor.fixed_point import read
 from ppafo.processor.lock_step import PythonProcessor
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
@@ -19,16 +19,17 @@ FIXED = "controller.kind=pid_fixed_point"
 class InPython:
     """The integer controller as a Python object."""
 
-    def __init__(self, fixed: PythonProcessor, converter: Converter) -> None:
-        self.processor = fixed
-        self.converter = converter
+    def __init__(self, fixed: FixedPointController) -> None:
+        self.processor = PythonProcessor(fixed)
+        self.fixed = fixed
 
     def reset(self) -> None:
         self.processor.begin()
 
     def update(self, time: float, reference: float, measurement: Measurement) -> float:
         assert time >= 0.0
-        return self.processor.sample(read(self.converter, reference, measurement))[0] / 1000
+        readings = read(self.fixed.steps, self.fixed.limits, reference, measurement)
+        return self.processor.sample(readings)[0] / 1000
 
 
 @pytest.mark.parametrize(
@@ -44,7 +45,7 @@ def test_whole_numbers_cost_less_than_one_percent_in_both_torque_tasks(name: str
 def test_the_lanes_decide_as_python_does() -> None:
     scenario = load_scenario("torque-task-proportional", (FIXED,))
     fixed = fixed_point_controller(scenario)
-    mine = simulate(scenario.controlled_by(InPython(PythonProcessor(fixed), fixed.converter))).recording
+    mine = simulate(scenario.controlled_by(InPython(fixed))).recording
     lanes = simulate(scenario).recording
     assert all(np.array_equal(mine[name], lanes[name]) for name in lanes.names)
     assert len(set(lanes["command"])) > 100

@@ -71,7 +71,7 @@ def test_what_may_leave_32_bits_is_refused_and_what_just_does_not_is_not() -> No
 
 def test_a_name_is_as_wide_as_what_it_holds() -> None:
     def types(most: int) -> dict[str, Any]:
-        function = narrowed(module_of(doubled_up), given(-5, 5, most)).module.functions[0]
+        function = narrowed(module_of(doubled_up), given(-5, 5, most)).module[0]
         assert function.returns is not None
         return dict(function.parameters) | {"": function.returns}
 

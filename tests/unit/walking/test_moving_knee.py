@@ -96,13 +96,13 @@ def needed_moment(gait: Gait, leg: LegParameters, phases: Floats) -> Floats:
     for phase in phases.tolist():
         now = gait_at(series, timing, leg, phase * gait.stride_time)
         foot = foot_direction(now.shank, now.ankle)
-        matrix = mass_matrix(leg, float(np.cos(now.ankle)))
-        turning = centrifugal_torques(leg, float(np.sin(now.ankle)), now.shank_rate, now.ankle_rate)
-        weight = gravity_torques(
+        _, coupling, _ = mass_matrix(leg, float(np.cos(now.ankle)))
+        _, turning = centrifugal_torques(leg, float(np.sin(now.ankle)), now.shank_rate, now.ankle_rate)
+        _, weight = gravity_torques(
             leg, now.sine_shank, now.cosine_shank, foot.sine, foot.cosine, now.knee_forward, now.knee_up
         )
-        inertial = foot_inertia_about_ankle(leg) * now.ankle_acceleration + matrix.coupling * now.shank_acceleration
-        found.append(inertial + turning.ankle + weight.ankle)
+        inertial = foot_inertia_about_ankle(leg) * now.ankle_acceleration + coupling * now.shank_acceleration
+        found.append(inertial + turning + weight)
     return np.array(found)
 
 

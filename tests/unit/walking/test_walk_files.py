@@ -19,7 +19,7 @@ from ppafo.loading import json_schema, list_all_scenarios, load_scenario, reload
 from ppafo.simulation.loading import load_scenario as load_vane
 from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.studies.draws import check_metrics
+from ppafo.studies.limits import check_metrics
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 

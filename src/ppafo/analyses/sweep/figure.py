@@ -48,38 +48,6 @@ _CAPTION = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class _Content:
-    """Content of a figure: metrics, channels with bands, configurations, and the varied paths.
-
-    ``varied`` are those whose size says something, without a seed; ``grid`` are those of a grid or a list.
-    """
-
-    metrics: Sequence[str]
-    bands: Sequence[str]
-    configurations: Sequence[str]
-    varied: Sequence[str]
-    grid: Sequence[str]
-
-    @property
-    def is_mapped(self) -> bool:
-        """True where each metric of a configuration is a panel, over two paths: a map of a grid, or points."""
-        return len(self.grid) == 2 or len(self.varied) == 2
-
-    @property
-    def is_compared(self) -> bool:
-        """True for panels over two paths of several configurations: a row for each metric."""
-        return self.is_mapped and len(self.configurations) > 1
-
-    @property
-    def across(self) -> int:
-        """Number of panels side by side."""
-        if self.is_compared:
-            return len(self.configurations)
-        count = len(self.metrics) * (len(self.configurations) if self.is_mapped else 1) + len(self.bands)
-        return 2 if count == 4 else min(_COLUMNS, max(1, count))
-
-
 def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Section:
     """Return maps for a grid of two axes, points for two values that are drawn, else a panel a metric; and bands."""
     study, all_metrics = results.document["study"], list(results.document["metrics"])
@@ -87,25 +55,28 @@ def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]
     with_values = [
         metric for metric in all_metrics if any(described[metric]["count"] for described in results.metrics.values())
     ]
-    content = _Content(
-        metrics=(with_values or all_metrics)[:MOST_METRICS],
-        bands=list(study["outputs"].get("bands", ())),
-        # As many as colours that can be told apart.
-        configurations=results.configurations[:MOST_CONFIGURATIONS],
-        varied=[path for path in results.varied if path != NOISE],
-        grid=[number["path"] for number in study.get("vary", ()) if number["kind"] in _GRIDDED],
-    )
+    metrics = (with_values or all_metrics)[:MOST_METRICS]
+    # As many as colours that can be told apart.
+    names = results.configurations[:MOST_CONFIGURATIONS]
+    # The size of a seed says nothing.
+    varied = [path for path in results.varied if path != NOISE]
+    grid = [number["path"] for number in study.get("vary", ()) if number["kind"] in _GRIDDED]
+    # Over two paths each metric of a configuration is a panel, a map of a grid or points; else one a metric.
+    is_mapped = 2 in (len(grid), len(varied))
     title = f"{results.name}, {results.summary['completed']:,} runs"
-    if not content.is_mapped and len(content.varied) > 1:
-        title += f" over {len(content.varied)} values: {_listed(content.varied)}"
+    if not is_mapped and len(varied) > 1:
+        title += f" over {len(varied)} values: {_listed(varied)}"
+    # Panels over two paths of several configurations have a row for each metric.
+    is_compared = is_mapped and len(names) > 1
+    count = len(metrics) + len(study["outputs"].get("bands", ()))
     return Section(
         said=said,
         remarks=remarks,
-        panels=partial(_panels, results, content),
+        panels=partial(_panels, results, metrics, names, varied, grid),
         name=FIGURE,
         caption=_CAPTION,
-        across=content.across,
-        size=_COMPARED_PANEL if content.is_compared else _PANEL,
+        across=len(names) if is_compared else min(_COLUMNS, max(1, count)),
+        size=_COMPARED_PANEL if is_compared else _PANEL,
         title=title,
         is_detail=True,
     )
@@ -119,21 +90,18 @@ def _listed(paths: Sequence[str]) -> str:
     return f"{', '.join(labels)}{more}"
 
 
-def _panels(results: StudyResults, content: _Content) -> list[Panel]:
-    """Return a panel for each metric, of each configuration where it is a map, and one for each band."""
-    names = content.configurations
-    if content.is_mapped:
-        over_two = (
-            partial(_map, results, content.grid)
-            if len(content.grid) == 2
-            else partial(_points, results, content.varied)
-        )
-        panels = [over_two(metric, name, content.is_compared) for metric in content.metrics for name in names]
-    elif len(content.varied) == 1:
-        panels = [_over(results, content.varied[0], metric, names) for metric in content.metrics]
+def _panels(
+    results: StudyResults, metrics: Sequence[str], names: Sequence[str], varied: Sequence[str], grid: Sequence[str]
+) -> list[Panel]:
+    """Return a panel for each metric, of each configuration where it is over two paths, and one for each band."""
+    if 2 in (len(grid), len(varied)):
+        over_two = partial(_map, results, grid) if len(grid) == 2 else partial(_points, results, varied)
+        panels = [over_two(metric, name, len(names) > 1) for metric in metrics for name in names]
+    elif len(varied) == 1:
+        panels = [_over(results, varied[0], metric, names) for metric in metrics]
     else:
-        panels = [_histogram(results, metric) for metric in content.metrics]
-    panels += [_band(results, channel, names) for channel in content.bands]
+        panels = [_histogram(results, metric) for metric in metrics]
+    panels += [_band(results, channel, names) for channel in results.document["study"]["outputs"].get("bands", ())]
     # The first panel with curves names the configurations for all.
     with_names = next((panel for panel in panels if len(names) > 1 and any(mark.label for mark in panel.marks)), None)
     return [replace(panel, legend="inside" if panel is with_names else "") for panel in panels]

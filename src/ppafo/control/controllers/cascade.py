@@ -91,20 +91,20 @@ class CascadeState(NamedTuple):
     within the tolerance, ``is_full`` while the valve is fully open.
     """
 
-    reference: float
-    angle: float
-    rate: float
-    asked: float
-    quickening: float
-    started: float
-    load: float
-    breakaway: float
-    asked_torque: float
-    lagged_torque: float
-    place: float
-    still: float
-    is_held: float
-    is_full: float
+    reference: float = 0.0
+    angle: float = 0.0
+    rate: float = 0.0
+    asked: float = 0.0
+    quickening: float = 0.0
+    started: float = 0.0
+    load: float = 0.0
+    breakaway: float = 0.0
+    asked_torque: float = 0.0
+    lagged_torque: float = 0.0
+    place: float = 0.0
+    still: float = 0.0
+    is_held: float = 0.0
+    is_full: float = 0.0
 
 
 SMOOTHING = 8.0
@@ -212,22 +212,7 @@ CASCADE = ControllerKind(
     source="disturbance observer: Ohnishi 1987; cascade: Bone and Ning 2007; gains by Skogestad 2003",
     quantities=quantities_of(CascadeParameters),
     parameters=CascadeParameters,
-    initial=CascadeState(
-        reference=0.0,
-        angle=0.0,
-        rate=0.0,
-        asked=0.0,
-        quickening=0.0,
-        started=0.0,
-        load=0.0,
-        breakaway=0.0,
-        asked_torque=0.0,
-        lagged_torque=0.0,
-        place=0.0,
-        still=0.0,
-        is_held=0.0,
-        is_full=0.0,
-    ),
+    initial=CascadeState(),
     update=cascade_update,
     controls=(ANGLE,),
 )

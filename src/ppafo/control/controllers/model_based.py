@@ -7,8 +7,8 @@ number is the controller's own, so that it can be wrong about the device as a re
 import math
 from typing import Annotated, NamedTuple
 
-from ppafo.control.controllers.feedback import PidGains, PidState, pid_command, pid_restart
-from ppafo.control.kind import NOMINAL, BelievedBand, ControllerKind
+from ppafo.control.controllers.pid import PidGains, PidState, pid_command, pid_restart
+from ppafo.control.kind import BelievedBand, ControllerKind, nominal_term
 from ppafo.control.torque_loop import CONVERGENCE, beyond_dead_band
 from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume
@@ -20,7 +20,7 @@ SMALLEST_GAIN = 1.0e-3
 
 def _believed(name: str, unit: str, what: str, minimum: float, maximum: float) -> Quantity:
     """A number of the device that a law believes, the device's own unless it is given."""
-    return Quantity("", unit, f"believed {what}", None, minimum, maximum, follows=(NOMINAL[name],))
+    return Quantity("", unit, f"believed {what}", None, minimum, maximum, follows=(nominal_term(name),))
 
 
 class NominalChambers(NamedTuple):
@@ -129,17 +129,8 @@ class PidFeedforwardParameters(NamedTuple):
 class PidFeedforwardState(NamedTuple):
     """The state of the PID, and the reference one sample ago [N m]."""
 
-    feedback: PidState
-    reference: float
-
-
-def rates_on_reference(nominal: NominalChambers, reference: float, angle: float) -> TorqueRates:
-    """Believed torque rates of a vane at rest whose torque is the reference [N m] with the other chamber vented."""
-    ambient = nominal.atmospheric_pressure
-    above = reference / nominal.torque_constant
-    pressure_1 = min(ambient + max(above, 0.0), NEARLY_SUPPLY * nominal.supply_pressure)
-    pressure_2 = min(ambient + max(-above, 0.0), NEARLY_SUPPLY * nominal.dorsiflexion_pressure)
-    return torque_rates(nominal, angle, 0.0, pressure_1, pressure_2)
+    feedback: PidState = PidState()
+    reference: float = 0.0
 
 
 def feedforward_update(
@@ -151,12 +142,17 @@ def feedforward_update(
 ) -> tuple[float, PidFeedforwardState]:
     """Command from -1 to 1: PID of the torque error [N m], equation (13), and the opening for the reference's rate."""
     rate = (reference - state.reference) / period * state.feedback.started
-    # Along the reference, not at the measured state: the feed-forward must not see the noise.
-    rates = rates_on_reference(parameters.nominal, reference, measurement.angle)
+    # Along the reference, with the other chamber vented, not at the measured state: the feed-forward must not see the
+    # noise.
+    nominal = parameters.nominal
+    ambient, above = nominal.atmospheric_pressure, reference / nominal.torque_constant
+    pressure_1 = min(ambient + max(above, 0.0), NEARLY_SUPPLY * nominal.supply_pressure)
+    pressure_2 = min(ambient + max(-above, 0.0), NEARLY_SUPPLY * nominal.dorsiflexion_pressure)
+    rates = torque_rates(nominal, measurement.angle, 0.0, pressure_1, pressure_2)
     ahead = parameters.feedforward * opening_for_rate(rates, rate)
     error = reference - measurement.torque
     opening, feedback = pid_command(parameters.feedback, state.feedback, error, ahead, period)
-    command = beyond_dead_band(opening, parameters.nominal.dead_band)
+    command = beyond_dead_band(opening, nominal.dead_band)
     return command, PidFeedforwardState(feedback, reference)
 
 
@@ -175,7 +171,7 @@ PID_FEEDFORWARD = ControllerKind(
         *NOMINAL_QUANTITIES,
     ),
     parameters=PidFeedforwardParameters,
-    initial=PidFeedforwardState(PidState(integral=0.0, error=0.0, slope=0.0, started=0.0), 0.0),
+    initial=PidFeedforwardState(),
     update=feedforward_update,
     restart=feedforward_restart,
 )
@@ -195,10 +191,10 @@ class FeedbackLinearisationParameters(NamedTuple):
 class FeedbackLinearisationState(NamedTuple):
     """Reference [N m] and angle [rad] one sample ago, filtered angular velocity [rad/s], start mark."""
 
-    reference: float
-    angle: float
-    angular_velocity: float
-    started: float
+    reference: float = 0.0
+    angle: float = 0.0
+    angular_velocity: float = 0.0
+    started: float = 0.0
 
 
 def linearising_update(
@@ -237,7 +233,7 @@ FEEDBACK_LINEARISATION = ControllerKind(
     source="Slotine and Li 1991, Applied Nonlinear Control, chapter 6; on pneumatic actuators Richer and Hurmuzlu 2000",
     quantities=quantities_of(FeedbackLinearisationParameters),
     parameters=FeedbackLinearisationParameters,
-    initial=FeedbackLinearisationState(reference=0.0, angle=0.0, angular_velocity=0.0, started=0.0),
+    initial=FeedbackLinearisationState(),
     update=linearising_update,
     restart=linearising_restart,
 )

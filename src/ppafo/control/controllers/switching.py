@@ -1,11 +1,14 @@
-"""Laws that open the valve by a fixed amount: always, by the sign of the error (equation 14), or beyond a dead zone."""
+"""Switching laws: a constant command, the sign of the error (equation 14), a dead zone, sliding mode with a layer.
+
+Units are those of a torque; of what else is controlled, its unit stands in the place of N m.
+"""
 
 from typing import Annotated, NamedTuple
 
-from ppafo.control.kind import ControllerKind
-from ppafo.control.torque_loop import DEAD_ZONE, OPENING, RELEASE
+from ppafo.control.kind import BelievedBand, ControllerKind
+from ppafo.control.torque_loop import BOUNDARY, DEAD_ZONE, INTEGRAL_RATE, OPENING, RELEASE, beyond_dead_band
 from ppafo.model.controlled import ANYTHING, OF_TORQUE, ErrorFunctions, seen_error
-from ppafo.model.declaration import Number, quantities_of
+from ppafo.model.declaration import EmptyRow, Number, quantities_of
 from ppafo.model.sensors import Measurement
 
 
@@ -15,13 +18,9 @@ class ConstantParameters(NamedTuple):
     command: Annotated[float, Number("", "command, above 0 feeds chamber 1", 1.0, -1.0, 1.0)]
 
 
-class ConstantState(NamedTuple):
-    """A constant command remembers nothing."""
-
-
 def constant_update(
-    parameters: ConstantParameters, state: ConstantState, reference: float, measurement: Measurement, period: float
-) -> tuple[float, ConstantState]:
+    parameters: ConstantParameters, state: EmptyRow, reference: float, measurement: Measurement, period: float
+) -> tuple[float, EmptyRow]:
     """Command [-] from -1 to 1, which is the setting whatever is measured, and the state."""
     return parameters.command, state
 
@@ -32,7 +31,7 @@ CONSTANT = ControllerKind(
     source="the paper, section on model validation: valve fully open",
     quantities=quantities_of(ConstantParameters),
     parameters=ConstantParameters,
-    initial=ConstantState(),
+    initial=EmptyRow(),
     update=constant_update,
     needs_reference=False,
 )
@@ -80,23 +79,15 @@ ROUNDING = 1.0e-9
 """N m: an error this small counts as zero, so that rounding does not decide the first command."""
 
 
-class OnOffParameters(NamedTuple):
-    """The law has no parameters; the paper has no dead zone."""
-
-
-class OnOffState(NamedTuple):
-    """On/off switching with a dead zone remembers nothing."""
-
-
 def on_off_update(
-    parameters: OnOffParameters,
-    state: OnOffState,
+    parameters: EmptyRow,
+    state: EmptyRow,
     reference: float,
     measurement: Measurement,
     period: float,
     *,
     parts: ErrorFunctions = OF_TORQUE,
-) -> tuple[float, OnOffState]:
+) -> tuple[float, EmptyRow]:
     """Command: 1 (valve A) where the error [N m] is 0 or more, else -1 (valve B). Equation (14)."""
     error = seen_error(reference, measurement, parts=parts)
     return (1.0 if error >= -ROUNDING else -1.0), state
@@ -107,8 +98,8 @@ ON_OFF = ControllerKind(
     summary="Valve A where the torque is below the reference, valve B where it is above.",
     source="the paper, equation (14)",
     quantities=(),
-    parameters=OnOffParameters,
-    initial=OnOffState(),
+    parameters=EmptyRow,
+    initial=EmptyRow(),
     update=on_off_update,
     controls=ANYTHING,
     only_switches=True,
@@ -171,4 +162,67 @@ ON_OFF_DEAD_ZONE = ControllerKind(
     restart=dead_zone_restart,
     controls=ANYTHING,
     only_switches=True,
+)
+
+
+class SlidingModeParameters(NamedTuple):
+    """Slope of the surface [1/s], half width of the boundary layer [N m], opening outside of it [-]; dead band [-]."""
+
+    surface_slope: Annotated[
+        float,
+        Number("1/s", "weight of the error's integral in the surface", None, 0.0, 1.0e5, follows=(INTEGRAL_RATE,)),
+    ]
+    boundary_layer: Annotated[
+        float, Number("N m", "half width of the layer without switching", None, 1.0e-6, 1.0e4, follows=(BOUNDARY,))
+    ]
+    reaching_command: Annotated[float, Number("", "opening outside the layer", 1.0, 0.0, 1.0)]
+    dead_band: BelievedBand
+
+
+class SlidingModeState(NamedTuple):
+    """State of a sliding-mode law: integral of the torque error [N m s]."""
+
+    integral: float
+
+
+def sliding_update(
+    parameters: SlidingModeParameters,
+    state: SlidingModeState,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+    *,
+    parts: ErrorFunctions = OF_TORQUE,
+) -> tuple[float, SlidingModeState]:
+    """Command [-] for the torque error e [N m], with the boundary layer phi [N m] and the slope lambda [1/s]:
+
+        s = e + lambda (integral of e),    u = reaching_command min(1, max(-1, s / phi))
+
+    The opening u is made a command beyond the dead band. The integral stands still outside the layer, where a longer
+    error could not open the valve further.
+    """
+    error = seen_error(reference, measurement, parts=parts)
+    integral = state.integral + period * error
+    surface = error + parameters.surface_slope * integral
+    is_inside = abs(surface) < parameters.boundary_layer
+    fraction = max(-1.0, min(1.0, surface / parameters.boundary_layer))
+    command = beyond_dead_band(parameters.reaching_command * fraction, parameters.dead_band)
+    return command, SlidingModeState(integral if is_inside else state.integral)
+
+
+def sliding_restart(state: SlidingModeState, requested: float, continues: float) -> SlidingModeState:
+    """The state, reset where another task begins (``continues`` 0, else 1); ``requested`` [N m] is not used."""
+    return SlidingModeState(integral=state.integral * continues)
+
+
+SLIDING_MODE = ControllerKind(
+    name="sliding_mode",
+    summary="Sliding mode on the torque error and its integral, with a boundary layer.",
+    source="Slotine and Li 1991, Applied Nonlinear Control, chapter 7; on pneumatic actuators Bone and Ning 2007",
+    quantities=quantities_of(SlidingModeParameters),
+    parameters=SlidingModeParameters,
+    initial=SlidingModeState(0.0),
+    update=sliding_update,
+    restart=sliding_restart,
+    controls=ANYTHING,
 )

@@ -7,17 +7,17 @@ The profile has the four parameters that the exoskeleton literature uses, of J. 
 zero, a smooth rise to the peak, a smooth fall, zero; cubic with level ends.
 """
 
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from ppafo.control.torque_loop import REACH
 from ppafo.control.walking import phases, safety
-from ppafo.control.walking.fault_checks import SAFETY_QUANTITIES, SafetyRules
-from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseRules, PhaseState
+from ppafo.control.walking.fault_checks import SAFETY_QUANTITIES
+from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseState
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.timing import GaitTime, TimingParts
 from ppafo.model.declaration import Quantity
 from ppafo.model.helping import MID_STANCE, PUSH_OFF
-from ppafo.model.sensors import GaitMeasurement, Measurement
+from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
 
 
@@ -93,19 +93,16 @@ ASSISTING_QUANTITIES = (*ASSISTANCE_QUANTITIES, *PHASE_QUANTITIES, *SAFETY_QUANT
 """Settings that every law with ``assistance`` declares after its own."""
 
 
-class Hold(NamedTuple):
-    """Angle of the lifted foot [rad], stiffness [N m/rad], damping [N m s/rad], filter of the angle's rate [s]."""
+class Assistance(NamedTuple):
+    """Hold of the lifted foot, profiles of landing and swing (in dorsiflexion) and of push-off, largest torque [N m].
+
+    The hold has an angle [rad], a stiffness [N m/rad], a damping [N m s/rad] and a filter of the angle's rate [s].
+    """
 
     swing_angle: float
     stiffness: float
     damping: float
     rate_filter: float
-
-
-class Assistance(NamedTuple):
-    """The hold, the profiles of landing and swing (in dorsiflexion) and of push-off, and the largest torque [N m]."""
-
-    hold: Hold
     landing: TorqueProfile
     push_off: TorqueProfile
     swing: TorqueProfile
@@ -115,9 +112,9 @@ class Assistance(NamedTuple):
 class TorqueRequest(NamedTuple):
     """Angle one sample ago [rad], 0 before the first, its filtered rate [rad/s], and the requested torque [N m]."""
 
-    angle: float
-    rate: float
-    torque: float
+    angle: float = 0.0
+    rate: float = 0.0
+    torque: float = 0.0
 
 
 class Assessment(NamedTuple):
@@ -136,47 +133,7 @@ class Assessment(NamedTuple):
     """1 where the law commands the valve, 0 where both chambers are vented."""
 
 
-class AssistingParameters(Protocol):
-    """Parameters common to all walking laws that request a torque by gait phase."""
-
-    @property
-    def assistance(self) -> Assistance:
-        """Requested torque by gait phase."""
-
-    @property
-    def phases(self) -> PhaseRules:
-        """Rules of the phases."""
-
-    @property
-    def safety(self) -> SafetyRules:
-        """Rules of safety."""
-
-    @property
-    def timing(self) -> Any:
-        """Parameters of the gait-phase estimation."""
-
-
-class AssistingState(Protocol):
-    """State common to all walking laws that request a torque by gait phase."""
-
-    @property
-    def phase(self) -> PhaseState:
-        """The phase that the controller sees."""
-
-    @property
-    def safety(self) -> SafetyState:
-        """The state of the safety checks."""
-
-    @property
-    def clock(self) -> Any:
-        """State of the timing."""
-
-    @property
-    def request(self) -> TorqueRequest:
-        """The torque requested last."""
-
-
-START = TorqueRequest(0.0, 0.0, 0.0)
+START = TorqueRequest()
 
 EASING_TIME = 0.1
 """Time [s] after a landing on the toes in which a torque in plantarflexion is taken off by the law; it vents after."""
@@ -194,12 +151,11 @@ def requested_torque(rules: Assistance, phase: PhaseState, time: GaitTime, angle
     Landing and swing: stiffness (swing_angle - q) - damping dq/dt, less their profile. Push-off: its profile.
     """
     fraction = time.since_strike / phase.stride_time
-    hold = rules.hold
-    held = hold.stiffness * (hold.swing_angle - angle) - hold.damping * rate
+    hold = rules.stiffness * (rules.swing_angle - angle) - rules.damping * rate
     landing, swing = profile_torque(rules.landing, fraction), profile_torque(rules.swing, fraction)
     lands = time.lands > 0.5
     # Profiles of landing and swing are given as torques in dorsiflexion, hence the minus.
-    lifted = held - (landing if lands else swing)
+    lifted = hold - (landing if lands else swing)
     # On the heel nothing presses the toes down, and in the air little: an angle that is read too low asks for it.
     lifted = min(lifted, 0.0 if lands else LARGEST_PRESS)
     pushed = profile_torque(rules.push_off, fraction) if phase.phase == PUSH_OFF else 0.0
@@ -229,41 +185,27 @@ def timed_phase(
     return after, followed, parts.gait_time(parameters.timing, followed, after)
 
 
-def filtered_rate(last: TorqueRequest, angle: float, time_constant: float, period: float) -> float:
-    """Rate of the angle [rad/s] after a sample of it [rad], behind a filter of first order with a time constant [s].
-
-    The step is implicit, so that it is stable for any time constant: (1 + period / tau) r = r_last + turned / tau.
-    """
-    # An angle of 0 marks that there was no sample before.
-    turned = angle - last.angle if last.angle > 0.0 else 0.0
-    return last.rate + (turned - period * last.rate) / (period + time_constant)
-
-
-def is_eased(phase: PhaseState, torque: float) -> bool:
-    """True where a torque of the actuator [N m] in plantarflexion is taken off by the law, after a landing on the toes.
-
-    A foot that lands on its toes turns far, and gas left in the chamber would then push on a loaded heel.
-    """
-    # A stance that began on the toes has been in mid-stance since its strike: it had no landing.
-    on_toes = phase.phase == MID_STANCE and phase.in_phase >= phase.since_strike
-    return on_toes and phase.since_strike < EASING_TIME and torque > EASED
-
-
 def assess(
-    parameters: AssistingParameters,
-    state: AssistingState,
-    measurement: GaitMeasurement,
-    period: float,
-    *,
-    parts: TimingParts,
+    parameters: Any, state: Any, measurement: GaitMeasurement, period: float, *, parts: TimingParts
 ) -> Assessment:
-    """Phase, safety and requested torque [N m] after a sample, taken every ``period`` [s], and whether to act on it."""
+    """Phase, safety and requested torque [N m] after a sample, taken every ``period`` [s], and whether to act on it.
+
+    ``parameters`` and ``state`` are rows with the fields of ``LawParameters`` and ``LawState`` (``frame.py``).
+    """
     phase, clock, time = timed_phase(parameters, state.phase, state.clock, measurement, period, parts=parts)
     watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
-    rules = parameters.assistance
-    rate = filtered_rate(state.request, measurement.angle, rules.hold.rate_filter, period)
+    rules: Assistance = parameters.assistance
+    last: TorqueRequest = state.request
+    # An angle of 0 marks that there was no sample before.
+    turned = measurement.angle - last.angle if last.angle > 0.0 else 0.0
+    # A filter of first order, with an implicit step: stable for any time constant.
+    rate = last.rate + (turned - period * last.rate) / (period + rules.rate_filter)
     torque = requested_torque(rules, phase, time, measurement.angle, rate)
-    has_task = phases.lifts(phase.phase) or phase.phase == PUSH_OFF or is_eased(phase, measurement.torque)
+    # A foot that lands on its toes turns far, and gas left in the chamber would then push on a loaded heel: the law
+    # takes it off. A stance that began on the toes has been in mid-stance since its strike: it had no landing.
+    on_toes = phase.phase == MID_STANCE and phase.in_phase >= phase.since_strike
+    is_eased = on_toes and phase.since_strike < EASING_TIME and measurement.torque > EASED
+    has_task = phases.lifts(phase.phase) or phase.phase == PUSH_OFF or is_eased
     return Assessment(
         phase=phase,
         clock=clock,
@@ -272,16 +214,6 @@ def assess(
         request=TorqueRequest(measurement.angle, rate, torque),
         continues=1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
         acts=1.0 if has_task and safety.permits(watch, phase.phase) else 0.0,
-    )
-
-
-def torque_measurement(measurement: GaitMeasurement) -> Measurement:
-    """The part of a measurement that a torque law uses."""
-    return Measurement(
-        angle=measurement.angle,
-        pressure_1=measurement.pressure_1,
-        pressure_2=measurement.pressure_2,
-        torque=measurement.torque,
     )
 
 

@@ -9,7 +9,7 @@ listed here: its ``update`` watches the sensors with ``safety.monitor`` and pass
 from typing import Annotated, NamedTuple
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.controllers import feedback, model_based, switching
+from ppafo.control.controllers import model_based, pid, switching
 from ppafo.control.kind import BelievedBand, ControllerKind
 from ppafo.control.torque_loop import INTEGRAL_GAIN, PROPORTIONAL_GAIN, beyond_dead_band
 from ppafo.control.walking import event_on_off, learning
@@ -83,9 +83,9 @@ _EVENT_BASED = {
     for law, following in (
         (switching.ON_OFF_DEAD_ZONE, "on/off switching with a dead zone"),
         (PROPORTIONAL, "proportional and integral action"),
-        (feedback.PID, "a PID with anti-windup"),
+        (pid.PID, "a PID with anti-windup"),
         (model_based.PID_FEEDFORWARD, "a PID and the inverse of a valve model"),
-        (feedback.SLIDING_MODE, "a sliding mode law with a boundary layer"),
+        (switching.SLIDING_MODE, "a sliding mode law with a boundary layer"),
         (model_based.FEEDBACK_LINEARISATION, "inverting the chamber dynamics"),
     )
 }
@@ -95,9 +95,9 @@ _COMPETING = (
     event_on_off.EVENT_ON_OFF,
     _EVENT_BASED[switching.ON_OFF_DEAD_ZONE],
     _EVENT_BASED[PROPORTIONAL],
-    _EVENT_BASED[feedback.PID],
+    _EVENT_BASED[pid.PID],
     _EVENT_BASED[model_based.PID_FEEDFORWARD],
-    _EVENT_BASED[feedback.SLIDING_MODE],
+    _EVENT_BASED[switching.SLIDING_MODE],
     learning.KIND,
     _EVENT_BASED[model_based.FEEDBACK_LINEARISATION],
     event_on_off.OFF,

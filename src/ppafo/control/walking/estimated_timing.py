@@ -39,13 +39,16 @@ KEEPS = 0.2
 """Correction of the clock per detected strike once a stride is learnt [-]: the two cannot drift apart."""
 
 
-class EstimationRules(NamedTuple):
-    """Strides to learn from, weight of a later one, misfits that count as one [rad], [N], and how they are used.
+class EstimatedRules(NamedTuple):
+    """Estimator parameters: known delays, correction per detected event before a stride is learnt [-], adaptation.
 
+    Strides to learn from, weight of a later one, misfits that count as one [rad], [N], and how they are used.
     ``clock_trust`` is the sum of squares that a shift by one knot costs: what the readings say of time has to outweigh
     it, which forces that rise and fall do, and the angle of the swing alone hardly does.
     """
 
+    delays: Delays
+    anchor_weight: AnchorWeight
     learning_strides: Annotated[
         float, Number("1", "good strides in a row from which the stride is learnt", 3.0, 1.0, 100.0)
     ]
@@ -59,29 +62,24 @@ class EstimationRules(NamedTuple):
     estimate_weight: Annotated[float, Number("1", "how far an estimate moves the clock, 1 wholly", 0.5, 0.0, 1.0)]
 
 
-class EstimatedRules(NamedTuple):
-    """The known delays, how far a detected event moves the clock while nothing is learnt [-], and the estimation."""
-
-    delays: Delays
-    anchor_weight: AnchorWeight
-    estimation: EstimationRules
+_NO_STRIDE, _NO_WINDOW = (0.0,) * KNOTS, (0.0,) * WINDOW
 
 
 class LearntStride(NamedTuple):
     """Ankle angle [rad], heel and toe force [N] at the knots of a stride, the next one first."""
 
-    angle: Annotated[tuple[float, ...], KNOTS]
-    heel_force: Annotated[tuple[float, ...], KNOTS]
-    toe_force: Annotated[tuple[float, ...], KNOTS]
+    angle: Annotated[tuple[float, ...], KNOTS] = _NO_STRIDE
+    heel_force: Annotated[tuple[float, ...], KNOTS] = _NO_STRIDE
+    toe_force: Annotated[tuple[float, ...], KNOTS] = _NO_STRIDE
 
 
 class Window(NamedTuple):
     """Angle and forces at the last knots, the latest one last, and how far estimates had moved the clock [turns]."""
 
-    angle: Annotated[tuple[float, ...], WINDOW]
-    heel_force: Annotated[tuple[float, ...], WINDOW]
-    toe_force: Annotated[tuple[float, ...], WINDOW]
-    moved: Annotated[tuple[float, ...], WINDOW]
+    angle: Annotated[tuple[float, ...], WINDOW] = _NO_WINDOW
+    heel_force: Annotated[tuple[float, ...], WINDOW] = _NO_WINDOW
+    toe_force: Annotated[tuple[float, ...], WINDOW] = _NO_WINDOW
+    moved: Annotated[tuple[float, ...], WINDOW] = _NO_WINDOW
 
 
 class EstimatedClock(NamedTuple):
@@ -90,29 +88,19 @@ class EstimatedClock(NamedTuple):
     Knots in the window, strides learnt from, and by how much estimates have moved the clock since the start [turns].
     """
 
-    clock: GaitClock
-    stride: LearntStride
-    window: Window
-    next_knot: float
-    filled: float
-    learnt: float
-    moved: float
+    clock: GaitClock = CLOCK_START
+    stride: LearntStride = LearntStride()
+    window: Window = Window()
+    next_knot: float = 0.0
+    filled: float = 0.0
+    learnt: float = 0.0
+    moved: float = 0.0
 
 
-_NO_STRIDE = (0.0,) * KNOTS
-_NO_WINDOW = (0.0,) * WINDOW
-START = EstimatedClock(
-    clock=CLOCK_START,
-    stride=LearntStride(_NO_STRIDE, _NO_STRIDE, _NO_STRIDE),
-    window=Window(angle=_NO_WINDOW, heel_force=_NO_WINDOW, toe_force=_NO_WINDOW, moved=_NO_WINDOW),
-    next_knot=0.0,
-    filled=0.0,
-    learnt=0.0,
-    moved=0.0,
-)
+START = EstimatedClock()
 
 
-def misfit(stride: LearntStride, window: Window, rules: EstimationRules, shift: int) -> float:
+def misfit(stride: LearntStride, window: Window, rules: EstimatedRules, shift: int) -> float:
     """Mean square misfit [-] of the window to the learnt stride ``shift`` knots on."""
     total = 0.0
     for back in range(WINDOW):
@@ -124,7 +112,7 @@ def misfit(stride: LearntStride, window: Window, rules: EstimationRules, shift: 
     return total / (3.0 * WINDOW)
 
 
-def finer_shift(stride: LearntStride, window: Window, rules: EstimationRules, shift: int) -> float:
+def finer_shift(stride: LearntStride, window: Window, rules: EstimatedRules, shift: int) -> float:
     """Rest of the shift [knots] beyond a whole number of them: one Gauss-Newton step, at most a knot."""
     # The cost of a shift is one more residual, and 1e-12 keeps a flat stride without trust from dividing by 0.
     along, square = -rules.clock_trust * shift, 1.0e-12 + rules.clock_trust
@@ -142,7 +130,7 @@ def finer_shift(stride: LearntStride, window: Window, rules: EstimationRules, sh
     return max(-1.0, min(1.0, along / square))
 
 
-def estimated_shift(stride: LearntStride, window: Window, rules: EstimationRules) -> float:
+def estimated_shift(stride: LearntStride, window: Window, rules: EstimatedRules) -> float:
     """Fraction of a stride [turns] by which the wearer is ahead of the clock; 0 where no shift fits well."""
     least, best = misfit(stride, window, rules, 0), 0
     for distance in range(1, FURTHEST + 1):
@@ -157,18 +145,7 @@ def estimated_shift(stride: LearntStride, window: Window, rules: EstimationRules
     return (best + finer_shift(stride, window, rules, best)) / KNOTS if fits else 0.0
 
 
-def moved_since(window: Window) -> float:
-    """Mean movement of the clock [turns] since the readings of the window were taken.
-
-    That much of the shift that they show is already corrected.
-    """
-    total = 0.0
-    for place in range(WINDOW):
-        total += window.moved[WINDOW - 1] - window.moved[place]
-    return total / WINDOW
-
-
-def turned(stride: LearntStride, measurement: GaitMeasurement, weight: float) -> LearntStride:
+def next_stride(stride: LearntStride, measurement: GaitMeasurement, weight: float) -> LearntStride:
     """The learnt stride a knot on; the knot that is passed moves towards the readings by a weight [-]."""
     angle = stride.angle[0] + weight * (measurement.angle - stride.angle[0])
     heel = stride.heel_force[0] + weight * (measurement.heel_force - stride.heel_force[0])
@@ -189,18 +166,18 @@ def knots_passed(fraction: float, next_knot: float) -> float:
     return ahead + KNOTS if ahead <= -0.5 * KNOTS else ahead
 
 
-def is_learnt(rules: EstimationRules, clock: EstimatedClock) -> bool:
+def is_learnt(rules: EstimatedRules, clock: EstimatedClock) -> bool:
     """True once enough strides were seen to tell the gait phase from their course."""
     return clock.learnt >= rules.learning_strides
 
 
 def passed_knot(
-    rules: EstimationRules, clock: EstimatedClock, at: GaitClock, learnt: float, measurement: GaitMeasurement
+    rules: EstimatedRules, clock: EstimatedClock, at: GaitClock, learnt: float, measurement: GaitMeasurement
 ) -> EstimatedClock:
     """The clock where its fraction passes a knot: learning, or moved by a part of the estimated shift."""
     ready = is_learnt(rules, clock)
     # The first strides are averaged evenly, later ones fade in.
-    stride = turned(clock.stride, measurement, rules.relearning if ready else 1.0 / (clock.learnt + 1.0))
+    stride = next_stride(clock.stride, measurement, rules.relearning if ready else 1.0 / (clock.learnt + 1.0))
     window = Window(
         angle=(*clock.window.angle[1:], measurement.angle),
         heel_force=(*clock.window.heel_force[1:], measurement.heel_force),
@@ -210,7 +187,12 @@ def passed_knot(
     # A clock that was set anew by more than a knot runs after it, and its window is not of one piece.
     together = knots_passed(at.fraction, clock.next_knot) < 1.0
     filled = clock.filled + 1.0 if together else 0.0
-    shift = estimated_shift(stride, window, rules) - moved_since(window) if ready & (filled >= WINDOW) else 0.0
+    # What the clock has moved in the mean since the readings of the window is corrected already.
+    corrected = 0.0
+    for place in range(WINDOW):
+        corrected += window.moved[WINDOW - 1] - window.moved[place]
+    corrected = corrected / WINDOW
+    shift = estimated_shift(stride, window, rules) - corrected if ready & (filled >= WINDOW) else 0.0
     # No further back than the strike; a clock that a strike left before it stays there until it gets to it.
     moved = max(rules.estimate_weight * shift, min(0.0, -at.fraction))
     following = clock.next_knot + 1.0
@@ -235,7 +217,7 @@ def follow(
     period: float,
 ) -> EstimatedClock:
     """The clock after a sample, taken every ``period`` [s]: fractional until a stride is learnt, then estimated."""
-    ready = is_learnt(rules.estimation, clock) & (clock.filled >= WINDOW)
+    ready = is_learnt(rules, clock) & (clock.filled >= WINDOW)
     # Once estimated, single events no longer move the clock, and the strike only a little.
     weight, strike_weight = 0.0 if ready else rules.anchor_weight, KEEPS if ready else 1.0
     at = next_clock(rules.delays, phase_rules, clock.clock, before, phase, weight, strike_weight, period)
@@ -245,9 +227,9 @@ def follow(
     time = clock.clock.strides.mean_time
     good = (abs(before.since_strike - time) < EVEN * time) & (phase.heel.loaded > 0.5)
     counted = (clock.learnt + 1.0 if good else 0.0) if ends else clock.learnt
-    learnt = clock.learnt if is_learnt(rules.estimation, clock) else counted
+    learnt = clock.learnt if is_learnt(rules, clock) else counted
     if knots_passed(at.fraction, clock.next_knot) >= 0.0:
-        return passed_knot(rules.estimation, clock, at, learnt, measurement)
+        return passed_knot(rules, clock, at, learnt, measurement)
     return clock._replace(clock=at, learnt=learnt)
 
 

@@ -12,11 +12,11 @@ from ppafo.control.torque_loop import REACH
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.assistance import timed_phase
 from ppafo.control.walking.fault_checks import SafetyRules
-from ppafo.control.walking.observer import NOMINAL_QUANTITIES
+from ppafo.control.walking.observer import LINE_QUANTITIES
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts, ThresholdClock, ThresholdRules
-from ppafo.model.declaration import Number, quantities_of
+from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts
+from ppafo.model.declaration import EmptyRow, Number, quantities_of
 from ppafo.model.helping import PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
@@ -48,22 +48,17 @@ class EventOnOffParameters(NamedTuple):
     ]
     phases: PhaseRules
     safety: SafetyRules
-    timing: ThresholdRules
+    timing: EmptyRow
 
 
 class EventOnOffState(NamedTuple):
     """Phase, clock, safety, whether the foot is to be lifted (1), and whether a torque too large is let go (1)."""
 
-    phase: PhaseState
-    clock: ThresholdClock
-    safety: SafetyState
-    lifting: float
-    resting: float
-
-
-def is_resting(largest_torque: float, before: float, torque: float) -> bool:
-    """Return whether a torque [N m] is let go: from the largest one on, until half of it is left."""
-    return abs(torque) > (0.5 * largest_torque if before > 0.5 else largest_torque)
+    phase: PhaseState = PhaseState()
+    clock: EmptyRow = EmptyRow()
+    safety: SafetyState = SafetyState()
+    lifting: float = 0.0
+    resting: float = 0.0
 
 
 USUAL_CLOCK = ClockParts(AT_THRESHOLDS, EventOnOffState)
@@ -92,8 +87,10 @@ def update(
     # Vented before toe-off, so that the gas does not hold the foot down in the swing.
     in_time = time.since_strike < parameters.push_off_end * phase.stride_time
     command = 1.0 if phase.phase == PUSH_OFF and in_time else command
-    # Of what the valve feeds alone: a torque against it is the wearer's.
-    rests = is_resting(parameters.largest_torque, state.resting, measurement.torque)
+    # A torque is let go from the largest one on, until half of it is left; of what the valve feeds alone: a torque
+    # against it is the wearer's.
+    largest = parameters.largest_torque
+    rests = abs(measurement.torque) > (0.5 * largest if state.resting > 0.5 else largest)
     command = VENT if rests and command * measurement.torque > 0.0 else command
     command, watch = safety.safe_command(watch, phase.phase, command, period)
     following: EventOnOffState = parts.state(
@@ -106,25 +103,17 @@ EVENT_ON_OFF = ControllerKind(
     name="event_on_off",
     summary="Event-based: dorsiflexion in swing and landing, free in mid-stance, plantarflexion in push-off.",
     source="the paper, figure 1A and section 'PPAFO Hardware': binary, event-based control",
-    quantities=(*quantities_of(EventOnOffParameters), *NOMINAL_QUANTITIES),
+    quantities=(*quantities_of(EventOnOffParameters), *LINE_QUANTITIES),
     parameters=EventOnOffParameters,
-    initial=EventOnOffState(phase=phases.START, clock=ThresholdClock(), safety=safety.START, lifting=0.0, resting=0.0),
+    initial=EventOnOffState(),
     update=update,
     only_switches=True,
 )
 
 
-class OffParameters(NamedTuple):
-    """A device that is switched off has nothing to set."""
-
-
-class OffState(NamedTuple):
-    """A device that is switched off remembers nothing."""
-
-
 def off_update(
-    parameters: OffParameters, state: OffState, reference: float, measurement: GaitMeasurement, period: float
-) -> tuple[float, OffState]:
+    parameters: EmptyRow, state: EmptyRow, reference: float, measurement: GaitMeasurement, period: float
+) -> tuple[float, EmptyRow]:
     """Command of a device that is switched off: always ``VENT``, and the state."""
     return VENT, state
 
@@ -134,8 +123,8 @@ OFF = ControllerKind(
     summary="Both chambers vented.",
     source="comparison without assistance",
     quantities=(),
-    parameters=OffParameters,
-    initial=OffState(),
+    parameters=EmptyRow,
+    initial=EmptyRow(),
     update=off_update,
     only_switches=True,
 )

@@ -17,13 +17,13 @@ from ppafo.control.walking.fault_flags import (
     FROZEN_ANGLE,
     FROZEN_HEEL,
     FROZEN_TOE,
-    NO_FLAG,
     PRESSURE_RANGE,
     STILL_ANGLE,
     STILL_HEEL,
     STILL_TOE,
+    raised,
 )
-from ppafo.control.walking.observer import NOMINAL_QUANTITIES, NominalDevice, pressure_above
+from ppafo.control.walking.observer import LINE_QUANTITIES, NominalDevice
 from ppafo.control.walking.phases import PhaseState, lifts
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
@@ -94,8 +94,8 @@ class SafetyRules(NamedTuple):
     nominal: NominalDevice
 
 
-SAFETY_QUANTITIES = (*quantities_of(SafetyRules), *NOMINAL_QUANTITIES)
-"""Settings of the checks in a walk file, followed by the nominal device of the observer."""
+SAFETY_QUANTITIES = (*quantities_of(SafetyRules), *LINE_QUANTITIES)
+"""Settings of the checks in a walk file, with the nominal device of the observer."""
 
 
 class LastReadings(NamedTuple):
@@ -107,17 +107,17 @@ class LastReadings(NamedTuple):
     angle only since the strike before, for a foot that hangs or sits may show one angle for long.
     """
 
-    heel_force: float
-    toe_force: float
-    angle: float
-    pressure_1: float
-    pressure_2: float
-    heel_unchanged: float
-    toe_unchanged: float
-    angle_unchanged: float
-    slow_heel: float
-    slow_toe: float
-    slow_angle: float
+    heel_force: float = 0.0
+    toe_force: float = 0.0
+    angle: float = 0.0
+    pressure_1: float = 0.0
+    pressure_2: float = 0.0
+    heel_unchanged: float = 0.0
+    toe_unchanged: float = 0.0
+    angle_unchanged: float = 0.0
+    slow_heel: float = 0.0
+    slow_toe: float = 0.0
+    slow_angle: float = 0.0
 
 
 class LandingCheck(NamedTuple):
@@ -127,36 +127,20 @@ class LandingCheck(NamedTuple):
     ``late_toes`` push-offs in a row at whose end the foot had turned down as it does in the air only.
     """
 
-    lowest: float
-    highest: float
-    in_doubt: float
-    late: float
-    late_toes: float
+    lowest: float = 0.0
+    highest: float = 0.0
+    in_doubt: float = 0.0
+    late: float = 0.0
+    late_toes: float = 0.0
 
 
 class Emptying(NamedTuple):
     """Lowest pressure of chamber 2 since it was joined to the atmosphere [Pa], angle then [rad], how long above [s]."""
 
-    lowest: float
-    angle: float
-    rising: float
+    lowest: float = 0.0
+    angle: float = 0.0
+    rising: float = 0.0
 
-
-AIRBORNE = LandingCheck(lowest=0.0, highest=0.0, in_doubt=0.0, late=0.0, late_toes=0.0)
-NOT_EMPTYING = Emptying(lowest=0.0, angle=0.0, rising=0.0)
-NOTHING_READ = LastReadings(
-    heel_force=0.0,
-    toe_force=0.0,
-    angle=0.0,
-    pressure_1=0.0,
-    pressure_2=0.0,
-    heel_unchanged=0.0,
-    toe_unchanged=0.0,
-    angle_unchanged=0.0,
-    slow_heel=0.0,
-    slow_toe=0.0,
-    slow_angle=0.0,
-)
 
 SLOW_TIME = 0.08
 """Time constant [s] of the slow readings: a step has faded from them when a sensor counts as frozen."""
@@ -285,11 +269,6 @@ def next_readings(
     )
 
 
-def next_thin(last: float, measurement: GaitMeasurement, period: float) -> float:
-    """Time for which the lower pressure has been below ``THIN`` [s]."""
-    return last + period if min(measurement.pressure_1, measurement.pressure_2) < THIN else 0.0
-
-
 def range_flag(rules: SafetyRules, measurement: GaitMeasurement, thin: float) -> float:
     """The fault flag of a reading that no foot and no chamber gives; one is thin for a time [s]."""
     force = max(measurement.heel_force, measurement.toe_force) > rules.largest_force
@@ -300,9 +279,7 @@ def range_flag(rules: SafetyRules, measurement: GaitMeasurement, thin: float) ->
     pressure = min(measurement.pressure_1, measurement.pressure_2) < rules.lowest_pressure
     pressure = pressure | (thin > THIN_TIME) | (measurement.pressure_1 > rules.highest_pressure)
     pressure = pressure | ((measurement.pressure_2 > rules.highest_pressure) & (not squeezed))
-    found = PRESSURE_RANGE if pressure else NO_FLAG
-    found = ANGLE_RANGE if angle else found
-    return FORCE_RANGE if force else found
+    return min(raised(FORCE_RANGE, force), raised(ANGLE_RANGE, angle), raised(PRESSURE_RANGE, pressure))
 
 
 def is_gone(rules: SafetyRules, last: float, force: float) -> bool:
@@ -314,7 +291,7 @@ def gone_flag(rules: SafetyRules, last: LastReadings, measurement: GaitMeasureme
     """The fault flag of a loose contact: a foot takes many samples of ``period`` [s] to leave the ground."""
     gone = is_gone(rules, last.heel_force, measurement.heel_force)
     gone = gone | is_gone(rules, last.toe_force, measurement.toe_force)
-    return FORCE_GONE if gone & (period < QUICK_PERIOD) else NO_FLAG
+    return raised(FORCE_GONE, gone & (period < QUICK_PERIOD))
 
 
 def still_flag(rules: SafetyRules, readings: LastReadings, before: PhaseState, phase: PhaseState) -> float:
@@ -329,12 +306,14 @@ def still_flag(rules: SafetyRules, readings: LastReadings, before: PhaseState, p
     angle = min(readings.angle_unchanged, phase.since_strike) > max(rules.frozen_time, TURNS_BACK * phase.stride_time)
     whole = (before.phase == SWING) & (phase.phase != SWING)
     whole = whole & (before.since_strike > HALF * phase.stride_time) & (before.since_strike < phase.stride_time / HALF)
-    found = STILL_ANGLE if angle & (not lifts(phase.phase)) else NO_FLAG
-    found = STILL_TOE if toe else found
-    found = STILL_HEEL if heel else found
-    found = FROZEN_ANGLE if whole & (readings.angle_unchanged > MOST * before.since_strike) else found
-    found = FROZEN_TOE if toe & (phase.heel.loaded != before.heel.loaded) else found
-    return FROZEN_HEEL if heel & (phase.toe.loaded != before.toe.loaded) else found
+    return min(
+        raised(FROZEN_HEEL, heel & (phase.toe.loaded != before.toe.loaded)),
+        raised(FROZEN_TOE, toe & (phase.heel.loaded != before.heel.loaded)),
+        raised(FROZEN_ANGLE, whole & (readings.angle_unchanged > MOST * before.since_strike)),
+        raised(STILL_HEEL, heel),
+        raised(STILL_TOE, toe),
+        raised(STILL_ANGLE, angle & (not lifts(phase.phase))),
+    )
 
 
 def next_landing(
@@ -388,7 +367,8 @@ def holds_pressure(rules: SafetyRules, pressure: float, expected: float, slow: f
     The ankle compresses the gas of a vented chamber, which then shows that pressure for as long as it flows out.
     """
     # The ankle may compress what is left: only pressure beyond the expected counts.
-    above = pressure - pressure_above(rules.nominal, expected)
+    gauge = max(expected - rules.nominal.nominal_atmospheric_pressure, 0.0)
+    above = pressure - (gauge if rules.nominal.nominal_flow > 0.0 else 0.0)
     return (above > rules.filled_pressure) & (slow <= (1.0 + FALLS) * pressure)
 
 

@@ -28,6 +28,8 @@ class FaultFlag:
 
 
 NO_FLAG = 0.0
+NOT_RAISED = 1.0e3
+"""Number beyond every flag: the least of several checks is the flag that comes first."""
 
 FAULT_FLAGS = {
     (FORCE_RANGE := 1.0): FaultFlag(
@@ -89,11 +91,7 @@ FAULT_FLAGS = {
         SEEN,
     ),
     (LEAK := 11.0): FaultFlag(
-        "leak",
-        STOPPED,
-        "a chamber loses gas that its valve keeps in: a leak, also across the vane",
-        PRESSURES,
-        SEEN,
+        "leak", STOPPED, "a chamber loses gas that its valve keeps in: a leak, also across the vane", PRESSURES, SEEN
     ),
     (PRESSURE_SENSOR := 12.0): FaultFlag(
         "pressure_sensor",
@@ -113,25 +111,13 @@ FAULT_FLAGS = {
         "force_gone", STOPPED, "large force lost within one sample", FORCES, ("largest_drop",)
     ),
     (STILL_HEEL := 17.0): FaultFlag(
-        "still_heel",
-        PAUSED,
-        "force of a loaded heel unchanged while other readings move",
-        FORCES,
-        ("frozen_time",),
+        "still_heel", PAUSED, "force of a loaded heel unchanged while other readings move", FORCES, ("frozen_time",)
     ),
     (STILL_TOE := 18.0): FaultFlag(
-        "still_toe",
-        PAUSED,
-        "force of loaded toes unchanged while other readings move",
-        FORCES,
-        ("frozen_time",),
+        "still_toe", PAUSED, "force of loaded toes unchanged while other readings move", FORCES, ("frozen_time",)
     ),
     (STILL_ANGLE := 19.0): FaultFlag(
-        "still_angle",
-        PAUSED,
-        "angle unchanged in stance while other readings move",
-        ("angle",),
-        ("frozen_time",),
+        "still_angle", PAUSED, "angle unchanged in stance while other readings move", ("angle",), ("frozen_time",)
     ),
     (ENDLESS_PHASE := 20.0): FaultFlag(
         "endless_phase", PAUSED, "swing, heel-only or toe-only contact lasting too long", FORCES, ("longest_phase",)
@@ -154,11 +140,7 @@ FAULT_FLAGS = {
         "short_swing", PAUSED, "swing too short for its stride", FORCES, ("shortest_swing",)
     ),
     (NO_TOE_OFF := 26.0): FaultFlag(
-        "no_toe_off",
-        PAUSED,
-        "stance without toe-off: heel and toe sensors show the same, or are swapped",
-        FORCES,
-        (),
+        "no_toe_off", PAUSED, "stance without toe-off: heel and toe sensors show the same, or are swapped", FORCES, ()
     ),
     (NO_HEEL := 27.0): FaultFlag(
         "no_heel", LIFTS, "no heel load in flat-foot stance", FORCES, ("flat_from", "flat_to")
@@ -188,7 +170,6 @@ def level_of(flag: float) -> float:
     return level if flag > NO_FLAG else HELPS
 
 
-def first_flag(some: float, others: float) -> float:
-    """The flag of two that comes first: one that stops before one that pauses, either before none."""
-    lower = min(some, others)
-    return lower if lower > NO_FLAG else max(some, others)
+def raised(flag: float, is_contradicted: bool) -> float:
+    """A flag where its check is contradicted, else ``NOT_RAISED``: the least of several is the most urgent one."""
+    return flag if is_contradicted else NOT_RAISED

@@ -15,12 +15,12 @@ from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, T
 from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.timing import AT_THRESHOLDS, ThresholdClock, ThresholdRules, TimingParts
+from ppafo.control.walking.timing import AT_THRESHOLDS, TimingParts
 from ppafo.errors import ScenarioError
 from ppafo.model.binding import made_of
 from ppafo.model.controlled import TORQUE
-from ppafo.model.declaration import row_with
-from ppafo.model.sensors import GaitMeasurement
+from ppafo.model.declaration import EmptyRow, row_with
+from ppafo.model.sensors import GaitMeasurement, Measurement
 
 
 class LawParameters(NamedTuple):
@@ -86,7 +86,12 @@ def law_that_walks_update(
     requested = assessment.request.torque
     # Before the update: what the law remembers of another task must not act on this one.
     law = parts.restart(state.law, requested, assessment.continues)
-    sample = assistance.torque_measurement(measurement)
+    sample = Measurement(
+        angle=measurement.angle,
+        pressure_1=measurement.pressure_1,
+        pressure_2=measurement.pressure_2,
+        torque=measurement.torque,
+    )
     command, law = parts.update(parameters.law, law, requested, sample, period)
     command, watch = assistance.valve_command(assessment, command, period)
     following: LawState = parts.state(
@@ -115,8 +120,8 @@ def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
         )
     # One class for each law, named after it: exported C has structs of these names.
     title = "".join(part.capitalize() for part in name.split("_"))
-    parameters = row_with(f"{title}Parameters", LawParameters, law=law.parameters, timing=ThresholdRules)
-    state = row_with(f"{title}State", LawState, law=type(law.initial), clock=ThresholdClock)
+    parameters = row_with(f"{title}Parameters", LawParameters, law=law.parameters, timing=EmptyRow)
+    state = row_with(f"{title}State", LawState, law=type(law.initial), clock=EmptyRow)
     # A law without a state has nothing to begin anew, and its empty NamedTuple no literal in C.
     anew = made_of(restart_anew, f"restart_{name}", InitialStateParts(law.initial)) if len(law.initial) else keep_state
     parts = WalkingParts(timing=AT_THRESHOLDS, state=state, update=law.update, restart=law.restart or anew)
@@ -127,13 +132,7 @@ def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
         source=f"the paper, figure 1A (phases); {law.source}",
         quantities=(*law.quantities, *ASSISTING_QUANTITIES),
         parameters=parameters,
-        initial=state(
-            phase=phases.START,
-            clock=ThresholdClock(),
-            safety=safety.START,
-            request=assistance.START,
-            law=law.initial,
-        ),
+        initial=state(phases.START, EmptyRow(), safety.START, assistance.START, law.initial),
         update=made_of(law_that_walks_update, f"update_{name}", parts),
         restart=None,
         controls=(TORQUE,),

@@ -12,11 +12,11 @@ straight line of arithmetic for all runs at once.
 
 from typing import Annotated, NamedTuple
 
-from ppafo.control.controllers import feedback
-from ppafo.control.controllers.feedback import DampedGains, TorqueSlope, damped_command
+from ppafo.control.controllers import damped_proportional
+from ppafo.control.controllers.damped_proportional import DampedGains, TorqueSlope, damped_command
 from ppafo.control.kind import DEAD_BAND, BelievedBand, ControllerKind
 from ppafo.control.torque_loop import LEAD, LEARNING_GAIN, beyond_dead_band
-from ppafo.control.walking import assistance, phases, safety
+from ppafo.control.walking import assistance
 from ppafo.control.walking.assistance import (
     ASSISTING_QUANTITIES,
     Assistance,
@@ -27,8 +27,8 @@ from ppafo.control.walking.assistance import (
 from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts, ThresholdClock, ThresholdRules
-from ppafo.model.declaration import Number, quantities_of
+from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts
+from ppafo.model.declaration import EmptyRow, Number, quantities_of
 from ppafo.model.helping import PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
 
@@ -41,12 +41,7 @@ class LearningRules(NamedTuple):
     learning_gain: Annotated[
         float,
         Number(
-            "1/(N m)",
-            "command learnt per mean torque error of a stride",
-            None,
-            0.0,
-            1.0e3,
-            follows=(LEARNING_GAIN,),
+            "1/(N m)", "command learnt per mean torque error of a stride", None, 0.0, 1.0e3, follows=(LEARNING_GAIN,)
         ),
     ]
     forgetting: Annotated[float, Number("1", "fraction of what was learnt that a stride forgets", 0.005, 0.0, 1.0)]
@@ -56,13 +51,9 @@ class LearningRules(NamedTuple):
     ]
 
 
-class LearntTable(NamedTuple):
-    """Learnt commands [-] at knots that lie evenly from the beginning to the end of the torque profile."""
-
-    knots: Annotated[tuple[float, ...], KNOTS]
-
-
-EMPTY = LearntTable(knots=(0.0,) * KNOTS)
+Knots = Annotated[tuple[float, ...], KNOTS]
+"""Learnt commands [-] at knots that lie evenly from the beginning to the end of the torque profile."""
+EMPTY = (0.0,) * KNOTS
 
 
 def near(place: float, knot: float) -> float:
@@ -70,26 +61,12 @@ def near(place: float, knot: float) -> float:
     return max(0.0, 1.0 - abs(place - knot))
 
 
-def command_at(table: LearntTable, place: float) -> float:
+def command_at(table: Knots, place: float) -> float:
     """Command [-] at a place counted in knots: straight between knots, 0 outside of the table."""
-    return (
-        table.knots[0] * near(place, 0.0)
-        + table.knots[1] * near(place, 1.0)
-        + table.knots[2] * near(place, 2.0)
-        + table.knots[3] * near(place, 3.0)
-        + table.knots[4] * near(place, 4.0)
-        + table.knots[5] * near(place, 5.0)
-        + table.knots[6] * near(place, 6.0)
-        + table.knots[7] * near(place, 7.0)
-        + table.knots[8] * near(place, 8.0)
-        + table.knots[9] * near(place, 9.0)
-        + table.knots[10] * near(place, 10.0)
-        + table.knots[11] * near(place, 11.0)
-        + table.knots[12] * near(place, 12.0)
-        + table.knots[13] * near(place, 13.0)
-        + table.knots[14] * near(place, 14.0)
-        + table.knots[15] * near(place, 15.0)
-    )
+    command = table[0] * near(place, 0.0)
+    for knot in range(1, KNOTS):
+        command = command + table[knot] * near(place, float(knot))
+    return command
 
 
 def next_knot(knot: float, weight: float, step: float, forgetting: float) -> float:
@@ -106,13 +83,13 @@ def place_in_table(profile: TorqueProfile, since_strike: float, stride_time: flo
 
 def learn(
     rules: LearningRules,
-    table: LearntTable,
+    table: Knots,
     profile: TorqueProfile,
     since_strike: float,
     stride_time: float,
     error: float,
     duration: float,
-) -> LearntTable:
+) -> Knots:
     """The table after a sample with a torque error [N m] that lasted ``duration`` [s], 0 where nothing is learnt.
 
     While a stride passes over a knot, the weights of its samples add up to 1.
@@ -124,30 +101,28 @@ def learn(
     return next_table(table, place, duration / knot_time, rules.learning_gain * error, rules.forgetting)
 
 
-def next_table(table: LearntTable, place: float, weight: float, step: float, forgetting: float) -> LearntTable:
+def next_table(table: Knots, place: float, weight: float, step: float, forgetting: float) -> Knots:
     """The table after a sample at a place, counted in knots.
 
     The two knots beside the place move, each by its part of the sample's ``weight`` [-] and of ``step`` [-].
     """
-    return LearntTable(
-        knots=(
-            next_knot(table.knots[0], near(place, 0.0) * weight, step, forgetting),
-            next_knot(table.knots[1], near(place, 1.0) * weight, step, forgetting),
-            next_knot(table.knots[2], near(place, 2.0) * weight, step, forgetting),
-            next_knot(table.knots[3], near(place, 3.0) * weight, step, forgetting),
-            next_knot(table.knots[4], near(place, 4.0) * weight, step, forgetting),
-            next_knot(table.knots[5], near(place, 5.0) * weight, step, forgetting),
-            next_knot(table.knots[6], near(place, 6.0) * weight, step, forgetting),
-            next_knot(table.knots[7], near(place, 7.0) * weight, step, forgetting),
-            next_knot(table.knots[8], near(place, 8.0) * weight, step, forgetting),
-            next_knot(table.knots[9], near(place, 9.0) * weight, step, forgetting),
-            next_knot(table.knots[10], near(place, 10.0) * weight, step, forgetting),
-            next_knot(table.knots[11], near(place, 11.0) * weight, step, forgetting),
-            next_knot(table.knots[12], near(place, 12.0) * weight, step, forgetting),
-            next_knot(table.knots[13], near(place, 13.0) * weight, step, forgetting),
-            next_knot(table.knots[14], near(place, 14.0) * weight, step, forgetting),
-            next_knot(table.knots[15], near(place, 15.0) * weight, step, forgetting),
-        )
+    return (
+        next_knot(table[0], near(place, 0.0) * weight, step, forgetting),
+        next_knot(table[1], near(place, 1.0) * weight, step, forgetting),
+        next_knot(table[2], near(place, 2.0) * weight, step, forgetting),
+        next_knot(table[3], near(place, 3.0) * weight, step, forgetting),
+        next_knot(table[4], near(place, 4.0) * weight, step, forgetting),
+        next_knot(table[5], near(place, 5.0) * weight, step, forgetting),
+        next_knot(table[6], near(place, 6.0) * weight, step, forgetting),
+        next_knot(table[7], near(place, 7.0) * weight, step, forgetting),
+        next_knot(table[8], near(place, 8.0) * weight, step, forgetting),
+        next_knot(table[9], near(place, 9.0) * weight, step, forgetting),
+        next_knot(table[10], near(place, 10.0) * weight, step, forgetting),
+        next_knot(table[11], near(place, 11.0) * weight, step, forgetting),
+        next_knot(table[12], near(place, 12.0) * weight, step, forgetting),
+        next_knot(table[13], near(place, 13.0) * weight, step, forgetting),
+        next_knot(table[14], near(place, 14.0) * weight, step, forgetting),
+        next_knot(table[15], near(place, 15.0) * weight, step, forgetting),
     )
 
 
@@ -160,18 +135,18 @@ class EventDampedLearningParameters(NamedTuple):
     assistance: Assistance
     phases: PhaseRules
     safety: SafetyRules
-    timing: ThresholdRules
+    timing: EmptyRow
 
 
 class EventDampedLearningState(NamedTuple):
     """Phase, clock, safety, the requested torque, the torque's course, and what was learnt."""
 
-    phase: PhaseState
-    clock: ThresholdClock
-    safety: SafetyState
-    request: TorqueRequest
-    law: TorqueSlope
-    table: LearntTable
+    phase: PhaseState = PhaseState()
+    clock: EmptyRow = EmptyRow()
+    safety: SafetyState = SafetyState()
+    request: TorqueRequest = TorqueRequest()
+    law: TorqueSlope = TorqueSlope()
+    table: Knots = EMPTY
 
 
 USUAL_CLOCK = ClockParts(AT_THRESHOLDS, EventDampedLearningState)
@@ -223,21 +198,14 @@ def update(
 KIND = ControllerKind(
     name="event_damped_learning",
     summary="Event-based torque profiles for each phase, tracked by damped control that learns the push-off.",
-    source=f"the paper, figure 1A (phases); {feedback.DAMPED_PROPORTIONAL.source}",
+    source=f"the paper, figure 1A (phases); {damped_proportional.DAMPED_PROPORTIONAL.source}",
     quantities=(
-        *feedback.GAIN_QUANTITIES,
+        *damped_proportional.GAIN_QUANTITIES,
         *quantities_of(LearningRules),
         DEAD_BAND,
         *ASSISTING_QUANTITIES,
     ),
     parameters=EventDampedLearningParameters,
-    initial=EventDampedLearningState(
-        phase=phases.START,
-        clock=ThresholdClock(),
-        safety=safety.START,
-        request=assistance.START,
-        law=TorqueSlope(0.0, 0.0, 0.0),
-        table=EMPTY,
-    ),
+    initial=EventDampedLearningState(),
     update=update,
 )

@@ -14,12 +14,12 @@ Every number is a setting whose default follows the device; ``nominal_flow`` 0 s
 """
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from ppafo.control.kind import NOMINAL, PRESSURE_LAG
+from ppafo.control.kind import PRESSURE_LAG, nominal_term
 from ppafo.control.walking.fault_flags import (
     LEAK,
-    NO_FLAG,
+    NOT_RAISED,
     SUPPLY_HIGH,
     SUPPLY_LOST,
     SUPPLY_LOW,
@@ -29,6 +29,26 @@ from ppafo.control.walking.fault_flags import (
 from ppafo.model.declaration import Quantity
 from ppafo.model.regulator import LineState, SupplyLines, step_lines
 from ppafo.model.valves.kind import VENTS_ABOVE
+
+_CHAMBERS = {
+    "displacement_per_radian": "chamber_growth",
+    "dead_volume_1": "chamber_rest_1",
+    "dead_volume_2": "chamber_rest_2",
+}
+"""Settings of both chambers for the observer; a torque law knows a vane by its mean chamber only."""
+
+
+def _nominal(name: str, unit: str, summary: str, maximum: float, lowest: float = 0.0) -> Quantity:
+    follows = (PRESSURE_LAG,) if name == "sensor_lag" else (nominal_term(_CHAMBERS.get(name, name)),)
+    return Quantity(
+        f"nominal_{name}", unit, f"{summary}; the device's unless given", 0.0, lowest, maximum, follows=follows
+    )
+
+
+_FLOW = "R T times the conductance of the valve, which the observer of the chambers believes; 0 switches it off"
+_PAIR = "1 for a pair of on/off valves, 0 for a spool with a vent valve"
+_INTERVAL = "shortest time between two switchings of a coil"
+_JOINING = "time for which the chambers are joined after chamber 1 was fed"
 
 
 class NominalDevice(NamedTuple):
@@ -42,74 +62,40 @@ class NominalDevice(NamedTuple):
     as its content p V [J]; a volume of 0 stands for a supply that needs none.
     """
 
-    nominal_flow: float
-    nominal_critical_ratio: float
-    nominal_supply_pressure: float
-    nominal_dorsiflexion_pressure: float
-    nominal_atmospheric_pressure: float
-    nominal_relieving: float
-    nominal_displacement_per_radian: float
-    nominal_dead_volume_1: float
-    nominal_dead_volume_2: float
-    nominal_angle_min: float
-    nominal_angle_max: float
-    nominal_pair: float
-    nominal_opening_delay: float
-    nominal_closing_delay: float
-    nominal_switching_interval: float
-    nominal_delay: float
-    nominal_lag: float
-    nominal_dead_band: float
-    nominal_joining_time: float
-    nominal_sensor_lag: float
+    nominal_flow: Annotated[float, _nominal("flow", "m^3/s", _FLOW, 1.0)]
+    nominal_critical_ratio: Annotated[
+        float, _nominal("critical_ratio", "", "critical pressure ratio of the valve", 0.95)
+    ]
+    nominal_supply_pressure: Annotated[float, _nominal("supply_pressure", "Pa_a", "pressure to chamber 1", 1.0e8)]
+    nominal_dorsiflexion_pressure: Annotated[
+        float, _nominal("dorsiflexion_pressure", "Pa_a", "pressure to chamber 2", 1.0e8)
+    ]
+    nominal_atmospheric_pressure: Annotated[
+        float, _nominal("atmospheric_pressure", "Pa_a", "pressure of the atmosphere", 1.0e8)
+    ]
+    nominal_relieving: Annotated[float, _nominal("relieving", "", "1 where the supplies take gas back", 1.0)]
+    nominal_displacement_per_radian: Annotated[
+        float, _nominal("displacement_per_radian", "m^3/rad", "mean growth of chamber 1 with the angle", 1.0)
+    ]
+    nominal_dead_volume_1: Annotated[float, _nominal("dead_volume_1", "m^3", "dead volume of chamber 1", 1.0)]
+    nominal_dead_volume_2: Annotated[float, _nominal("dead_volume_2", "m^3", "dead volume of chamber 2", 1.0)]
+    nominal_angle_min: Annotated[float, _nominal("angle_min", "rad", "lower stop", 10.0, -10.0)]
+    nominal_angle_max: Annotated[float, _nominal("angle_max", "rad", "upper stop", 10.0, -10.0)]
+    nominal_pair: Annotated[float, _nominal("pair", "", _PAIR, 1.0)]
+    nominal_opening_delay: Annotated[float, _nominal("opening_delay", "s", "time from energising a coil to flow", 1.0)]
+    nominal_closing_delay: Annotated[
+        float, _nominal("closing_delay", "s", "time from de-energising it to venting", 1.0)
+    ]
+    nominal_switching_interval: Annotated[float, _nominal("switching_interval", "s", _INTERVAL, 1.0)]
+    nominal_delay: Annotated[float, _nominal("delay", "s", "dead time of a spool", 1.0)]
+    nominal_lag: Annotated[float, _nominal("lag", "s", "time after which a spool has followed", 1.0)]
+    nominal_dead_band: Annotated[float, _nominal("dead_band", "", "smallest command that opens a spool", 0.99)]
+    nominal_joining_time: Annotated[float, _nominal("joining_time", "s", _JOINING, 10.0)]
+    nominal_sensor_lag: Annotated[float, _nominal("sensor_lag", "s", "lag of the pressure sensors", 1.0e3)]
     nominal_lines: SupplyLines
 
 
-_CHAMBERS = {
-    "displacement_per_radian": "chamber_growth",
-    "dead_volume_1": "chamber_rest_1",
-    "dead_volume_2": "chamber_rest_2",
-}
-"""Settings of both chambers for the observer; a torque law knows a vane by its mean chamber only."""
-
-
-def _nominal(name: str, unit: str, summary: str, maximum: float, lowest: float = 0.0) -> Quantity:
-    follows = (PRESSURE_LAG,) if name == "sensor_lag" else (NOMINAL[_CHAMBERS.get(name, name)],)
-    return Quantity(
-        f"nominal_{name}", unit, f"{summary}; the device's unless given", 0.0, lowest, maximum, follows=follows
-    )
-
-
-NOMINAL_QUANTITIES = (
-    Quantity(
-        "nominal_flow",
-        "m^3/s",
-        "R T times the conductance of the valve, which the observer of the chambers believes; 0 switches it off; "
-        "the device's unless given",
-        0.0,
-        0.0,
-        1.0,
-        follows=(NOMINAL["flow"],),
-    ),
-    _nominal("critical_ratio", "", "critical pressure ratio of the valve", 0.95),
-    _nominal("supply_pressure", "Pa_a", "pressure to chamber 1", 1.0e8),
-    _nominal("dorsiflexion_pressure", "Pa_a", "pressure to chamber 2", 1.0e8),
-    _nominal("atmospheric_pressure", "Pa_a", "pressure of the atmosphere", 1.0e8),
-    _nominal("relieving", "", "1 where the supplies take gas back", 1.0),
-    _nominal("displacement_per_radian", "m^3/rad", "mean growth of chamber 1 with the angle", 1.0),
-    _nominal("dead_volume_1", "m^3", "dead volume of chamber 1", 1.0),
-    _nominal("dead_volume_2", "m^3", "dead volume of chamber 2", 1.0),
-    _nominal("angle_min", "rad", "lower stop", 10.0, -10.0),
-    _nominal("angle_max", "rad", "upper stop", 10.0, -10.0),
-    _nominal("pair", "", "1 for a pair of on/off valves, 0 for a spool with a vent valve", 1.0),
-    _nominal("opening_delay", "s", "time from energising a coil to flow", 1.0),
-    _nominal("closing_delay", "s", "time from de-energising it to venting", 1.0),
-    _nominal("switching_interval", "s", "shortest time between two switchings of a coil", 1.0),
-    _nominal("delay", "s", "dead time of a spool", 1.0),
-    _nominal("lag", "s", "time after which a spool has followed", 1.0),
-    _nominal("dead_band", "", "smallest command that opens a spool", 0.99),
-    _nominal("joining_time", "s", "time for which the chambers are joined after chamber 1 was fed", 10.0),
-    _nominal("sensor_lag", "s", "lag of the pressure sensors", 1.0e3),
+LINE_QUANTITIES = (
     *(
         _nominal(f"line_{name}_{line}", unit, f"{what} of line {line}", most)
         for line in (1, 2)
@@ -121,24 +107,28 @@ NOMINAL_QUANTITIES = (
     ),
     _nominal("line_relieving", "", "1 where gas flows back through the regulators", 1.0),
 )
-"""Fields of ``NominalDevice``, in order."""
+"""Fields of ``nominal_lines``, in order."""
+
+
+LONG_AGO = 1.0e9
+"""Time [s] since the command of a coil that was switched off before the start."""
 
 
 class ObservedValve(NamedTuple):
     """On/off valve: present flow (0 or 1), commanded flow, time since the command, and switching time [s]."""
 
-    position: float
-    target: float
-    since: float
-    waits: float
+    position: float = 0.0
+    target: float = 0.0
+    since: float = LONG_AGO
+    waits: float = 0.0
 
 
 class CommandInTransit(NamedTuple):
     """A command on its way to a spool or a vent valve [-], a third of the dead time behind it each."""
 
-    first: float
-    second: float
-    third: float
+    first: float = 0.0
+    second: float = 0.0
+    third: float = 0.0
 
 
 class ObservedChamber(NamedTuple):
@@ -148,11 +138,11 @@ class ObservedChamber(NamedTuple):
     longer: the lowest of many noisy readings would show gas that never came.
     """
 
-    content: float
-    pressure: float
-    passed: float
-    contrary: float
-    least: float
+    content: float = 0.0
+    pressure: float = 0.0
+    passed: float = 0.0
+    contrary: float = 0.0
+    least: float = 0.0
 
 
 class Observer(NamedTuple):
@@ -161,34 +151,19 @@ class Observer(NamedTuple):
     ``lines`` are the gas contents [J] of the lines behind regulators.
     """
 
-    chamber_1: ObservedChamber
-    chamber_2: ObservedChamber
-    command: float
-    coil_1: ObservedValve
-    coil_2: ObservedValve
-    on_the_way: CommandInTransit
-    venting: CommandInTransit
-    spool: float
-    joined: float
-    lines: LineState
+    chamber_1: ObservedChamber = ObservedChamber()
+    chamber_2: ObservedChamber = ObservedChamber()
+    command: float = 2.0
+    coil_1: ObservedValve = ObservedValve()
+    coil_2: ObservedValve = ObservedValve()
+    on_the_way: CommandInTransit = CommandInTransit()
+    venting: CommandInTransit = CommandInTransit(1.0, 1.0, 1.0)
+    spool: float = 0.0
+    joined: float = 0.0
+    lines: LineState = LineState(0.0, 0.0, 0.0)
 
 
-LONG_AGO = 1.0e9
-_EMPTY = ObservedChamber(content=0.0, pressure=0.0, passed=0.0, contrary=0.0, least=0.0)
-_OFF = ObservedValve(position=0.0, target=0.0, since=LONG_AGO, waits=0.0)
-_FULL = LineState(mass_1=0.0, mass_2=0.0, regulated_mass=0.0)
-START = Observer(
-    _EMPTY,
-    _EMPTY,
-    command=2.0,
-    coil_1=_OFF,
-    coil_2=_OFF,
-    on_the_way=CommandInTransit(first=0.0, second=0.0, third=0.0),
-    venting=CommandInTransit(first=1.0, second=1.0, third=1.0),
-    spool=0.0,
-    joined=0.0,
-    lines=_FULL,
-)
+START = Observer()
 
 FORGETS = 0.128
 """Time [s] in which contents follow what is measured, and gas that has passed is forgotten."""
@@ -221,24 +196,18 @@ SAME = 1.0e-6
 """Times [s] closer to each other than this are one."""
 
 
-def flow_share(nominal: NominalDevice, ratio: float) -> float:
-    """Flow over choked flow [-], 0 to 1, at a pressure ratio r; b is the critical one. ISO 6358-1:2013.
-
-    psi(r) = sqrt(1 - ((r - b) / (1 - b))^2), 1 below b, and a straight line to 0 at r = 1 above ``LINEAR_RATIO``.
-    """
-    critical = nominal.nominal_critical_ratio
-    # Nearly equal pressures take the straight line, as the model's own flow does.
-    place = (min(max(ratio, critical), LINEAR_RATIO) - critical) / (1.0 - critical)
-    return math.sqrt(1.0 - place * place) * min((1.0 - ratio) / (1.0 - LINEAR_RATIO), 1.0)
-
-
 def flow_into(nominal: NominalDevice, pressure: float, node: float, is_relieving: float) -> float:
     """Content [J/s] that enters a chamber at ``pressure`` from a node [Pa] through the open valve; below 0 it leaves.
 
-    No gas flows back into a node with ``is_relieving`` 0. Equations (6), (7).
+    No gas flows back into a node with ``is_relieving`` 0. Equations (6), (7), with the flow function of ISO 6358-1:2013
+    at a pressure ratio r and the critical one b: psi(r) = sqrt(1 - ((r - b) / (1 - b))^2), 1 below b, and a straight
+    line to 0 at r = 1 above ``LINEAR_RATIO``.
     """
     upstream = max(pressure, node)
-    share = flow_share(nominal, min(pressure, node) / upstream)
+    ratio, critical = min(pressure, node) / upstream, nominal.nominal_critical_ratio
+    # Nearly equal pressures take the straight line, as the model's own flow does.
+    place = (min(max(ratio, critical), LINEAR_RATIO) - critical) / (1.0 - critical)
+    share = math.sqrt(1.0 - place * place) * min((1.0 - ratio) / (1.0 - LINEAR_RATIO), 1.0)
     return nominal.nominal_flow * upstream * share * (1.0 if node >= pressure else -is_relieving)
 
 
@@ -271,55 +240,6 @@ def next_on_the_way(
     return CommandInTransit(first=first, second=second, third=on_the_way.third + (second - on_the_way.third) * share)
 
 
-def opening_of(nominal: NominalDevice, command: float) -> float:
-    """Opening of a spool [-], -1 to 1, that a command asks for; it rests in the middle while all vents."""
-    size = max(min(abs(command), 1.0) - nominal.nominal_dead_band, 0.0) / (1.0 - nominal.nominal_dead_band)
-    return 0.0 if command > VENTS_ABOVE else (size if command >= 0.0 else -size)
-
-
-def next_spool(nominal: NominalDevice, spool: float, target: float, period: float) -> float:
-    """Opening of a spool [-], -1 to 1, after a sample [s] in which it is asked for a ``target``."""
-    return spool + (target - spool) * period / (period + nominal.nominal_lag)
-
-
-def passed_chamber(
-    nominal: NominalDevice,
-    chamber: ObservedChamber,
-    volume: float,
-    measured: float,
-    source: float,
-    vent: float,
-    supply: float,
-    was_fed: bool,
-    period: float,
-) -> tuple[ObservedChamber, float]:
-    """A chamber after a sample [s] in which it had a volume [m^3] and a reading [Pa], and was open to two nodes.
-
-    ``source`` and ``vent`` [-] are the openings to a supply [Pa] and to the atmosphere; ``was_fed`` before. And what it
-    took from the supply [J].
-    """
-    room = nominal.nominal_atmospheric_pressure
-    held = chamber.content / volume
-    # At the expected pressure, not the measured one: an offset of the sensor would add up in the flow.
-    entered = source * flow_into(nominal, held, supply, nominal.nominal_relieving) + vent * flow_into(
-        nominal, held, room, 1.0
-    )
-    # In one sample no flow leads beyond the pressures between which it runs.
-    low, high = min(held, room if vent > 0.0 else supply), max(held, supply if source > 0.0 else room)
-    added = max((low - held) * volume, min((high - held) * volume, WARM * period * entered))
-    share = period / FORGETS
-    # What was before a change of the connection belongs to another cause.
-    turns = (source > vent) != was_fed
-    lowest = chamber.least if was_fed else min(chamber.least, measured * volume)
-    return ObservedChamber(
-        content=chamber.content + added,
-        pressure=chamber.pressure,
-        passed=chamber.passed + abs(added) - share * chamber.passed,
-        contrary=chamber.contrary,
-        least=measured * volume if turns else lowest,
-    ), added if source > vent else 0.0
-
-
 def contradiction(
     nominal: NominalDevice,
     passed: float,
@@ -344,36 +264,58 @@ def contradiction(
     return max(share, overfull) if fed & (measured > expected) else share
 
 
-def met_chamber(
+def next_chamber(
     nominal: NominalDevice,
     chamber: ObservedChamber,
+    source: float,
+    vent: float,
+    was_fed: bool,
+    supply: float,
+    set_pressure: float,
+    last_volume: float,
+    last_measured: float,
     volume: float,
     mean_volume: float,
     measured: float,
-    fed: bool,
-    supply: float,
     blind: bool,
     period: float,
-) -> ObservedChamber:
-    """A chamber after a reading [Pa] in its volume [m^3]: residual, how long it has contradicted, what it teaches.
+) -> tuple[ObservedChamber, float]:
+    """A chamber after a sample [s], by the gas that passes and then by a reading [Pa]; and what it took [J].
 
-    ``supply`` [Pa] is the pressure that feeds it where it is ``fed``.
-    ``blind`` is True where the content is taken from the sensor: at first, and while the chambers are joined.
+    ``source`` and ``vent`` [-] are the openings to a supply with a pressure [Pa], ``set_pressure`` by its regulator,
+    and to the atmosphere; ``was_fed`` before. Volumes [m^3] are those of the last reading [Pa] and of this one, and the
+    mean one. ``blind`` is True where the content is taken from the sensor: at first, and while the chambers are joined.
     """
-    content = measured * volume if blind else chamber.content
-    held = content / volume
+    room = nominal.nominal_atmospheric_pressure
+    before = chamber.content / last_volume
+    # At the expected pressure, not the measured one: an offset of the sensor would add up in the flow.
+    entered = source * flow_into(nominal, before, supply, nominal.nominal_relieving) + vent * flow_into(
+        nominal, before, room, 1.0
+    )
+    # In one sample no flow leads beyond the pressures between which it runs.
+    low, high = min(before, room if vent > 0.0 else supply), max(before, supply if source > 0.0 else room)
+    added = max((low - before) * last_volume, min((high - before) * last_volume, WARM * period * entered))
+    share = period / FORGETS
+    passed = chamber.passed + abs(added) - share * chamber.passed
+    # What was before a change of the connection belongs to another cause.
+    turns = (source > vent) != was_fed
+    lowest = chamber.least if was_fed else min(chamber.least, last_measured * last_volume)
+    least = last_measured * last_volume if turns else lowest
+
+    content = measured * volume if blind else chamber.content + added
     lag = nominal.nominal_sensor_lag
-    expected = measured if blind else chamber.pressure + (held - chamber.pressure) * period / (period + lag)
+    followed = chamber.pressure + (content / volume - chamber.pressure) * period / (period + lag)
+    expected = measured if blind else followed
     # As gas content: what no movement of the ankle changes.
     residual = (measured - expected) * volume
-    share = contradiction(nominal, chamber.passed, volume, mean_volume, measured, expected, fed, supply)
+    excess = contradiction(nominal, passed, volume, mean_volume, measured, expected, was_fed, set_pressure)
     return ObservedChamber(
-        content=max(content + residual * min(period / FORGETS, 1.0), 0.0),
+        content=max(content + residual * min(share, 1.0), 0.0),
         pressure=expected,
-        passed=0.0 if blind else chamber.passed,
-        contrary=chamber.contrary + period if abs(share) > 1.0 else 0.0,
-        least=measured * volume if blind else chamber.least,
-    )
+        passed=0.0 if blind else passed,
+        contrary=chamber.contrary + period if abs(excess) > 1.0 else 0.0,
+        least=measured * volume if blind else least,
+    ), added if source > vent else 0.0
 
 
 def volumes(nominal: NominalDevice, angle: float) -> tuple[float, float]:
@@ -419,49 +361,70 @@ def next_observer(
     if nominal.nominal_flow <= 0.0:
         return state
     command, begins = state.command, state.chamber_1.content <= 0.0
-    vents = command > VENTS_ABOVE
+    vents, is_pair = command > VENTS_ABOVE, nominal.nominal_pair > 0.5
     coil_1, on_1 = next_coil(nominal, state.coil_1, 1.0 if (command > 0.0) & (not vents) else 0.0, period)
     coil_2, on_2 = next_coil(nominal, state.coil_2, 1.0 if command < 0.0 else 0.0, period)
-    on_the_way = next_on_the_way(nominal, state.on_the_way, opening_of(nominal, command), period)
+    # A spool opens beyond its dead band, and rests in the middle while all vents.
+    size = max(min(abs(command), 1.0) - nominal.nominal_dead_band, 0.0) / (1.0 - nominal.nominal_dead_band)
+    target = 0.0 if vents else (size if command >= 0.0 else -size)
+    on_the_way = next_on_the_way(nominal, state.on_the_way, target, period)
     venting = next_on_the_way(nominal, state.venting, 1.0 if vents else 0.0, period)
-    spool, is_pair = next_spool(nominal, state.spool, on_the_way.third, period), nominal.nominal_pair > 0.5
+    spool = state.spool + (on_the_way.third - state.spool) * period / (period + nominal.nominal_lag)
     towards_1, towards_2 = max(spool, 0.0), max(-spool, 0.0)
     # A pair feeds by its coils' mean positions, a spool by its opening to either side.
     source_1, source_2 = on_1 if is_pair else towards_1, on_2 if is_pair else towards_2
     vent_1 = 1.0 - on_1 if is_pair else max(venting.third, towards_2)
     vent_2 = 1.0 - on_2 if is_pair else max(venting.third, towards_1)
     fed_1, fed_2 = is_fed(nominal, state.coil_1, state.spool), is_fed(nominal, state.coil_2, -state.spool)
-    left = max(state.joined - period, 0.0)
     # The joining time counts from when the coil of chamber 1 lets go.
-    joined = nominal.nominal_joining_time if coil_1.position > 0.5 else left
-    # The flow is reckoned in the volume before the sample, the reading in the volume after it.
-    before_1, before_2 = believed_volumes(nominal, last_angle, last_1, last_2)
-    now_1, now_2 = believed_volumes(nominal, angle, pressure_1, pressure_2)
-    # At the start the lines are at the set pressures of their regulators.
-    lines = (
-        LineState(
-            mass_1=nominal.nominal_supply_pressure * nominal.nominal_lines.volume_1,
-            mass_2=nominal.nominal_dorsiflexion_pressure * nominal.nominal_lines.volume_2,
-            regulated_mass=0.0,
-        )
-        if begins
-        else state.lines
-    )
-    to_1, to_2 = supplied(nominal, lines)
-    # No line has more than its regulator gives, whatever it has lost on the way.
-    set_1, set_2 = nominal.nominal_supply_pressure, nominal.nominal_dorsiflexion_pressure
-    mean_1, mean_2 = mean_volumes(nominal, pressure_1, pressure_2)
+    joined = nominal.nominal_joining_time if coil_1.position > 0.5 else max(state.joined - period, 0.0)
     # While the chambers are joined, gas passes that no nominal flow describes.
     blind = begins | ((joined > 0.0) & (coil_1.position < 0.5))
-    passed_1, taken_1 = passed_chamber(
-        nominal, state.chamber_1, before_1, last_1, source_1, vent_1, to_1, fed_1, period
+    # The flow is reckoned in the volume before the sample, the reading in the volume after it.
+    was_1, was_2 = believed_volumes(nominal, last_angle, last_1, last_2)
+    now_1, now_2 = believed_volumes(nominal, angle, pressure_1, pressure_2)
+    mean_1, mean_2 = mean_volumes(nominal, pressure_1, pressure_2)
+    # No line has more than its regulator gives, whatever it has lost on the way; at the start it has that.
+    set_1, set_2 = nominal.nominal_supply_pressure, nominal.nominal_dorsiflexion_pressure
+    given = nominal.nominal_lines
+    full = LineState(mass_1=set_1 * given.volume_1, mass_2=set_2 * given.volume_2, regulated_mass=0.0)
+    lines = full if begins else state.lines
+    to_1, to_2 = supplied(nominal, lines)
+    chamber_1, taken_1 = next_chamber(
+        nominal,
+        state.chamber_1,
+        source_1,
+        vent_1,
+        fed_1,
+        to_1,
+        set_1,
+        was_1,
+        last_1,
+        now_1,
+        mean_1,
+        pressure_1,
+        blind,
+        period,
     )
-    passed_2, taken_2 = passed_chamber(
-        nominal, state.chamber_2, before_2, last_2, source_2, vent_2, to_2, fed_2, period
+    chamber_2, taken_2 = next_chamber(
+        nominal,
+        state.chamber_2,
+        source_2,
+        vent_2,
+        fed_2,
+        to_2,
+        set_2,
+        was_2,
+        last_2,
+        now_2,
+        mean_2,
+        pressure_2,
+        blind,
+        period,
     )
     return Observer(
-        chamber_1=met_chamber(nominal, passed_1, now_1, mean_1, pressure_1, fed_1, set_1, blind, period),
-        chamber_2=met_chamber(nominal, passed_2, now_2, mean_2, pressure_2, fed_2, set_2, blind, period),
+        chamber_1=chamber_1,
+        chamber_2=chamber_2,
         command=command,
         coil_1=coil_1,
         coil_2=coil_2,
@@ -516,14 +479,6 @@ def is_fed(nominal: NominalDevice, coil: ObservedValve, spool: float) -> bool:
     return (coil.position > 0.5) if nominal.nominal_pair > 0.5 else (spool > 0.0)
 
 
-def is_vented(nominal: NominalDevice, coil: ObservedValve, spool: float, venting: float) -> bool:
-    """True where a valve is believed to vent its chamber; ``spool`` [-] is above 0 towards it.
-
-    ``venting`` [-] is how far the vent valve is believed to be open.
-    """
-    return (coil.position < 0.5) if nominal.nominal_pair > 0.5 else ((venting > 0.5) | (spool < 0.0))
-
-
 SHOWS_GAS = 0.05
 """Part of the gas that has passed by which a content must have grown to show that some came: half of what a tenth of
 the flow gives, and several times what a hose that is open to the atmosphere shows."""
@@ -544,15 +499,19 @@ def cause_of(
     volume: float,
     measured: float,
     supply: float,
-    fed: bool,
-    vented: bool,
+    coil: ObservedValve,
+    spool: float,
+    venting: float,
     lost_beside: float,
     period: float,
 ) -> float:
-    """The flag of a chamber with a reading [Pa] in its volume [m^3], fed from a supply [Pa] or vented; 0 for none.
+    """The flag of a chamber with a reading [Pa] in its volume [m^3] and a supply [Pa]; ``NOT_RAISED`` for none.
 
+    ``coil``, ``spool`` [-], above 0 towards the chamber, and ``venting`` [-] are its valves as they are believed.
     ``lost_beside`` [J] is by how much the other chamber, if gas came to it, has less than expected.
     """
+    fed = is_fed(nominal, coil, spool)
+    vented = (coil.position < 0.5) if nominal.nominal_pair > 0.5 else ((venting > 0.5) | (spool < 0.0))
     # In samples too: at a slow rate 5 ms would be a single noisy reading.
     alarm = chamber.contrary > max(ALARM_TIME, ALARM_SAMPLES * period) - SAME
     gained = (measured - chamber.pressure) * volume
@@ -567,27 +526,23 @@ def cause_of(
     found = in_fill if fed else (in_vent if vented else closed)
     # What a chamber without a source gains has come across the vane where the other one lost as much of what came.
     across = gains & (not fed) & (lost_beside > gained)
-    return (LEAK if across else found) if alarm else NO_FLAG
+    return (LEAK if across else found) if alarm else NOT_RAISED
 
 
 def found_cause(
     nominal: NominalDevice, state: Observer, angle: float, pressure_1: float, pressure_2: float, period: float
 ) -> float:
-    """The flag of a sample [s] with an angle [rad] and absolute pressures [Pa]; ``NO_FLAG`` where there is none."""
+    """The flag of a sample [s] with an angle [rad] and absolute pressures [Pa], of chamber 1 before chamber 2.
+
+    ``NOT_RAISED`` where there is none.
+    """
     if nominal.nominal_flow <= 0.0:
-        return NO_FLAG
+        return NOT_RAISED
     now_1, now_2 = believed_volumes(nominal, angle, pressure_1, pressure_2)
-    fed_1, fed_2 = is_fed(nominal, state.coil_1, state.spool), is_fed(nominal, state.coil_2, -state.spool)
-    vented_1 = is_vented(nominal, state.coil_1, state.spool, state.venting.third)
-    vented_2 = is_vented(nominal, state.coil_2, -state.spool, state.venting.third)
     to_1, to_2 = supplied(nominal, state.lines)
     lost_1 = (state.chamber_1.pressure - pressure_1) * now_1 if has_gas(state.chamber_1, now_1, pressure_1) else 0.0
     lost_2 = (state.chamber_2.pressure - pressure_2) * now_2 if has_gas(state.chamber_2, now_2, pressure_2) else 0.0
-    first = cause_of(nominal, state.chamber_1, now_1, pressure_1, to_1, fed_1, vented_1, lost_2, period)
-    second = cause_of(nominal, state.chamber_2, now_2, pressure_2, to_2, fed_2, vented_2, lost_1, period)
-    return first if first > NO_FLAG else second
-
-
-def pressure_above(nominal: NominalDevice, expected: float) -> float:
-    """Largest expected gauge pressure of a chamber [Pa], by its expected gas; 0 when off."""
-    return max(expected - nominal.nominal_atmospheric_pressure, 0.0) if nominal.nominal_flow > 0.0 else 0.0
+    spool, venting = state.spool, state.venting.third
+    first = cause_of(nominal, state.chamber_1, now_1, pressure_1, to_1, state.coil_1, spool, venting, lost_2, period)
+    second = cause_of(nominal, state.chamber_2, now_2, pressure_2, to_2, state.coil_2, -spool, venting, lost_1, period)
+    return first if first < NOT_RAISED else second

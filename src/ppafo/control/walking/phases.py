@@ -27,31 +27,23 @@ class PhaseRules(NamedTuple):
 class DebouncedSensor(NamedTuple):
     """A debounced force sensor: loaded (1) or not (0), and how long it has contradicted that [s]."""
 
-    loaded: float
-    contradicted: float
+    loaded: float = 0.0
+    contradicted: float = 0.0
 
 
 class PhaseState(NamedTuple):
     """Phase, both switches, time in the phase and since the last heel strike [s], stride time [s], strikes seen."""
 
-    phase: float
-    heel: DebouncedSensor
-    toe: DebouncedSensor
-    in_phase: float
-    since_strike: float
-    stride_time: float
-    strikes: float
+    phase: float = SWING
+    heel: DebouncedSensor = DebouncedSensor()
+    toe: DebouncedSensor = DebouncedSensor()
+    in_phase: float = 0.0
+    since_strike: float = 0.0
+    stride_time: float = 0.0
+    strikes: float = 0.0
 
 
-START = PhaseState(
-    phase=SWING,
-    heel=DebouncedSensor(0.0, 0.0),
-    toe=DebouncedSensor(0.0, 0.0),
-    in_phase=0.0,
-    since_strike=0.0,
-    stride_time=0.0,
-    strikes=0.0,
-)
+START = PhaseState()
 
 
 def lifts(phase: float) -> bool:

@@ -16,6 +16,7 @@ Flags are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep
 from typing import NamedTuple
 
 from ppafo.control.walking import fault_checks, fault_flags, observer
+from ppafo.control.walking.fault_flags import NOT_RAISED, raised
 from ppafo.control.walking.observer import Observer
 from ppafo.control.walking.phases import PhaseState
 from ppafo.model.helping import HELPS, LANDING, LIFTS, MID_STANCE, PAUSED, PUSH_OFF, STOPPED, SWING
@@ -26,9 +27,9 @@ from ppafo.model.valves.kind import VENT, VENTS_ABOVE
 class ValveTimes(NamedTuple):
     """Times for which the valve is commanded to fill chambers 1 and 2, weighted by opening, and to vent both [s]."""
 
-    filling_1: float
-    filling_2: float
-    venting: float
+    filling_1: float = 0.0
+    filling_2: float = 0.0
+    venting: float = 0.0
 
 
 class Stance(NamedTuple):
@@ -40,10 +41,10 @@ class Stance(NamedTuple):
     longer does, which tells both sensors from each other, until the foot stands flat again.
     """
 
-    heel_seen: float
-    toe_seen: float
-    together: float
-    apart: float
+    heel_seen: float = 0.0
+    toe_seen: float = 0.0
+    together: float = 0.0
+    apart: float = 0.0
     flat_angle: float = 0.0
     turned: float = 0.0
     largest: float = 0.0
@@ -53,12 +54,12 @@ class Stance(NamedTuple):
 class VentingFault(NamedTuple):
     """The last fault flag that vented the chambers, and the readings then: forces [N], angle [rad], pressures [Pa]."""
 
-    fault_flag: float
-    heel_force: float
-    toe_force: float
-    angle: float
-    pressure_1: float
-    pressure_2: float
+    fault_flag: float = fault_flags.NO_FLAG
+    heel_force: float = 0.0
+    toe_force: float = 0.0
+    angle: float = 0.0
+    pressure_1: float = 0.0
+    pressure_2: float = 0.0
 
 
 class SafetyState(NamedTuple):
@@ -69,42 +70,24 @@ class SafetyState(NamedTuple):
     both has been below the pressure of a chamber at rest.
     """
 
-    level: float
-    good_strides: float
-    ventings: float
-    finding: VentingFault
-    readings: fault_checks.LastReadings
-    landing: fault_checks.LandingCheck
-    stance: Stance
-    toe_strides: float
-    steady: float
-    valve_times: ValveTimes
-    observer: Observer
-    emptying: fault_checks.Emptying
-    slow_pressure_1: float
-    slow_pressure_2: float
-    thin: float
+    level: float = HELPS
+    good_strides: float = 0.0
+    ventings: float = 0.0
+    finding: VentingFault = VentingFault()
+    readings: fault_checks.LastReadings = fault_checks.LastReadings()
+    landing: fault_checks.LandingCheck = fault_checks.LandingCheck()
+    stance: Stance = Stance()
+    toe_strides: float = 0.0
+    steady: float = 0.0
+    valve_times: ValveTimes = ValveTimes()
+    observer: Observer = Observer()
+    emptying: fault_checks.Emptying = fault_checks.Emptying()
+    slow_pressure_1: float = 0.0
+    slow_pressure_2: float = 0.0
+    thin: float = 0.0
 
 
-START = SafetyState(
-    level=HELPS,
-    good_strides=0.0,
-    ventings=0.0,
-    finding=VentingFault(
-        fault_flag=fault_flags.NO_FLAG, heel_force=0.0, toe_force=0.0, angle=0.0, pressure_1=0.0, pressure_2=0.0
-    ),
-    readings=fault_checks.NOTHING_READ,
-    landing=fault_checks.AIRBORNE,
-    stance=Stance(heel_seen=0.0, toe_seen=0.0, together=0.0, apart=0.0),
-    toe_strides=0.0,
-    steady=0.0,
-    valve_times=ValveTimes(0.0, 0.0, 0.0),
-    observer=observer.START,
-    emptying=fault_checks.NOT_EMPTYING,
-    slow_pressure_1=0.0,
-    slow_pressure_2=0.0,
-    thin=0.0,
-)
+START = SafetyState()
 
 LIFT_STRIDES = 1.0
 """Good strides in a row after which a paused device holds the foot up again."""
@@ -180,10 +163,12 @@ def gait_flag(rules: fault_checks.SafetyRules, before: PhaseState, phase: PhaseS
     # Sitting down unloads both alike, and may turn the ankle then, but late; the first step may begin anywhere.
     leaves = (phase.phase == SWING) & (stance.turned > 0.5) & (stance.largest > CARRIES)
     leaves = leaves & (phase.since_strike < SITS_DOWN * phase.stride_time) & (phase.strikes > 1.5)
-    found = fault_flags.NO_TOE_OFF if leaves & (stance.rolled < 0.5) else fault_flags.NO_FLAG
-    found = fault_flags.NO_TOES if skips_toes else found
-    found = fault_flags.RESTLESS if stays & returns else found
-    return fault_flags.ENDLESS_PHASE if endless else found
+    return min(
+        raised(fault_flags.ENDLESS_PHASE, endless),
+        raised(fault_flags.RESTLESS, stays & returns),
+        raised(fault_flags.NO_TOES, skips_toes),
+        raised(fault_flags.NO_TOE_OFF, leaves & (stance.rolled < 0.5)),
+    )
 
 
 def steady_flag(rules: fault_checks.SafetyRules, before: PhaseState, phase: PhaseState, angle: float) -> float:
@@ -193,10 +178,12 @@ def steady_flag(rules: fault_checks.SafetyRules, before: PhaseState, phase: Phas
     enters = (before.phase == SWING) & (phase.phase != SWING)
     short = enters & (before.in_phase < rules.shortest_swing * phase.stride_time)
     bent = (angle < rules.lowest_flat_angle) | (angle > rules.highest_flat_angle)
-    found = fault_flags.NO_HEEL if flat & (phase.heel.loaded < 0.5) else fault_flags.NO_FLAG
-    found = fault_flags.SHORT_SWING if short else found
-    found = fault_flags.FLAT_ANGLE if flat & bent & (min(phase.heel.loaded, phase.toe.loaded) > 0.5) else found
-    return fault_flags.NOT_FLAT if flat & (phase.toe.loaded < 0.5) else found
+    return min(
+        raised(fault_flags.NOT_FLAT, flat & (phase.toe.loaded < 0.5)),
+        raised(fault_flags.FLAT_ANGLE, flat & bent & (min(phase.heel.loaded, phase.toe.loaded) > 0.5)),
+        raised(fault_flags.SHORT_SWING, short),
+        raised(fault_flags.NO_HEEL, flat & (phase.heel.loaded < 0.5)),
+    )
 
 
 def valve_flag(
@@ -220,11 +207,9 @@ def valve_flag(
     left = left | fault_checks.holds_pressure(rules, measurement.pressure_2, expected_2, now.slow_pressure_2)
     held = stands & (valve_times.venting > rules.vent_time) & left
     late = (valve_times.venting > LATE * rules.vent_time) & (measurement.pressure_2 > rules.filled_pressure)
-    no_fall = held | (stands & late)
-    found = fault_flags.NO_FALL if no_fall | (now.emptying.rising > fault_checks.LASTS) else fault_flags.NO_FLAG
-    found = fault_flags.NO_RISE if no_rise_1 | no_rise_2 else found
-    observed = fault_flags.PRESSURE_SENSOR if held else fault_flags.NO_FLAG
-    return observed if rules.nominal.nominal_flow > 0.0 else found
+    no_fall = held | (stands & late) | (now.emptying.rising > fault_checks.LASTS)
+    found = min(raised(fault_flags.NO_RISE, no_rise_1 | no_rise_2), raised(fault_flags.NO_FALL, no_fall))
+    return raised(fault_flags.PRESSURE_SENSOR, held) if rules.nominal.nominal_flow > 0.0 else found
 
 
 def next_good_strides(state: SafetyState, before: PhaseState, phase: PhaseState, flag: float) -> float:
@@ -242,19 +227,7 @@ def next_good_strides(state: SafetyState, before: PhaseState, phase: PhaseState,
     return -1.0 if flag > fault_flags.NO_FLAG else counted
 
 
-def level_after(rules: fault_checks.SafetyRules, state: SafetyState, good_strides: float, together: float) -> float:
-    """The level after good strides in a row, and heel and toes on the ground for a time [s]; a stop lasts.
-
-    A swing without end is sitting: standing up shows that both forces are sound.
-    """
-    resting = (state.level == PAUSED) & (state.finding.fault_flag == fault_flags.ENDLESS_PHASE)
-    resumes = (state.level < STOPPED) & (good_strides >= rules.resume_strides)
-    # Step by step: the foot is lifted again before it is pushed.
-    lifted = LIFTS if (state.level == PAUSED) & (good_strides >= LIFT_STRIDES) else state.level
-    return HELPS if resumes | (resting & (together > STANDS_UP)) else lifted
-
-
-def remembered(
+def next_memory(
     rules: fault_checks.SafetyRules,
     state: SafetyState,
     before: PhaseState,
@@ -263,16 +236,17 @@ def remembered(
     period: float,
 ) -> SafetyState:
     """The state with what the checks remember of a sample of ``period`` [s]; the level is as it was."""
-    seen = fault_checks.next_readings(state.readings, measurement, before, phase, period)
+    readings = fault_checks.next_readings(state.readings, measurement, before, phase, period)
     enters = (before.phase == SWING) & (phase.phase != SWING)
     on_toes = (state.stance.heel_seen < 0.5) & (before.strikes > 0.5)
     usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
     steady = (1.0 if usual else 0.0) if enters else state.steady
     # Chamber 2 is joined to the atmosphere while chamber 1 is fed, and while both vent.
     vented = state.valve_times.filling_1 + state.valve_times.venting
+    thin = min(measurement.pressure_1, measurement.pressure_2) < fault_checks.THIN
     return state._replace(
-        readings=seen,
-        landing=fault_checks.next_landing(rules, state.landing, seen, before, phase, steady, period),
+        readings=readings,
+        landing=fault_checks.next_landing(rules, state.landing, readings, before, phase, steady, period),
         stance=next_stance(state.stance, before, phase, measurement, period),
         toe_strides=(state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides,
         steady=steady,
@@ -290,7 +264,7 @@ def remembered(
         emptying=fault_checks.next_emptying(rules, state.emptying, vented, measurement, period),
         slow_pressure_1=fault_checks.next_slow_pressure(state.slow_pressure_1, measurement.pressure_1, period),
         slow_pressure_2=fault_checks.next_slow_pressure(state.slow_pressure_2, measurement.pressure_2, period),
-        thin=fault_checks.next_thin(state.thin, measurement, period),
+        thin=state.thin + period if thin else 0.0,
     )
 
 
@@ -303,22 +277,23 @@ def found_flag(
     measurement: GaitMeasurement,
     period: float,
 ) -> float:
-    """The fault flag of a sample that comes first; ``last`` are the readings before it, ``now`` remembers it."""
+    """The most urgent fault flag of a sample; ``last`` are the readings before it, ``now`` remembers it."""
+    nominal, pressure_1, pressure_2 = rules.nominal, measurement.pressure_1, measurement.pressure_2
+    steady = steady_flag(rules, before, phase, measurement.angle)
     late = max(now.landing.late, now.landing.late_toes) > fault_checks.LATE_STRIDES
-    # From the least urgent to the most: each line gives way to a flag that comes first.
-    flag = fault_flags.LATE_FORCES if late else fault_flags.NO_FLAG
-    flag = fault_flags.TOE_STRIDES if now.toe_strides > rules.most_toe_strides else flag
-    flag = (
-        fault_flags.first_flag(steady_flag(rules, before, phase, measurement.angle), flag) if now.steady > 0.5 else flag
+    # The numbers of the flags are in order of urgency: the least one comes first, whichever check raised it.
+    found = min(
+        observer.found_cause(nominal, now.observer, measurement.angle, pressure_1, pressure_2, period),
+        valve_flag(rules, now, phase, measurement),
+        fault_checks.range_flag(rules, measurement, now.thin),
+        fault_checks.gone_flag(rules, last, measurement, period),
+        fault_checks.still_flag(rules, now.readings, before, phase),
+        gait_flag(rules, before, phase, now.stance),
+        steady if now.steady > 0.5 else NOT_RAISED,
+        raised(fault_flags.TOE_STRIDES, now.toe_strides > rules.most_toe_strides),
+        raised(fault_flags.LATE_FORCES, late),
     )
-    flag = fault_flags.first_flag(gait_flag(rules, before, phase, now.stance), flag)
-    flag = fault_flags.first_flag(fault_checks.still_flag(rules, now.readings, before, phase), flag)
-    flag = fault_flags.first_flag(fault_checks.gone_flag(rules, last, measurement, period), flag)
-    flag = fault_flags.first_flag(fault_checks.range_flag(rules, measurement, now.thin), flag)
-    flag = fault_flags.first_flag(valve_flag(rules, now, phase, measurement), flag)
-    pressure_1, pressure_2 = measurement.pressure_1, measurement.pressure_2
-    cause = observer.found_cause(rules.nominal, now.observer, measurement.angle, pressure_1, pressure_2, period)
-    return fault_flags.first_flag(cause, flag)
+    return found if found < NOT_RAISED else fault_flags.NO_FLAG
 
 
 def monitor(
@@ -330,11 +305,17 @@ def monitor(
     period: float,
 ) -> SafetyState:
     """The state after a sample of ``period`` [s]; ``before`` and ``phase`` are the phases before and after it."""
-    now = remembered(rules, state, before, phase, measurement, period)
+    now = next_memory(rules, state, before, phase, measurement, period)
     flag = found_flag(rules, state.readings, now, before, phase, measurement, period)
     good_strides = next_good_strides(state, before, phase, flag)
+    # A swing without end is sitting: standing up shows that both forces are sound.
+    resting = (state.level == PAUSED) & (state.finding.fault_flag == fault_flags.ENDLESS_PHASE)
+    # A stop lasts; else help comes back step by step: the foot is lifted again before it is pushed.
+    resumes = (state.level < STOPPED) & (good_strides >= rules.resume_strides)
+    lifted = LIFTS if (state.level == PAUSED) & (good_strides >= LIFT_STRIDES) else state.level
+    allowed = HELPS if resumes | (resting & (now.stance.together > STANDS_UP)) else lifted
     # A flag of this sample outweighs what good strides would allow.
-    level = max(level_after(rules, state, good_strides, now.stance.together), fault_flags.level_of(flag))
+    level = max(allowed, fault_flags.level_of(flag))
     # Only a rise of the level vents; a lower level gives help back.
     vents = level > state.level
     return now._replace(

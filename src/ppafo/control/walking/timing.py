@@ -18,7 +18,7 @@ from typing import Annotated, Any, NamedTuple
 
 from ppafo.control.kind import FORCE_LAG, VALVE_DELAY
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.model.declaration import Number, Quantity, quantities_of
+from ppafo.model.declaration import EmptyRow, Number, Quantity, quantities_of
 from ppafo.model.helping import LANDING, SWING
 from ppafo.model.sensors import GaitMeasurement
 
@@ -50,28 +50,20 @@ class TimingKind:
     gait_time: Callable[[Any, Any, PhaseState], GaitTime]
 
 
-class ThresholdRules(NamedTuple):
-    """Nothing to set: the rules of the phases say it all."""
-
-
-class ThresholdClock(NamedTuple):
-    """State of a timing by force thresholds beside the phases: empty."""
-
-
 def follow_thresholds(
-    rules: ThresholdRules,
+    rules: EmptyRow,
     phase_rules: PhaseRules,
-    clock: ThresholdClock,
+    clock: EmptyRow,
     before: PhaseState,
     phase: PhaseState,
     measurement: GaitMeasurement,
     period: float,
-) -> ThresholdClock:
+) -> EmptyRow:
     """The clock after a sample, taken every ``period`` [s]: nothing."""
     return clock
 
 
-def threshold_time(rules: ThresholdRules, clock: ThresholdClock, phase: PhaseState) -> GaitTime:
+def threshold_time(rules: EmptyRow, clock: EmptyRow, phase: PhaseState) -> GaitTime:
     """The time since the detected heel strike [s]; the foot lands once that was detected."""
     return GaitTime(phase.since_strike, 1.0 if phase.phase == LANDING else 0.0)
 
@@ -97,8 +89,8 @@ THRESHOLDS = TimingKind(
     summary="The stride begins when the heel force has passed its threshold; nothing is known before it is detected.",
     source="the paper, figure 1A",
     quantities=(),
-    parameters=ThresholdRules,
-    initial=ThresholdClock(),
+    parameters=EmptyRow,
+    initial=EmptyRow(),
     follow=follow_thresholds,
     gait_time=threshold_time,
 )
@@ -155,10 +147,10 @@ class Delays(NamedTuple):
 class Events(NamedTuple):
     """Number for each event of a stride: heel strike, toes on the ground, heel off, toes off."""
 
-    strike: float
-    toes_on: float
-    heel_off: float
-    toes_off: float
+    strike: float = 0.0
+    toes_on: float = 0.0
+    heel_off: float = 0.0
+    toes_off: float = 0.0
 
 
 class StrideTiming(NamedTuple):
@@ -167,11 +159,11 @@ class StrideTiming(NamedTuple):
     ``this_time`` is what the stride will take that has begun, by when its heel and its toes have left the ground.
     """
 
-    mean_time: float
-    counted: float
-    last: float
-    even: float
-    this_time: float
+    mean_time: float = 0.0
+    counted: float = 0.0
+    last: float = 0.0
+    even: float = 0.0
+    this_time: float = 0.0
 
 
 class GaitClock(NamedTuple):
@@ -180,19 +172,13 @@ class GaitClock(NamedTuple):
     ``come`` is from recent strides, 0 for an event that was not seen yet.
     """
 
-    fraction: float
-    event: float
-    come: Events
-    strides: StrideTiming
+    fraction: float = 0.0
+    event: float = TOES_OFF
+    come: Events = Events()
+    strides: StrideTiming = StrideTiming()
 
 
-NOT_KNOWN = Events(strike=0.0, toes_on=0.0, heel_off=0.0, toes_off=0.0)
-CLOCK_START = GaitClock(
-    fraction=0.0,
-    event=TOES_OFF,
-    come=NOT_KNOWN,
-    strides=StrideTiming(mean_time=0.0, counted=0.0, last=0.0, even=0.0, this_time=0.0),
-)
+CLOCK_START = GaitClock()
 
 
 def detection_delays(delays: Delays, phase_rules: PhaseRules, period: float) -> Events:
@@ -209,7 +195,7 @@ def detection_delays(delays: Delays, phase_rules: PhaseRules, period: float) -> 
     )
 
 
-def seen_events(before: PhaseState, phase: PhaseState) -> Events:
+def detected_events(before: PhaseState, phase: PhaseState) -> Events:
     """1 for each event that is detected at this sample, else 0; heel and toes only where they can be that event."""
     enters = (before.phase == SWING) & (phase.phase != SWING)
     toes_on = (before.toe.loaded < 0.5) & (phase.toe.loaded > 0.5) & (before.phase == LANDING)
@@ -224,15 +210,15 @@ def seen_events(before: PhaseState, phase: PhaseState) -> Events:
     )
 
 
-def next_come(come: float, seen: float, found: float, weight: float) -> float:
-    """Fraction of the stride at which an event comes [turns], after it may have been seen at ``found``."""
+def learnt_fraction(come: float, seen: float, found: float, weight: float) -> float:
+    """Updated fraction of a gait event [strides], given an optional detection (``seen`` 1) at ``found``."""
     # One stumble moves it by no more than a usual stride may.
     missed = max(-TOO_FAR, min(TOO_FAR, found - come))
     moved = come + weight * missed if come > 0.0 else found
     return moved if (seen > 0.5) & (found > 0.0) & (found < 1.0) else come
 
 
-def anchored(fraction: float, seen: float, come: float, late: float, weight: float) -> float:
+def anchored_fraction(fraction: float, seen: float, come: float, late: float, weight: float) -> float:
     """Fraction [turns] after an event that comes at ``come`` may have been detected ``late`` [turns] after it."""
     missed = come + late - fraction
     # Far from where it came in recent strides it is another event, or another gait.
@@ -254,47 +240,23 @@ def latest_fraction(phase: PhaseState, come: Events, predicts: bool) -> float:
 
 
 def last_event(clock: GaitClock, fraction: float, come: Events, seen: Events, phase: PhaseState) -> float:
-    """The last event that has been passed; one whose fraction is not known is passed where it is detected."""
-    is_swing = phase.phase == SWING
-    struck = (seen.strike > 0.5) | (is_swing & (clock.event == TOES_OFF) & (fraction >= 1.0))
-    expected = is_swing & (clock.event == STRUCK)
-    passed = clock.event if expected else event_of_stance(clock.event, fraction, come, seen, phase.toe.loaded)
-    return STRUCK if struck else passed
-
-
-def event_of_stance(event: float, fraction: float, come: Events, seen: Events, toe_loaded: float) -> float:
-    """The last event passed in a stance: one after the other."""
+    """Last event that has been passed; one whose fraction is not known (0) is passed where it is detected."""
     # A foot that lands on its toes has them on the ground at once.
     toes_on = (
         (seen.toes_on > 0.5)
-        | ((come.toes_on <= 0.0) & (toe_loaded > 0.5))
+        | ((come.toes_on <= 0.0) & (phase.toe.loaded > 0.5))
         | ((come.toes_on > 0.0) & (fraction >= come.toes_on))
     )
     heel_off = (seen.heel_off > 0.5) & (come.heel_off <= 0.0) | ((come.heel_off > 0.0) & (fraction >= come.heel_off))
     toes_off = (seen.toes_off > 0.5) | ((come.toes_off > 0.0) & (fraction >= come.toes_off))
-    found = max(event, TOES_ON) if toes_on else event
-    found = max(found, HEEL_OFF) if heel_off else found
-    return TOES_OFF if toes_off else found
-
-
-def learnt_events(come: Events, seen: Events, found: Events, weight: float) -> Events:
-    """Fractions at which events come [turns], after a sample with events ``seen`` at fractions ``found``."""
-    return Events(
-        strike=0.0,
-        toes_on=next_come(come.toes_on, seen.toes_on, found.toes_on, weight),
-        heel_off=next_come(come.heel_off, seen.heel_off, found.heel_off, weight),
-        toes_off=next_come(come.toes_off, seen.toes_off, found.toes_off, weight),
-    )
-
-
-def chosen_events(some: Events, others: Events, takes_some: bool) -> Events:
-    """Some events or the others: nothing is learnt in fractions of a stride whose time is not known."""
-    return Events(
-        strike=0.0,
-        toes_on=some.toes_on if takes_some else others.toes_on,
-        heel_off=some.heel_off if takes_some else others.heel_off,
-        toes_off=some.toes_off if takes_some else others.toes_off,
-    )
+    in_stance = max(clock.event, TOES_ON) if toes_on else clock.event
+    in_stance = max(in_stance, HEEL_OFF) if heel_off else in_stance
+    in_stance = TOES_OFF if toes_off else in_stance
+    is_swing = phase.phase == SWING
+    struck = (seen.strike > 0.5) | (is_swing & (clock.event == TOES_OFF) & (fraction >= 1.0))
+    # A strike that the clock has passed in the swing is awaited: no event of the stance comes before it.
+    passed = clock.event if is_swing & (clock.event == STRUCK) else in_stance
+    return STRUCK if struck else passed
 
 
 def next_strides(
@@ -327,8 +289,8 @@ def next_strides(
     )
 
 
-def paced(strides: StrideTiming, seen: Events, found: Events, come: Events, weight: float) -> StrideTiming:
-    """Predicted duration of the present stride, corrected by an early or late heel-off or toe-off.
+def predicted_time(strides: StrideTiming, seen: Events, found: Events, come: Events, weight: float) -> float:
+    """Predicted duration of the present stride [s], corrected by an early or late heel-off or toe-off.
 
     ``found`` are the fractions of the mean stride at which they did, ``come`` the fractions of recent strides.
     """
@@ -337,19 +299,8 @@ def paced(strides: StrideTiming, seen: Events, found: Events, come: Events, weig
     # Toe-off comes later and says more: it replaces what heel-off said.
     pace = found.heel_off / come.heel_off if heel else 1.0
     pace = found.toes_off / come.toes_off if toes else pace
-    told = strides.mean_time * (1.0 + weight * (max(1.0 - FASTER, min(1.0 + FASTER, pace)) - 1.0))
-    return strides._replace(this_time=told if heel | toes else strides.this_time)
-
-
-def anchored_fraction(
-    clock: GaitClock, seen: Events, late: Events, stride_time: float, weight: float, period: float
-) -> float:
-    """The fraction of the stride [turns] a ``period`` [s] later, moved by what was detected after the strike."""
-    come = clock.come
-    fraction = clock.fraction + period / stride_time
-    fraction = anchored(fraction, seen.toes_on, come.toes_on, late.toes_on / stride_time, weight)
-    fraction = anchored(fraction, seen.heel_off, come.heel_off, late.heel_off / stride_time, weight)
-    return anchored(fraction, seen.toes_off, come.toes_off, late.toes_off / stride_time, weight)
+    corrected = strides.mean_time * (1.0 + weight * (max(1.0 - FASTER, min(1.0 + FASTER, pace)) - 1.0))
+    return corrected if heel | toes else strides.this_time
 
 
 def struck_fraction(fraction: float, target: float, weight: float) -> float:
@@ -369,7 +320,7 @@ def next_clock(
     period: float,
 ) -> GaitClock:
     """The clock after a sample; a detected strike moves it by ``strike_weight``, the events after it by ``weight``."""
-    late, seen = detection_delays(delays, phase_rules, period), seen_events(before, phase)
+    late, seen = detection_delays(delays, phase_rules, period), detected_events(before, phase)
     struck = seen.strike > 0.5
     # The first strike ends no stride, and the second one begins the first whole one: a walk may begin in mid-stance.
     ends = struck & (before.strikes > 1.5)
@@ -380,21 +331,34 @@ def next_clock(
     # The strike itself was detected late: time since it is longer by that delay.
     now = phase.since_strike + late.strike
     found = Events(
-        strike=0.0,
         toes_on=(now - late.toes_on) / strides.mean_time,
         heel_off=(now - late.heel_off) / strides.mean_time,
         toes_off=(now - late.toes_off) / strides.mean_time,
     )
-    strides = paced(strides, seen, found, clock.come, weight)
-    stride, predicts = strides.this_time, strides.even > 0.5
-    learnt = learnt_events(clock.come, seen, found, max(usual, 1.0 / max(strides.counted, 1.0)))
-    come = chosen_events(learnt, clock.come, predicts | (strides.counted < 1.5) & (strides.counted > 0.5))
-    passed = anchored_fraction(clock, seen, late, stride, weight, period)
+    last = clock.come
+    stride, predicts = predicted_time(strides, seen, found, last, weight), strides.even > 0.5
+    # Nothing is learnt in fractions of a stride whose time is not known.
+    learns = predicts | (strides.counted < 1.5) & (strides.counted > 0.5)
+    share = max(usual, 1.0 / max(strides.counted, 1.0))
+    come = Events(
+        toes_on=learnt_fraction(last.toes_on, seen.toes_on, found.toes_on, share) if learns else last.toes_on,
+        heel_off=learnt_fraction(last.heel_off, seen.heel_off, found.heel_off, share) if learns else last.heel_off,
+        toes_off=learnt_fraction(last.toes_off, seen.toes_off, found.toes_off, share) if learns else last.toes_off,
+    )
+    # The fraction a period later, moved by what was detected after the strike.
+    passed = clock.fraction + period / stride
+    passed = anchored_fraction(passed, seen.toes_on, last.toes_on, late.toes_on / stride, weight)
+    passed = anchored_fraction(passed, seen.heel_off, last.heel_off, late.heel_off / stride, weight)
+    passed = anchored_fraction(passed, seen.toes_off, last.toes_off, late.toes_off / stride, weight)
     set_anew = struck_fraction(passed, late.strike / stride, strike_weight)
     fraction = set_anew if struck else min(passed, latest_fraction(phase, come, predicts))
-    told = chosen_events(come, NOT_KNOWN, predicts)
-    event = last_event(clock, fraction, told, seen, phase)
-    return GaitClock(fraction=fraction, event=event, come=come, strides=strides)
+    predicted = Events(
+        toes_on=come.toes_on if predicts else 0.0,
+        heel_off=come.heel_off if predicts else 0.0,
+        toes_off=come.toes_off if predicts else 0.0,
+    )
+    event = last_event(clock, fraction, predicted, seen, phase)
+    return GaitClock(fraction=fraction, event=event, come=come, strides=strides._replace(this_time=stride))
 
 
 def place_in_stride(clock: GaitClock, lead: float, phase: PhaseState) -> GaitTime:

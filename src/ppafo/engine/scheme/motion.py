@@ -18,8 +18,8 @@ from ppafo.model.plant import (
     PlantState,
     driving_torque,
     holds_still,
-    loaded,
     net_torque,
+    torque_less_loads,
     vane_acceleration,
     viscous_torque,
 )
@@ -427,7 +427,7 @@ def begin_free(
     velocity = state.angular_velocity
     way = direction_of(velocity)
     pressure_1, pressure_2 = parts.held_pressures(plant, held, state)
-    torque = loaded(parts.torque(plant, state.angle, pressure_1, pressure_2), state.angle) + added_torque
+    torque = torque_less_loads(parts.torque(plant, state.angle, pressure_1, pressure_2), state.angle) + added_torque
     friction = friction_now(plant, velocity, pressure_1, pressure_2)
     sliding = vane_acceleration(
         torque, way * friction.in_motion, plant.viscous_damping, plant.inertia, state.angle, velocity
@@ -456,7 +456,7 @@ def end_free(
     way = direction_of(velocity)
     predicted = clamp_angle(plant, begun.free_angle)
     next_1, next_2 = parts.held_pressures(plant, ahead, state)
-    next_torque = loaded(parts.torque(plant, predicted, next_1, next_2), predicted) + added_torque
+    next_torque = torque_less_loads(parts.torque(plant, predicted, next_1, next_2), predicted) + added_torque
     next_rate = velocity + begun.acceleration * step
     friction = friction_now(plant, next_rate, next_1, next_2)
     sliding_torque = net_torque(next_torque, way * friction.in_motion, 0.0, predicted, next_rate)

@@ -21,8 +21,15 @@ from ppafo.model.gait import (
     GaitNow,
     GaitTiming,
 )
-from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank_on
-from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, loaded, net_torque, viscous_torque
+from ppafo.model.leg import FootLoad, LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank
+from ppafo.model.plant import (
+    ActuatorFunctions,
+    PlantParameters,
+    PlantState,
+    net_torque,
+    torque_less_loads,
+    viscous_torque,
+)
 from ppafo.model.ports import friction_in_motion
 
 
@@ -89,12 +96,9 @@ def carried_foot(leg: LegParameters, share: DeviceShare, now: GaitNow, foot: Dir
 def torque_of_body_on_foot(
     leg: LegParameters, mass_moment: float, inertia: float, now: GaitNow, foot: Direction
 ) -> float:
-    """Torque [N m] of shank, knee and weight about the ankle, on a body on the foot: see ``torque_of_shank_on``."""
-    return torque_of_shank_on(
-        mass_moment,
-        inertia,
-        leg.shank_length,
-        leg.gravity,
+    """Torque [N m] of shank, knee and weight about the ankle, on a body on the foot: see ``torque_of_shank``."""
+    return torque_of_shank(
+        FootLoad(mass_moment, inertia, leg.shank_length, leg.gravity),
         now.sine_shank,
         now.cosine_shank,
         foot.sine,
@@ -211,7 +215,7 @@ def external_torque(
     # left.
     needed = foot_inertia_about_ankle(leg) * acceleration + passive_damping - (torque - plate)
     pressure_1, pressure_2 = parts.held_pressures(plant, held, state)
-    driving = loaded(parts.torque(plant, state.angle, pressure_1, pressure_2) + plate, state.angle)
+    driving = torque_less_loads(parts.torque(plant, state.angle, pressure_1, pressure_2) + plate, state.angle)
     way = (1.0 if speed > 0.0 else 0.0) - (1.0 if speed < 0.0 else 0.0)
     friction = friction_in_motion(plant.dynamic_torque, speed, pressure_1, pressure_2)
     damping = viscous_torque(share.viscous_damping, speed)

@@ -36,5 +36,5 @@ def torque(parts: Program, lane: Lane, time: float, angle: float) -> float:
 
 def sample(parts: Program, lane: Lane, time: float) -> FootSample:
     """The foot beside the one that was measured, at a time [s] of a gait."""
-    found = foot_in_gait(lane.shank, time, lane.state.angle)
-    return FootSample(found.angle, found.measured_angle, found.toe_difference)
+    angle, measured_angle, toe_difference = foot_in_gait(lane.shank, time, lane.state.angle)
+    return FootSample(angle, measured_angle, toe_difference)

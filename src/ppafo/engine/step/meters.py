@@ -45,7 +45,7 @@ def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval
         temperature_2=second_temperature(parts, lane) if parts.is_thermal else 0.0,
         gas=gas_of(parts, lane),
         energy=energy_of(parts, lane),
-        foot=foot_of(parts, lane, time),
+        foot=parts.foot.sample(parts, lane, time) if parts.foot is not None and parts.is_on_gait else NO_FOOT,
         stride=stride_of(parts, lane, number, interval),
     )
 
@@ -92,14 +92,6 @@ def wanted_at(parts: Program, lane: Lane, time: float) -> float:
     if parts.leg is not None:
         return float(lane.controller_state.request.torque) if parts.requests_torque else 0.0
     return reference_at(parts, lane, time) if parts.has_reference else 0.0
-
-
-def foot_of(parts: Program, lane: Lane, time: float) -> FootSample:
-    """The foot on the shank of a gait at a time [s]; zeros where there is none."""
-    if parts.foot is not None and parts.is_on_gait:
-        sample: FootSample = parts.foot.sample(parts, lane, time)
-        return sample
-    return NO_FOOT
 
 
 def stride_of(parts: Program, lane: Lane, number: int, interval: float) -> StrideSample:

@@ -19,8 +19,6 @@ from ppafo.model.gait import (
     gait_of,
     measured_at,
     place_at,
-    shown_toe_force,
-    stands_on_toes,
 )
 from ppafo.model.leg import LegParameters
 from ppafo.model.sensors import GaitSeen, GaitSensors
@@ -159,9 +157,10 @@ def end(parts: Program, lane: Lane, length: float) -> None:
         parts=parts.functions,
     )
     if parts.takes_task_sequence:
-        # A stride's marks: a scuff on the toe sensor, a forefoot on a stair's edge.
+        # A stride's marks: a scuff, which the toe sensor follows, and a forefoot alone on a stair's edge.
         follow_rate = lane.gait_sensors.follow_rate
+        followed = lane.marks.scuff_force * follow_rate * length / (1.0 + follow_rate * length)
         lane.walk_after = lane.walk_after._replace(
-            toe_force=shown_toe_force(lane.walk_after.toe_force, lane.marks, follow_rate, length),
-            toes_first=stands_on_toes(lane.walk_after.toes_first, lane.marks),
+            toe_force=lane.walk_after.toe_force + followed,
+            toes_first=max(lane.walk_after.toes_first, lane.marks.forefoot),
         )

@@ -17,7 +17,7 @@ from ppafo.exports.c_library.readme import words_of, words_of_walk
 from ppafo.exports.c_library.settings import relations_of, settings_of
 from ppafo.model.catalog import ordered_effects
 from ppafo.parameters.device import Device
-from ppafo.parameters.plant import effects_of
+from ppafo.parameters.effects import effects_of
 from ppafo.simulation.clock import links_of_times, time_texts
 from ppafo.simulation.motion_kind import VANE, WALK
 from ppafo.simulation.numbers import links_that_hold

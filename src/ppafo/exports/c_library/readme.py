@@ -7,8 +7,8 @@ from ppafo.exports.c_library.conditions import choosing
 from ppafo.exports.c_library.library import c_identifier
 from ppafo.metrics import METRICS
 from ppafo.parameters.device import Device, SonicOrifice
+from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import Graph
-from ppafo.parameters.plant import effects_of
 from ppafo.simulation.scenario import Scenario, vane_motion
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from ppafo.exports.c_library.library import ExportParameter, Relation, c_identif
 from ppafo.model.catalog import device_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import consistency
-from ppafo.parameters.plant import effects_of
+from ppafo.parameters.effects import effects_of
 from ppafo.simulation.clock import step_unless_given, step_with_output, time_texts
 from ppafo.simulation.declaration import LOCKED_ANGLE
 from ppafo.simulation.document import value_at

@@ -28,7 +28,7 @@ from ppafo.identification.trajectory.experiment import FittedExperiment, scenari
 from ppafo.identification.trajectory.numbers import GAIN_OF, TIME_OFFSET, ZERO_OF, FitNumber, with_numbers
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
-from ppafo.parameters.plant import switches_of
+from ppafo.parameters.effects import switches_of
 from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus, resolution_of, rounding_of
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, SUPPLY

@@ -15,8 +15,8 @@ from ppafo.identification.trajectory.numbers import (
     number_at,
 )
 from ppafo.model.declaration import Quantity
+from ppafo.parameters.effects import switches_of
 from ppafo.parameters.parameter_set import ParameterSet
-from ppafo.parameters.plant import switches_of
 from ppafo.signals.faults import noise_of, resolution_of
 from ppafo.signals.recording import Recording
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY

@@ -38,52 +38,44 @@ class Cylinder(NamedTuple):
     longest: float
 
 
-class Pins(NamedTuple):
-    """Distance of the pins [m], and what it grows per radian [m/rad]: the arm at which the cylinder pushes."""
+def pins_at(lever: float, base: float, between: float) -> tuple[float, float]:
+    """Distance of the pins [m] with an angle [rad] between lever and base [m], and its growth per radian [m/rad].
 
-    length: float
-    arm: float
-
-
-def pins_at(lever: float, base: float, between: float) -> Pins:
-    """Pins of a lever and a base [m] with an angle [rad] between them: the law of cosines."""
+    The law of cosines; the growth is the arm at which the cylinder pushes.
+    """
     sine, cosine = sine_and_cosine_of_turns(between * TURNS_OF_RADIAN)
     # No test for a length of 0: ``problem`` refuses a lever near its dead centre, where the arm would vanish too.
     length = math.sqrt(lever * lever + base * base - 2.0 * lever * base * cosine)
-    return Pins(length=length, arm=lever * base * sine / length)
+    return length, lever * base * sine / length
 
 
-def chamber_1(shape: Cylinder, pins: Pins) -> LinearChamber:
-    """Chamber on the side of the piston, which grows with the angle."""
-    swept = shape.piston_area * (pins.length - shape.shortest)
-    return rigid(shape.dead_volume_1 + swept, shape.piston_area * pins.arm)
-
-
-def chamber_2(shape: Cylinder, pins: Pins) -> LinearChamber:
-    """Chamber on the side of the rod, which shrinks with the angle."""
-    swept = shape.rod_side_area * (shape.longest - pins.length)
-    return rigid(shape.dead_volume_2 + swept, -shape.rod_side_area * pins.arm)
+def chambers_at(shape: Cylinder, angle: float) -> tuple[LinearChamber, LinearChamber]:
+    """Chamber on the side of the piston, which grows with the angle [rad], and the one of the rod, which shrinks."""
+    length, arm = pins_at(shape.lever, shape.base, angle + shape.offset)
+    swept_1 = shape.piston_area * (length - shape.shortest)
+    swept_2 = shape.rod_side_area * (shape.longest - length)
+    return (
+        rigid(shape.dead_volume_1 + swept_1, shape.piston_area * arm),
+        rigid(shape.dead_volume_2 + swept_2, -shape.rod_side_area * arm),
+    )
 
 
 def chambers(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> Chambers:
     """Both chambers at an angle [rad]."""
-    shape: Cylinder = plant.shape
-    pins = pins_at(shape.lever, shape.base, angle + shape.offset)
-    return linear_chambers(plant, chamber_1(shape, pins), chamber_2(shape, pins), pressure_1, pressure_2)
+    first, second = chambers_at(plant.shape, angle)
+    return linear_chambers(plant, first, second, pressure_1, pressure_2)
 
 
 def pressures(plant: ShapedPlant, angle: float, mass_1: float, mass_2: float) -> tuple[float, float]:
     """Absolute pressures [Pa] of two masses [kg]. Equation (3)."""
-    shape: Cylinder = plant.shape
-    pins = pins_at(shape.lever, shape.base, angle + shape.offset)
-    return linear_pressures(plant, chamber_1(shape, pins), chamber_2(shape, pins), mass_1, mass_2)
+    first, second = chambers_at(plant.shape, angle)
+    return linear_pressures(plant, first, second, mass_1, mass_2)
 
 
 def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> float:
     """Torque [N m] of two absolute pressures [Pa]; the atmosphere pushes on the rod."""
-    shape: Cylinder = plant.shape
-    pins = pins_at(shape.lever, shape.base, angle + shape.offset)
-    return linear_torque(plant, chamber_1(shape, pins), chamber_2(shape, pins), pressure_1, pressure_2)
+    first, second = chambers_at(plant.shape, angle)
+    return linear_torque(plant, first, second, pressure_1, pressure_2)
 
 
 class CylinderSettings(NamedTuple):
@@ -111,8 +103,8 @@ def prepare(settings: CylinderSettings, stops: Range) -> Cylinder:
         offset=offset,
         dead_volume_1=stops.dead_volume_1,
         dead_volume_2=stops.dead_volume_2,
-        shortest=pins_at(lever, base, stops.angle_min + offset).length,
-        longest=pins_at(lever, base, stops.angle_max + offset).length,
+        shortest=pins_at(lever, base, stops.angle_min + offset)[0],
+        longest=pins_at(lever, base, stops.angle_max + offset)[0],
     )
 
 

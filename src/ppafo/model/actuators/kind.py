@@ -130,9 +130,4 @@ def mean_growth(shape: Any, stops: Range, gauge: float, chambers: Callable[..., 
     return (last - first) / max(stops.angle_max - stops.angle_min, 1.0e-9)
 
 
-def plant_in_shape(plant: PlantParameters, model: ActuatorModel, shape: Any, growth: float) -> Any:
-    """The plant of another kind from a vane's with the same stops, gas and orifices; mean growth [m^3/rad]."""
-    return model.plant(*plant._replace(torque_constant=growth, displacement_per_radian=growth), shape)
-
-
 _PLANTS: dict[type, type] = {}

@@ -24,16 +24,6 @@ def rigid(volume: float, slope: float) -> LinearChamber:
     return LinearChamber(rest=volume, compliance=0.0, rest_slope=slope, compliance_slope=0.0)
 
 
-def grown(chamber: LinearChamber, gauge: float) -> float:
-    """Volume [m^3] at a gauge pressure [Pa]: dPhi/dp."""
-    return chamber.rest + chamber.compliance * gauge
-
-
-def turning(chamber: LinearChamber, gauge: float) -> float:
-    """Torque [N m] at a gauge pressure [Pa]: dPhi/dangle."""
-    return gauge * (chamber.rest_slope + 0.5 * chamber.compliance_slope * gauge)
-
-
 def pressure_in(chamber: LinearChamber, content: float, atmosphere: float) -> float:
     """Absolute pressure [Pa] at which p V is a gas content [J]."""
     # p (rest + compliance (p - p_0)) = content is a quadratic. This form of its root subtracts no near numbers, and is
@@ -46,11 +36,11 @@ def pressure_in(chamber: LinearChamber, content: float, atmosphere: float) -> fl
 def linear_chambers(
     plant: ShapedPlant, chamber_1: LinearChamber, chamber_2: LinearChamber, pressure_1: float, pressure_2: float
 ) -> Chambers:
-    """Both chambers at two absolute pressures [Pa]."""
+    """Both chambers at two absolute pressures [Pa]: the volumes dPhi/dp."""
     room = plant.atmospheric_pressure
     return Chambers(
-        volume_1=grown(chamber_1, pressure_1 - room),
-        volume_2=grown(chamber_2, pressure_2 - room),
+        volume_1=chamber_1.rest + chamber_1.compliance * (pressure_1 - room),
+        volume_2=chamber_2.rest + chamber_2.compliance * (pressure_2 - room),
         compliance_1=chamber_1.compliance,
         compliance_2=chamber_2.compliance,
     )
@@ -70,6 +60,7 @@ def linear_pressures(
 def linear_torque(
     plant: ShapedPlant, chamber_1: LinearChamber, chamber_2: LinearChamber, pressure_1: float, pressure_2: float
 ) -> float:
-    """Torque [N m] of both chambers at two absolute pressures [Pa]: the atmosphere is on the other side of each."""
-    room = plant.atmospheric_pressure
-    return turning(chamber_1, pressure_1 - room) + turning(chamber_2, pressure_2 - room)
+    """Torque [N m] of both chambers at two absolute pressures [Pa]: dPhi/dangle at gauge pressures."""
+    gauge_1, gauge_2 = pressure_1 - plant.atmospheric_pressure, pressure_2 - plant.atmospheric_pressure
+    torque_1 = gauge_1 * (chamber_1.rest_slope + 0.5 * chamber_1.compliance_slope * gauge_1)
+    return torque_1 + gauge_2 * (chamber_2.rest_slope + 0.5 * chamber_2.compliance_slope * gauge_2)

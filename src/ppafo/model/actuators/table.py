@@ -59,13 +59,6 @@ class Measured(NamedTuple):
     rest_angle: float
 
 
-class Bases(NamedTuple):
-    """Factors of the coefficients of a curve: for its value, and for its slope [1/rad]."""
-
-    value: Curve
-    slope: Curve
-
-
 class Level(NamedTuple):
     """Volume of a chamber [m^3] and its slope over the angle [m^3/rad] at one pressure."""
 
@@ -73,15 +66,8 @@ class Level(NamedTuple):
     slope: float
 
 
-class Levels(NamedTuple):
-    """A chamber at an angle: up to the lowest pressure, and what each stretch adds."""
-
-    lowest: Level
-    gains: Annotated[tuple[Level, ...], RISES]
-
-
-def bases_at(table: Table, angle: float) -> Bases:
-    """Bases of all curves of a table at an angle [rad]."""
+def bases_at(table: Table, angle: float) -> tuple[Curve, Curve]:
+    """Factors of the coefficients of all curves of a table at an angle [rad]: for value and slope [1/rad]."""
     # Truncated powers: the cube of max(share - bend, 0) begins at its bend with two continuous derivatives.
     share = (angle - table.first_angle) * table.per_angle
     square, per = share * share, table.per_angle
@@ -93,19 +79,19 @@ def bases_at(table: Table, angle: float) -> Bases:
     s0, s1, s2, s3 = d0 * d0, d1 * d1, d2 * d2, d3 * d3
     s4, s5, s6, s7 = d4 * d4, d5 * d5, d6 * d6, d7 * d7
     three = 3.0 * per
-    return Bases(
-        value=Curve(
+    return (
+        Curve(
             (1.0, share, square, square * share),
             (s0 * d0, s1 * d1, s2 * d2, s3 * d3, s4 * d4, s5 * d5, s6 * d6, s7 * d7),
         ),
-        slope=Curve(
+        Curve(
             (0.0, per, 2.0 * per * share, three * square),
             (three * s0, three * s1, three * s2, three * s3, three * s4, three * s5, three * s6, three * s7),
         ),
     )
 
 
-def along(curve: Curve, basis: Curve) -> float:
+def curve_value(curve: Curve, basis: Curve) -> float:
     """Value of a curve, or of its slope, at an angle where the basis of the spline is known."""
     a, b, c, d = curve.powers, basis.powers, curve.bends, basis.bends
     smooth = (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
@@ -113,22 +99,20 @@ def along(curve: Curve, basis: Curve) -> float:
     return smooth + (low + ((c[4] * d[4] + c[5] * d[5]) + (c[6] * d[6] + c[7] * d[7])))
 
 
-def level_of(curve: Curve, bases: Bases) -> Level:
+def level_of(curve: Curve, bases: tuple[Curve, Curve]) -> Level:
     """Value and slope of a curve over the angle."""
-    return Level(along(curve, bases.value), along(curve, bases.slope))
+    return Level(curve_value(curve, bases[0]), curve_value(curve, bases[1]))
 
 
-def levels_of(chamber: TabulatedChamber, bases: Bases, dead_volume: float) -> Levels:
-    """A chamber with a dead volume [m^3] at an angle."""
+def levels_of(chamber: TabulatedChamber, bases: tuple[Curve, Curve], dead_volume: float) -> tuple[Level, ...]:
+    """A chamber with a dead volume [m^3] at an angle: up to the lowest pressure, and what each stretch adds."""
     lowest, rises = level_of(chamber.lowest, bases), chamber.rises
-    return Levels(
+    return (
         Level(lowest.volume + dead_volume, lowest.slope),
-        (
-            level_of(rises[0].gain, bases),
-            level_of(rises[1].gain, bases),
-            level_of(rises[2].gain, bases),
-            level_of(rises[3].gain, bases),
-        ),
+        level_of(rises[0].gain, bases),
+        level_of(rises[1].gain, bases),
+        level_of(rises[2].gain, bases),
+        level_of(rises[3].gain, bases),
     )
 
 
@@ -149,12 +133,12 @@ def filled_from_vented(rise: Rise, gauge: float) -> float:
     return filled_share(rise, gauge) - filled_share(rise, 0.0)
 
 
-def volume_at(chamber: TabulatedChamber, levels: Levels, gauge: float) -> float:
+def volume_at(chamber: TabulatedChamber, levels: tuple[Level, ...], gauge: float) -> float:
     """Volume of a chamber [m^3] at a gauge pressure [Pa]."""
-    rises, gains = chamber.rises, levels.gains
-    low = gains[0].volume * share_of(rises[0], gauge) + gains[1].volume * share_of(rises[1], gauge)
-    high = gains[2].volume * share_of(rises[2], gauge) + gains[3].volume * share_of(rises[3], gauge)
-    return levels.lowest.volume + (low + high)
+    rises = chamber.rises
+    low = levels[1].volume * share_of(rises[0], gauge) + levels[2].volume * share_of(rises[1], gauge)
+    high = levels[3].volume * share_of(rises[2], gauge) + levels[4].volume * share_of(rises[3], gauge)
+    return levels[0].volume + (low + high)
 
 
 def compliance_in(rise: Rise, gain: Level, gauge: float) -> float:
@@ -163,22 +147,22 @@ def compliance_in(rise: Rise, gain: Level, gauge: float) -> float:
     return gain.volume / rise.length if gauge >= rise.lower and gauge < rise.lower + rise.length else 0.0
 
 
-def compliance_at(chamber: TabulatedChamber, levels: Levels, gauge: float) -> float:
+def compliance_at(chamber: TabulatedChamber, levels: tuple[Level, ...], gauge: float) -> float:
     """Growth of the volume with the pressure [m^3/Pa] at a gauge pressure [Pa]."""
-    rises, gains = chamber.rises, levels.gains
-    low = compliance_in(rises[0], gains[0], gauge) + compliance_in(rises[1], gains[1], gauge)
-    return low + (compliance_in(rises[2], gains[2], gauge) + compliance_in(rises[3], gains[3], gauge))
+    rises = chamber.rises
+    low = compliance_in(rises[0], levels[1], gauge) + compliance_in(rises[1], levels[2], gauge)
+    return low + (compliance_in(rises[2], levels[3], gauge) + compliance_in(rises[3], levels[4], gauge))
 
 
-def turning(chamber: TabulatedChamber, levels: Levels, gauge: float) -> float:
+def chamber_torque(chamber: TabulatedChamber, levels: tuple[Level, ...], gauge: float) -> float:
     """Torque [N m] at a gauge pressure [Pa]: the integral of the volume's slope over the pressure."""
-    rises, gains = chamber.rises, levels.gains
-    low = gains[0].slope * filled_from_vented(rises[0], gauge) + gains[1].slope * filled_from_vented(rises[1], gauge)
-    high = gains[2].slope * filled_from_vented(rises[2], gauge) + gains[3].slope * filled_from_vented(rises[3], gauge)
-    return levels.lowest.slope * gauge + (low + high)
+    rises = chamber.rises
+    low = levels[1].slope * filled_from_vented(rises[0], gauge) + levels[2].slope * filled_from_vented(rises[1], gauge)
+    high = levels[3].slope * filled_from_vented(rises[2], gauge) + levels[4].slope * filled_from_vented(rises[3], gauge)
+    return levels[0].slope * gauge + (low + high)
 
 
-def climb(rise: Rise, gain: Level, volume: float, found: float, content: float, atmosphere: float) -> float:
+def stretch_pressure(rise: Rise, gain: Level, volume: float, found: float, content: float, atmosphere: float) -> float:
     """Absolute pressure [Pa] in a stretch that the gas content [J] reaches; else the one found below it."""
     begin = rise.lower + atmosphere
     stretch = LinearChamber(
@@ -192,16 +176,16 @@ def climb(rise: Rise, gain: Level, volume: float, found: float, content: float, 
     return own if content > begin * volume else found
 
 
-def pressure_at(chamber: TabulatedChamber, levels: Levels, content: float, atmosphere: float) -> float:
+def pressure_at(chamber: TabulatedChamber, levels: tuple[Level, ...], content: float, atmosphere: float) -> float:
     """Absolute pressure [Pa] at which p V is a gas content [J]."""
-    rises, gains = chamber.rises, levels.gains
-    volume = levels.lowest.volume
-    pressure = climb(rises[0], gains[0], volume, content / volume, content, atmosphere)
-    second = volume + gains[0].volume
-    pressure = climb(rises[1], gains[1], second, pressure, content, atmosphere)
-    third = second + gains[1].volume
-    pressure = climb(rises[2], gains[2], third, pressure, content, atmosphere)
-    return climb(rises[3], gains[3], third + gains[2].volume, pressure, content, atmosphere)
+    rises = chamber.rises
+    volume = levels[0].volume
+    pressure = stretch_pressure(rises[0], levels[1], volume, content / volume, content, atmosphere)
+    second = volume + levels[1].volume
+    pressure = stretch_pressure(rises[1], levels[2], second, pressure, content, atmosphere)
+    third = second + levels[2].volume
+    pressure = stretch_pressure(rises[2], levels[3], third, pressure, content, atmosphere)
+    return stretch_pressure(rises[3], levels[4], third + levels[3].volume, pressure, content, atmosphere)
 
 
 def chambers(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> Chambers:
@@ -236,8 +220,8 @@ def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: floa
     room = plant.atmospheric_pressure
     first, second, bases = shape.table.chamber_1, shape.table.chamber_2, bases_at(shape.table, angle)
     # A dead volume does not change with the angle, so it gives no torque: 0 stands for it.
-    active_1 = turning(first, levels_of(first, bases, 0.0), pressure_1 - room)
-    active_2 = turning(second, levels_of(second, bases, 0.0), pressure_2 - room)
+    active_1 = chamber_torque(first, levels_of(first, bases, 0.0), pressure_1 - room)
+    active_2 = chamber_torque(second, levels_of(second, bases, 0.0), pressure_2 - room)
     return active_1 + active_2 - shape.stiffness * (angle - shape.rest_angle)
 
 

@@ -42,7 +42,7 @@ def prepare(settings: Bandwidths, _device: Any) -> SensorRates:
     return SensorRates(angle=turn * settings.angle_bandwidth, pressure=turn * settings.pressure_bandwidth)
 
 
-def as_they_show(
+def sensor_readings(
     angle: float, pressure_1: float, pressure_2: float, bandwidth: SensorRates, bandwidth_state: SensorState
 ) -> tuple[float, float, float]:
     """Angle [rad] and absolute pressures [Pa] that the sensors show; a sensor without a bandwidth shows the truth."""
@@ -88,7 +88,7 @@ EFFECT = Effect(
     parameters=SensorRates,
     prepare=prepare,
     switch=("angle_bandwidth", "pressure_bandwidth"),
-    laws={shown_signals: as_they_show},
+    laws={shown_signals: sensor_readings},
     source="a first-order lag, exact between two instants",
     equation="dy/dt = 2 pi f (x - y)",
     state=State(row=SensorState, start=start, advance=advance, slopes=slopes),

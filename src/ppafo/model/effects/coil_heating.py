@@ -32,7 +32,7 @@ class CoilRises(NamedTuple):
     rise_b: float = 0.0
 
 
-def slower(rise: float, pull_in_share: float) -> float:
+def relative_opening_time(rise: float, pull_in_share: float) -> float:
     """Opening time of a coil relative to a cold one [-], at a rise [K].
 
     The current in a coil rises as ``i = u/R (1 - exp(-R t/L))`` to the one that lifts the valve, which is a share ``q``
@@ -63,7 +63,7 @@ def prepare(settings: CoilSettings, _device: Any) -> CoilHeating:
     """
     # A parabola through three points of the formula, exact at no rise, half and full rise.
     steady, share = settings.steady_rise, settings.pull_in_share
-    half, full = slower(0.5 * steady, share) - 1.0, slower(steady, share) - 1.0
+    half, full = relative_opening_time(0.5 * steady, share) - 1.0, relative_opening_time(steady, share) - 1.0
     # Without a rise both differences are 0, and so is the parabola.
     whole = max(steady, 1.0e-30)
     return CoilHeating(
@@ -74,7 +74,7 @@ def prepare(settings: CoilSettings, _device: Any) -> CoilHeating:
     )
 
 
-def opening_when_warm(time: float, is_coil_a: float, coil_heating: CoilHeating, coil_heating_state: CoilRises) -> float:
+def warm_opening_time(time: float, is_coil_a: float, coil_heating: CoilHeating, coil_heating_state: CoilRises) -> float:
     """Time [s] from energising to flow of a coil as warm as it is then."""
     rise = coil_heating_state.rise_a if is_coil_a > 0.5 else coil_heating_state.rise_b
     return opening_time(time, is_coil_a) * (1.0 + rise * (coil_heating.slowing + rise * coil_heating.slowing_squared))
@@ -108,7 +108,7 @@ EFFECT = Effect(
     parameters=CoilHeating,
     prepare=prepare,
     switch=("steady_rise",),
-    laws={opening_time: opening_when_warm},
+    laws={opening_time: warm_opening_time},
     source="a coil at constant voltage, R L in series; resistance of copper, IEC 60034-1",
     equation="t/t_0 = ln(1 - q r) / (r ln(1 - q)), r = 1 + alpha x, dx/dt = (x_s on - x) / tau",
     symbols=(

@@ -33,7 +33,7 @@ def prepare(settings: IceSettings, _device: Any) -> Ice:
     return Ice(blockage_per_gas=settings.blockage_per_gas, melting=1.0 / settings.melting_time)
 
 
-def narrowed(conductance: float, ice_state: IceState) -> float:
+def iced_path(conductance: float, ice_state: IceState) -> float:
     """Conductance [kg/(s Pa)] of the exhaust path with ice in it; ``C / (1 + s)``."""
     # A stage of a step extrapolates the state, below 0 too.
     return exhaust_path(conductance / (1.0 + max(ice_state.blockage, 0.0)))
@@ -59,7 +59,7 @@ EFFECT = Effect(
     parameters=Ice,
     prepare=prepare,
     switch=("blockage_per_gas",),
-    laws={exhaust_path: narrowed},
+    laws={exhaust_path: iced_path},
     source="assumed: the simplest balance of growth and melting, to be fitted to a valve",
     equation="C = C_v / (1 + s), ds/dt = g m'_out - s / tau",
     symbols=(

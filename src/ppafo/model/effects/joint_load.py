@@ -20,7 +20,7 @@ class JointLoad(NamedTuple):
     ]
 
 
-def taken(torque: float, angle: float, rate: float, joint_load: JointLoad) -> float:
+def joint_load_torque(torque: float, angle: float, rate: float, joint_load: JointLoad) -> float:
     """Torque [N m] that drag, spring and weight take from the joint: ``c w |w| + k (theta - theta_0) + T_w(theta)``."""
     others = load_torque(torque, angle, rate)
     drag = joint_load.drag * rate * abs(rate)
@@ -35,7 +35,7 @@ EFFECT = Effect(
     parameters=JointLoad,
     prepare=None,
     switch=("drag", "stiffness", "weight"),
-    laws={load_torque: taken},
+    laws={load_torque: joint_load_torque},
     source="quadratic drag, Hooke's spring, and the weight of a link",
     equation="T_l = c w |w| + k (theta - theta_0) - W cos(theta - 90 deg)",
     symbols=(

@@ -159,7 +159,18 @@ def _problems(effect: Effect) -> Iterator[str]:
     if effect.always and (effect.switch or effect.is_of_device):
         yield "is always on: it has no switch, and names the section of a parameter set that its settings have"
     if not effect.always:
-        yield from _problems_of_switch(effect)
+        for item in effect.quantities:
+            if item.default is None:
+                yield f"'{item.name}' has no default: a device that says nothing of an effect must be without it"
+        # A switch below 0 would be on or off by its sign.
+        lowest = {item.name: item.minimum for item in effect.quantities}
+        if not effect.switch:
+            yield "has no switch"
+        for name in effect.switch:
+            if lowest.get(name) != 0.0:
+                yield f"switch names '{name}', which is no quantity with a minimum of 0"
+        if effect.is_on(effect.defaults()):
+            yield "its defaults leave it on: a device that says nothing of an effect must be without it"
     for name, defaults in effect.of_gas.items():
         # A gas without a default would silently get another gas's number.
         lacking = [species for species in SPECIES if species not in defaults]
@@ -170,22 +181,6 @@ def _problems(effect: Effect) -> Iterator[str]:
         given, taken = _parameters(port), [name for name in _parameters(law) if name not in effect.rows]
         if taken != given:
             yield f"{law.__name__}({', '.join(taken)}) must take ({', '.join(given)}), as {port.__name__} does"
-
-
-def _problems_of_switch(effect: Effect) -> Iterator[str]:
-    """Yield the faults of an effect that can be off: in its switch and its defaults."""
-    for item in effect.quantities:
-        if item.default is None:
-            yield f"'{item.name}' has no default: a device that says nothing of an effect must be without it"
-    # A switch below 0 would be on or off by its sign.
-    lowest = {item.name: item.minimum for item in effect.quantities}
-    if not effect.switch:
-        yield "has no switch"
-    for name in effect.switch:
-        if lowest.get(name) != 0.0:
-            yield f"switch names '{name}', which is no quantity with a minimum of 0"
-    if effect.is_on(effect.defaults()):
-        yield "its defaults leave it on: a device that says nothing of an effect must be without it"
 
 
 def laws_in_order(effects: Sequence[Effect]) -> dict[Any, Any]:

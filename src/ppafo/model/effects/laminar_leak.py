@@ -16,7 +16,7 @@ class LaminarLeak(NamedTuple):
     ]
 
 
-def with_gap(
+def leak_with_gap(
     conductance: float, pressure_1: float, pressure_2: float, curve: FlowCurve, laminar_leak: LaminarLeak
 ) -> float:
     """Conductance [kg/(s Pa)] of an orifice that passes as much as leak and gap together, ``c (P_1^2 - P_2^2)`` more.
@@ -37,7 +37,7 @@ EFFECT = Effect(
     parameters=LaminarLeak,
     prepare=None,
     switch=("coefficient",),
-    laws={leakage_path: with_gap},
+    laws={leakage_path: leak_with_gap},
     source="isothermal laminar flow of an ideal gas through a gap (Hagen-Poiseuille); identified by vane-leak",
     equation="m_l = C_l P_up psi(r) + c_l (P_1^2 - P_2^2)",
     symbols=(("c_l", "coefficient", "kg/(s Pa^2)", "laminar leak between the chambers over P_1^2 - P_2^2"),),

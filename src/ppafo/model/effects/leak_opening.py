@@ -24,7 +24,7 @@ class LeakSettings(NamedTuple):
     rise: Annotated[float, Number("", "excess at which half of the leak is open, over that pressure", 1.0, 0.01, 100.0)]
 
 
-def lifted(
+def lifted_leak(
     conductance: float, pressure_1: float, pressure_2: float, curve: FlowCurve, leak_opening: LeakOpening
 ) -> float:
     """Conductance [kg/(s Pa)] of the leak: ``C e / (e + w P_o)`` with ``e = |P_1 - P_2| - P_o``, and 0 below ``P_o``.
@@ -47,7 +47,7 @@ EFFECT = Effect(
     parameters=LeakOpening,
     prepare=None,
     switch=("pressure",),
-    laws={leakage_path: lifted},
+    laws={leakage_path: lifted_leak},
     source="assumed: a lip that the gas lifts against a constant preload, to be fitted to an actuator",
     equation="C = C_l e / (e + w P_o), e = max(0, |P_1 - P_2| - P_o)",
     symbols=(

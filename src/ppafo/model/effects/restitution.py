@@ -13,7 +13,7 @@ class Restitution(NamedTuple):
     restitution: Annotated[float, Number("", "rebound speed over impact speed at a stop", minimum=0.0, maximum=1.0)]
 
 
-def thrown_back(angular_velocity: float, restitution: Restitution) -> float:
+def rebound_velocity(angular_velocity: float, restitution: Restitution) -> float:
     """Angular velocity [rad/s] with which the vane leaves a stop: ``-e w``, Newton's law of impact."""
     return -restitution.restitution * angular_velocity
 
@@ -25,7 +25,7 @@ EFFECT = Effect(
     parameters=Restitution,
     prepare=None,
     switch=(),
-    laws={rebound: thrown_back},
+    laws={rebound: rebound_velocity},
     source="Newton's law of impact",
     equation="w_after = -e w_before",
     symbols=(("e", "restitution", "-", "rebound speed over impact speed at a stop"),),

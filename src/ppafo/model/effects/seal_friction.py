@@ -16,14 +16,14 @@ class SealFriction(NamedTuple):
     dynamic_per_pressure: Annotated[float, Number("N m/Pa", "friction torque in motion per pressure", 0.0, 0.0, 1.0)]
 
 
-def pressed_at_rest(torque: float, pressure_1: float, pressure_2: float, seal_friction: SealFriction) -> float:
+def static_seal_friction(torque: float, pressure_1: float, pressure_2: float, seal_friction: SealFriction) -> float:
     """Largest friction torque at rest [N m]: ``T_s + c_s |P_1 - P_2|``."""
     return friction_at_rest(torque, pressure_1, pressure_2) + seal_friction.static_per_pressure * abs(
         pressure_1 - pressure_2
     )
 
 
-def pressed_in_motion(
+def dynamic_seal_friction(
     torque: float, angular_velocity: float, pressure_1: float, pressure_2: float, seal_friction: SealFriction
 ) -> float:
     """Size of the friction torque in motion [N m]: ``T_d + c_d |P_1 - P_2|``."""
@@ -38,7 +38,7 @@ EFFECT = Effect(
     parameters=SealFriction,
     prepare=None,
     switch=("static_per_pressure", "dynamic_per_pressure"),
-    laws={friction_at_rest: pressed_at_rest, friction_in_motion: pressed_in_motion},
+    laws={friction_at_rest: static_seal_friction, friction_in_motion: dynamic_seal_friction},
     source="assumed: linear in the pressure on the seals, to be fitted to an actuator; the simulated bench has it too",
     equation="T_f = T_f0 + c |P_1 - P_2|",
     symbols=(

@@ -71,12 +71,12 @@ def gas_enthalpy(temperature: float, density: float, gas_constant: float, heat_c
     return temperature * (heat_capacity + gas_constant * real_gas_factor(density, virial))
 
 
-def compressed(density: float, second_virial: SecondVirial) -> float:
+def real_gas_density(density: float, second_virial: SecondVirial) -> float:
     """Density [kg/m^3] of the gas, given an ideal gas's at its pressure and temperature."""
     return real_density(density, 1.0, 1.0, second_virial.per_mass)
 
 
-def expanded(density: float, second_virial: SecondVirial) -> tuple[float, float]:
+def ideal_gas_density(density: float, second_virial: SecondVirial) -> tuple[float, float]:
     """Density [kg/m^3] of an ideal gas with the pressure of this one, ``rho Z``, and how it grows with rho [-]."""
     virial = second_virial.per_mass
     return density * real_gas_factor(density, virial), 1.0 + 2.0 * virial * density
@@ -90,7 +90,7 @@ EFFECT = Effect(
     prepare=prepare,
     switch=("share",),
     of_gas={"coefficient": SECOND_VIRIAL},
-    laws={gas_density: compressed, ideal_density: expanded},
+    laws={gas_density: real_gas_density, ideal_density: ideal_gas_density},
     source="J. H. Dymond and E. B. Smith, The Virial Coefficients of Pure Gases and Mixtures, 1980",
     equation="P = rho (R/M) T (1 + b rho), b = share B / M",
     symbols=(("b", "per_mass", "m^3/kg", "second virial coefficient over the molar mass"),),

@@ -8,19 +8,13 @@ from ppafo.model.ports import at_valve
 from ppafo.model.valves.kind import VENTS_ABOVE
 
 
-class SpoolPlay(NamedTuple):
-    """Whole width of the play [-], in units of the command."""
-
-    play_width: float
-
-
 class SpoolPlace(NamedTuple):
     """Command [-] that the spool follows, -1 to 1, which starts in its middle."""
 
     spool_command: float = 0.0
 
 
-class PlaySettings(NamedTuple):
+class SpoolPlay(NamedTuple):
     """Setting of the play [-] between command and spool."""
 
     width: Annotated[float, Number("", "whole width of the play over the full command, 0 for none", 0.0, 0.0, 0.5)]
@@ -39,10 +33,10 @@ def spool_position(position: float, command: float, play_width: float) -> float:
     return max(-1.0, min(1.0, inner / (1.0 - half)))
 
 
-def behind_play(command: float, spool_play: SpoolPlay, spool_play_state: SpoolPlace) -> float:
+def command_behind_play(command: float, spool_play: SpoolPlay, spool_play_state: SpoolPlace) -> float:
     """Command [-] that a spool follows with play behind its command. A command that vents is no position."""
     given = at_valve(command)
-    drawn = spool_position(spool_play_state.spool_command, given, spool_play.play_width)
+    drawn = spool_position(spool_play_state.spool_command, given, spool_play.width)
     return given if given > VENTS_ABOVE else drawn
 
 
@@ -66,15 +60,15 @@ def slopes(_spool_play: SpoolPlay, _spool_play_state: SpoolPlace, _now: PlantSna
 EFFECT = Effect(
     name="spool_play",
     summary="Play between command and spool of the valve.",
-    settings=PlaySettings,
+    settings=SpoolPlay,
     parameters=SpoolPlay,
     prepare=None,
     switch=("width",),
-    laws={at_valve: behind_play},
+    laws={at_valve: command_behind_play},
     source="the play operator of hysteresis; the simulated test bench has it too",
     equation="y = max(c - b/2, min(c + b/2, y)), c' = y / (1 - b/2)",
     symbols=(
-        ("b", "play_width", "-", "whole width of the play between command and spool"),
+        ("b", "width", "-", "whole width of the play between command and spool"),
         ("c'", "spool_command", "-", "command that a spool with play follows"),
     ),
     state=State(row=SpoolPlace, start=None, advance=advance, slopes=slopes, settle=settle),

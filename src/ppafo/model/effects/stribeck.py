@@ -32,7 +32,7 @@ def prepare(settings: StribeckSettings, device: Any) -> Stribeck:
     return Stribeck(settings.share * (friction.static_torque - friction.dynamic_torque), scale)
 
 
-def more_near_standstill(
+def stribeck_friction(
     torque: float, angular_velocity: float, pressure_1: float, pressure_2: float, stribeck: Stribeck
 ) -> float:
     """Size of the friction torque in motion [N m]: ``T_d + a (T_s - T_d) / (1 + (w / w_s)^2)``."""
@@ -47,7 +47,7 @@ EFFECT = Effect(
     parameters=Stribeck,
     prepare=prepare,
     switch=("velocity",),
-    laws={friction_in_motion: more_near_standstill},
+    laws={friction_in_motion: stribeck_friction},
     source="the curve of Hess and Soom (Journal of Tribology 112, 1990); a share below 1 lets the vane break away",
     equation="T_f = T_d + a (T_s - T_d) / (1 + (w / w_s)^2)",
     symbols=(

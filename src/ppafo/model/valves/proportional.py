@@ -21,7 +21,7 @@ from ppafo.model.plant import (
     single_port_flow_slopes,
     single_ports,
 )
-from ppafo.model.valves.kind import ValveKind, ValveModel, never
+from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel, never
 
 # From shut to open within 1 ps, below any step; two instants within 10 ps are one; and a quotient of zeros is finite.
 NO_SLEW_LIMIT = 1.0e12
@@ -76,9 +76,12 @@ class SpoolState(NamedTuple):
 
 
 def opening_of_command(command: float, dead_band: float) -> float:
-    """Opening [-], -1 to 1, that a command asks for: nothing inside the dead band, all at full command."""
+    """Opening [-], -1 to 1, that a command asks for: nothing inside the dead band, all at full command.
+
+    While a vent valve behind it vents, the spool returns to its middle, so that it feeds no chamber when that shuts.
+    """
     size = max(min(abs(command), 1.0) - dead_band, 0.0) / (1.0 - dead_band)
-    return size if command >= 0.0 else -size
+    return 0.0 if command > VENTS_ABOVE else (size if command >= 0.0 else -size)
 
 
 def advance_ideal(
@@ -86,18 +89,8 @@ def advance_ideal(
 ) -> tuple[float, NoValveState]:
     """Opening during the step [-], -1 to 1, of a valve without dynamics."""
     size = max(min(abs(command), 1.0) - valve.dead_band, 0.0) * valve.gain
-    opening = size if command >= 0.0 else -size
+    opening = 0.0 if command > VENTS_ABOVE else (size if command >= 0.0 else -size)
     return opening, NoValveState(opening)
-
-
-def slew_opening(requested: float, target: float, slew_limit: float, step: float) -> tuple[float, float]:
-    """Requested opening after a step [s], and its rate [1/s], on the way to a target at the slew limit [1/s]."""
-    distance = target - requested
-    # The sign by two selects, 0 at the target.
-    way = (1.0 if distance > 0.0 else 0.0) - (1.0 if distance < 0.0 else 0.0)
-    arrives = abs(distance) <= slew_limit * step
-    rate = way * slew_limit
-    return (target if arrives else requested + rate * step), rate
 
 
 def towards_chamber_1(opening: float, next_opening: float, mean: float) -> float:
@@ -117,7 +110,11 @@ def advance_moving(
     """Mean openings [-] in a step [s] and the spool at its end; the request changes its rate at the beginning only."""
     settled = settle_moving(valve, state, command, time)
     target = opening_of_command(command, valve.dead_band)
-    requested, slew = slew_opening(settled.requested, target, valve.slew_limit, step)
+    # The request moves at the slew limit, with the sign by two selects, 0 at the target.
+    distance = target - settled.requested
+    slew = ((1.0 if distance > 0.0 else 0.0) - (1.0 if distance < 0.0 else 0.0)) * valve.slew_limit
+    arrives = abs(distance) <= valve.slew_limit * step
+    requested = target if arrives else settled.requested + slew * step
     requested_mean = 0.5 * (settled.requested + requested)
     has_spool = valve.frequency > 0.0
     angular = 2.0 * math.pi * valve.frequency

@@ -5,9 +5,10 @@ foot moves freely. A coil accepts a change at most once in every switching inter
 the opening or closing delay, and is lost if the coil is commanded otherwise before that.
 """
 
+from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
-from ppafo.model.declaration import Number
+from ppafo.model.declaration import EmptyRow, Number
 from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_port_flow, single_port_flow_slopes
 from ppafo.model.ports import exhaust_path, opening_time, supply_path
 from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel, never
@@ -21,10 +22,6 @@ SAME_INSTANT = 1.0e-9
 OpeningDelay = Annotated[float, Number("s", "time from energising to flow from the source", 0.0, 0.0, 0.2)]
 ClosingDelay = Annotated[float, Number("s", "time from de-energising to venting", 0.0, 0.0, 0.2)]
 SwitchingInterval = Annotated[float, Number("s", "shortest time between two switchings of one valve", 0.0, 0.0, 1.0)]
-
-
-class IdealSolenoid(NamedTuple):
-    """An ideal pair of solenoid valves has no parameters."""
 
 
 class PairPositions(NamedTuple):
@@ -67,7 +64,7 @@ def coil_commands(command: float) -> tuple[float, float]:
 
 
 def advance_ideal(
-    valve: IdealSolenoid, state: PairPositions, command: float, time: float, step: float
+    valve: EmptyRow, state: PairPositions, command: float, time: float, step: float
 ) -> tuple[PairPositions, PairPositions]:
     """Positions [-] during the step [s] of a pair that follows its command at once."""
     position_a, position_b = coil_commands(command)
@@ -154,18 +151,18 @@ def advance_timed(
     return PairPositions(settled.coil_a.position, settled.coil_b.position), settled
 
 
-def instant_ideal(valve: IdealSolenoid, state: PairPositions, command: float) -> Openings:
+def instant_ideal(valve: EmptyRow, state: PairPositions, command: float) -> Openings:
     """Openings [-] at an instant of a pair that follows its command at once."""
     position_a, position_b = coil_commands(command)
     return Openings(source_1=position_a, vent_1=1.0 - position_a, source_2=position_b, vent_2=1.0 - position_b)
 
 
-def rates_ideal(valve: IdealSolenoid, state: PairPositions, command: float) -> PairPositions:
+def rates_ideal(valve: EmptyRow, state: PairPositions, command: float) -> PairPositions:
     """Rates [1/s]: none, nothing moves by itself."""
     return PairPositions(0.0, 0.0)
 
 
-def settle_ideal(valve: IdealSolenoid, state: PairPositions, command: float, time: float) -> PairPositions:
+def settle_ideal(valve: EmptyRow, state: PairPositions, command: float, time: float) -> PairPositions:
     """Positions [-] that the command requests, taken at once."""
     position_a, position_b = coil_commands(command)
     return PairPositions(position_a, position_b)
@@ -183,9 +180,9 @@ def rates_timed(valve: TimedSolenoid, state: PairState, command: float) -> PairS
     return PairState(still, still)
 
 
-def prepare_ideal(settings: TimedSolenoid) -> IdealSolenoid:
+def prepare_ideal(settings: TimedSolenoid) -> EmptyRow:
     """Parameters of the ideal pair from ``settings`` [SI]."""
-    return IdealSolenoid()
+    return EmptyRow()
 
 
 def prepare_timed(settings: Any) -> TimedSolenoid:
@@ -204,7 +201,7 @@ def lag(settings: TimedSolenoid) -> float:
 
 
 IDEAL = ValveModel(
-    parameters=IdealSolenoid,
+    parameters=EmptyRow,
     state=PairPositions,
     prepare=prepare_ideal,
     initial=PairPositions,
@@ -223,20 +220,14 @@ IDEAL = ValveModel(
     settle=settle_ideal,
 )
 
-TIMED = ValveModel(
+TIMED = replace(
+    IDEAL,
     parameters=TimedSolenoid,
     state=PairState,
     prepare=prepare_timed,
     initial=PairState,
-    shown=PairPositions,
-    port=SinglePort,
     advance=advance_timed,
-    connect=connect_positions,
-    port_flow=single_port_flow,
-    port_flow_slopes=single_port_flow_slopes,
     jumps=True,
-    shift=None,
-    command_delay=no_dead_time,
     instant=instant_timed,
     rates=rates_timed,
     next_event=next_timed_event,

@@ -7,10 +7,11 @@ it has got for the holding time, or until valve B lets it go; then valve B tops 
 the others. Without a joining time it is the pair of ``solenoid``.
 """
 
+from dataclasses import replace
 from typing import Annotated, NamedTuple
 
 from ppafo.model.declaration import Number
-from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_port_flow, single_port_flow_slopes
+from ppafo.model.plant import Openings, PlantParameters, SinglePort
 from ppafo.model.valves import solenoid
 from ppafo.model.valves.kind import JoiningPath, ValveKind, ValveModel
 from ppafo.model.valves.solenoid import NEVER, SAME_INSTANT, Coil, PairPositions, PairState, TimedSolenoid
@@ -158,20 +159,15 @@ def prepare(settings: RecyclingSettings) -> RecyclingSolenoid:
     return RecyclingSolenoid(solenoid.prepare_timed(settings), settings.joining_time, settings.holding_time)
 
 
-MODEL = ValveModel(
+MODEL = replace(
+    solenoid.TIMED,
     parameters=RecyclingSolenoid,
     state=RecyclingState,
     prepare=prepare,
     initial=RecyclingState,
     shown=RecyclingPositions,
-    port=SinglePort,
     advance=advance,
     connect=connect,
-    port_flow=single_port_flow,
-    port_flow_slopes=single_port_flow_slopes,
-    jumps=True,
-    shift=None,
-    command_delay=solenoid.no_dead_time,
     instant=instant,
     rates=rates,
     next_event=next_event,

@@ -20,11 +20,6 @@ class VentedOpening(NamedTuple):
     vents: float
 
 
-def spool_command(command: float) -> float:
-    """Command [-] of the proportional valve: 0 while both chambers vent."""
-    return 0.0 if command > VENTS_ABOVE else command
-
-
 def vent_chambers(openings: Openings, command: float) -> Openings:
     """Openings [-] with both chambers vented where the command says so."""
     # The vent valve acts at once: it has neither delay nor spool.
@@ -41,8 +36,7 @@ def advance_ideal(
     valve: IdealProportional, state: NoValveState, command: float, time: float, step: float
 ) -> tuple[VentedOpening, NoValveState]:
     """Opening [-] and venting during the step [s], and the state at its end."""
-    # The spool returns to its middle meanwhile, so that it feeds no chamber when the vent valve shuts.
-    opening, after = proportional.advance_ideal(valve, state, spool_command(command), time, step)
+    opening, after = proportional.advance_ideal(valve, state, command, time, step)
     return VentedOpening(opening, 1.0 if command > VENTS_ABOVE else 0.0), after
 
 
@@ -69,40 +63,20 @@ def connect_ideal(plant: PlantParameters, shown: VentedOpening) -> tuple[SingleP
 
 def instant_ideal(valve: IdealProportional, state: NoValveState, command: float) -> Openings:
     """Openings [-] at an instant."""
-    return vent_chambers(proportional.instant_ideal(valve, state, spool_command(command)), command)
-
-
-def settle_ideal(valve: IdealProportional, state: NoValveState, command: float, time: float) -> NoValveState:
-    """Opening [-] that the command requests, taken at once."""
-    return proportional.settle_ideal(valve, state, spool_command(command), time)
+    return vent_chambers(proportional.instant_ideal(valve, state, command), command)
 
 
 def advance_moving(
     valve: MovingProportional, state: SpoolState, command: float, time: float, step: float
 ) -> tuple[Openings, SpoolState]:
     """Mean openings [-] during the step [s] and the spool at its end."""
-    openings, after = proportional.advance_moving(valve, state, spool_command(command), time, step)
+    openings, after = proportional.advance_moving(valve, state, command, time, step)
     return vent_chambers(openings, command), after
 
 
 def instant_moving(valve: MovingProportional, state: SpoolState, command: float) -> Openings:
     """Openings [-] at an instant."""
-    return vent_chambers(proportional.instant_moving(valve, state, spool_command(command)), command)
-
-
-def rates_moving(valve: MovingProportional, state: SpoolState, command: float) -> SpoolState:
-    """Rates [1/s] of the spool; the vent valve has no state."""
-    return proportional.rates_moving(valve, state, spool_command(command))
-
-
-def next_moving_event(valve: MovingProportional, state: SpoolState, command: float, time: float) -> float:
-    """Time [s] at which the requested opening arrives at the command."""
-    return proportional.next_moving_event(valve, state, spool_command(command), time)
-
-
-def settle_moving(valve: MovingProportional, state: SpoolState, command: float, time: float) -> SpoolState:
-    """The state with the requested opening [-] at its target, where it has arrived."""
-    return proportional.settle_moving(valve, state, spool_command(command), time)
+    return vent_chambers(proportional.instant_moving(valve, state, command), command)
 
 
 IDEAL = replace(
@@ -111,17 +85,9 @@ IDEAL = replace(
     advance=advance_ideal,
     connect=connect_ideal,
     instant=instant_ideal,
-    settle=settle_ideal,
 )
 
-MOVING = replace(
-    proportional.MOVING,
-    advance=advance_moving,
-    instant=instant_moving,
-    rates=rates_moving,
-    next_event=next_moving_event,
-    settle=settle_moving,
-)
+MOVING = replace(proportional.MOVING, advance=advance_moving, instant=instant_moving)
 
 
 def choose(settings: proportional.ProportionalSettings) -> ValveModel:

@@ -22,7 +22,7 @@ from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.cold_gas import ColdSupply, Passage
-from ppafo.model.declaration import Quantity, range_rule
+from ppafo.model.declaration import Quantity
 from ppafo.model.gas import SPECIES
 from ppafo.model.source import (
     BottleWall,
@@ -36,12 +36,11 @@ from ppafo.model.source import (
     liquid_density,
     pressure_reserve,
 )
-from ppafo.parameters.declaration import is_within, limits_text
 from ppafo.parameters.overrides import Forms, other_forms, override_set, read_overrides
-from ppafo.parameters.parameter_set import Entry, TextEntry
+from ppafo.parameters.parameter_set import Entry, TextEntry, allowed_number
 from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import Figure
-from ppafo.units import format_quantity, split_quantity, to_si
+from ppafo.units import format_quantity, split_quantity
 from ppafo.units.shown import shown_text
 from ppafo.wording import nearest_name, said_missing
 
@@ -264,6 +263,15 @@ def is_of_catalogue(name_or_path: str | Path) -> bool:
     return Path(name_or_path).parent.suffix == ".toml"
 
 
+def _part_of(name_or_path: str | Path) -> Part | None:
+    """Return the part that a bottle is, by name or ``CATALOGUE.toml/PART``; None for one with a file of its own."""
+    path = Path(name_or_path)
+    if is_of_catalogue(path):
+        return load_catalogue(path.parent).part("bottles", path.name)
+    # A bottle file has its own walls and regulator; a part of the same name has only a content and a mass.
+    return None if str(name_or_path) in FILE.names() else bottle_parts().get(str(name_or_path))
+
+
 def list_bottles() -> tuple[str, ...]:
     """Return the names of the bottles that come with the package: bottle files, and bottles of the catalogue."""
     return tuple(dict.fromkeys((*FILE.names(), *bottle_parts())))
@@ -286,19 +294,15 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     A part of a catalogue of one's own is ``CATALOGUE.toml/PART``. ``overrides`` are texts such as
     ``bottle.gas_mass=567 g`` or ``room.temperature=5 degC``.
     """
-    name, known = label(str(name_or_path)), list_bottles()
-    # A bottle file has its own walls and regulator; a part of the same name has only a content and a mass.
-    if is_of_catalogue(name_or_path):
-        part: Part | None = load_catalogue(Path(name_or_path).parent).part("bottles", Path(name_or_path).name)
-    else:
-        part = None if name in FILE.names() else bottle_parts().get(name)
+    name, known, part = label(str(name_or_path)), list_bottles(), _part_of(name_or_path)
     if not (name in known or Path(name_or_path).suffix == ".toml" or "/" in name):
         hint = nearest_name(name, known)
         raise ParameterError(f"there is no bottle '{name}'{hint}; available: {', '.join(known)}, or give a .toml file")
     # A part has no file of its own: the paper's bottle gives what a catalogue does not say.
     parsed, file = read_model(FILE, bottle_file(), name_or_path if part is None else PAPER_BOTTLE)
     # A file without regulator and hose values has the paper's.
-    entries = _warming() | _given(parsed)
+    paper = _given(read_model(FILE, bottle_file(), PAPER_BOTTLE)[0])
+    entries = {path: paper[path] for path in WARMING} | _given(parsed)
     if part is not None:
         parsed = parsed.model_copy(update={"name": part.name, "title": f"{part.maker}: {part.model}, with a regulator"})
         entries, file = scaled_entries(part, entries), part.name
@@ -319,13 +323,6 @@ def _given(parsed: Any) -> dict[str, Entry]:
     return {path: entry for path, entry in entries.items() if entry is not None}
 
 
-@functools.cache
-def _warming() -> dict[str, Entry]:
-    """Return the values of regulator and hose of the paper's bottle."""
-    entries = _given(read_model(FILE, bottle_file(), PAPER_BOTTLE)[0])
-    return {path: entries[path] for path in WARMING}
-
-
 def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
     """Return the bottle of these values, or report what is missing or cannot be."""
     missing = [path for path in NEEDED if path not in entries]
@@ -334,10 +331,7 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
     values = {}
     for path, entry in entries.items():
         written = f"{file}: {path} = {format_quantity(entry.value, entry.unit)}"
-        with refused_as(ParameterError, written, UnitError):
-            values[path] = to_si(entry.value, entry.unit, PATHS[path].unit)
-        if not (math.isfinite(values[path]) and is_within(values[path], PATHS[path])):
-            raise ParameterError(f"{written}: {range_rule(PATHS[path], limits_text(PATHS[path], entry.unit))}")
+        values[path] = allowed_number(written, entry, PATHS[path])
     with refused_as(ParameterError, f"{file}: gas = '{parsed.gas.value}'", ParameterError):
         fluid = load_fluid(parsed.gas.value)
     bottle = Bottle(
@@ -434,11 +428,9 @@ def bottle_part(name_or_path: str | Path) -> tuple[Part, str]:
 
     A bottle file says nothing of the empty mass: it is what has the heat capacity of the wall.
     """
-    bottle = load_bottle(name_or_path)
-    if is_of_catalogue(name_or_path):
-        return load_catalogue(Path(name_or_path).parent).part("bottles", Path(name_or_path).name), bottle.fluid.name
-    if str(name_or_path) in bottle_parts() and str(name_or_path) not in FILE.names():
-        return bottle_parts()[str(name_or_path)], bottle.fluid.name
+    bottle, known = load_bottle(name_or_path), _part_of(name_or_path)
+    if known is not None:
+        return known, bottle.fluid.name
     empty = bottle.wall.wall_heat_capacity / _WALL
     source = "heat capacity of its wall, at 885 J/(kg K)"
     figure = Figure(value=1000.0 * empty, unit="g", origin="assumed", source=source)

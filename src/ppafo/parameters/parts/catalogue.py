@@ -11,15 +11,14 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.arguments import checked
-from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import SchemaVersion, StrictTable, make_schema, one_of, optional, table, validate
 from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, UnitError, refused_as
+from ppafo.errors import ParameterError
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import ACTUATOR, AREA_FORM, ORIFICE, SONIC_FORM, is_within, limits_text
-from ppafo.units import to_si
+from ppafo.parameters.declaration import ACTUATOR, AREA_FORM, ORIFICE, SONIC_FORM
+from ppafo.parameters.parameter_set import allowed_number
 from ppafo.wording import nearest_name
 
 MASS = Quantity("mass", "kg", "mass of the part, of both valves for a pair", minimum=0.0, maximum=100.0)
@@ -289,11 +288,8 @@ def _part(file: str, group: str, name: str, parsed: Any) -> Part:
         # A guess without its reason cannot be checked by the next reader.
         if figure.origin in _NEEDS_A_REASON and not figure.note.strip():
             raise ParameterError(f"{where}.{key}.note is missing: a figure that is {figure.origin} needs its reason")
-        with refused_as(ParameterError, shown, UnitError):
-            # Data sheets give gauge pressures at sea level.
-            values[key] = to_si(figure.value, figure.unit, declared[key].unit, STANDARD_ATMOSPHERE)
-        if not is_within(values[key], declared[key]):
-            raise ParameterError(f"{shown}: must be {limits_text(declared[key], figure.unit)}")
+        # Data sheets give gauge pressures at sea level.
+        values[key] = allowed_number(shown, figure, declared[key])
     if "torque_constant" in values:
         values.setdefault("displacement_per_radian", values["torque_constant"])
     return Part(

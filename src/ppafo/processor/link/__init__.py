@@ -29,10 +29,10 @@ def example_controller(scenario: Scenario) -> dict[str, bytes]:
         "kind": fixed.law.kind.name,
         "version": __version__,
         "period": str(period),
-        "pressure_step": repr(fixed.converter.pressure_step),
-        "torque_step": repr(fixed.converter.torque_step),
-        "top": repr(fixed.converter.top),
-        "middle": repr(fixed.converter.middle),
+        "pressure_step": repr(fixed.steps.pressure_step),
+        "torque_step": repr(fixed.steps.torque_step),
+        "top": repr(fixed.limits.top),
+        "middle": repr(fixed.limits.middle),
         "next": shlex.join(["ppafo", "hil", source, *settings, "--port", "udp:127.0.0.1:5000", "--out", "out/hil"]),
     }
     own = {name: filled(template(__name__, name), words).encode() for name in _TEMPLATES}

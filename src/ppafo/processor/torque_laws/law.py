@@ -1,15 +1,22 @@
-"""Declaration of an integer controller, in addition to its entry in the catalogue of controllers."""
+"""Declaration of an integer controller, in addition to its entry in the catalogue of controllers, and its numbers."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from ppafo.control.kind import ControllerKind
+from ppafo.model.columns import Problem, at, over_runs
+from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Quantity
-from ppafo.processor.fixed_point import ConverterCounts
+from ppafo.processor.fixed_point import SETTINGS, ConverterCounts, converter_of
 
 Sample = Callable[[Any, Any, ConverterCounts], tuple[int, Any]]
 """Command in steps, from -1000 to 1000, and next state, of numbers, state and readings: a pure function of integers."""
+Settings = Mapping[str, float]
+_ROUNDING = 1.0e-9
+"""Torque [N m] by which a reference may pass what the converter shows: rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,3 +36,82 @@ class FixedLaw:
     number_quantities: tuple[Quantity, ...]
     begins: Any
     state_ranges: Mapping[str, tuple[int, int]]
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """The plan of an integer law, of which ``ControllerKind`` says what it is given and what it makes.
+
+    ``prepare(settings, period, torque_step)`` makes the numbers after the converter's, for one run, ``quantities``
+    declare all of them in order. ``largest`` is the largest part of its range that any number takes, above 1 where the
+    settings cannot be held. A law without numbers of its own has neither.
+    """
+
+    name: str
+    quantities: tuple[Quantity, ...]
+    prepare: Callable[[Settings, float, float], tuple[float, ...]] | None = None
+    largest: Callable[[Settings, float, float], float] | None = None
+
+    def __call__(
+        self, settings: Mapping[str, Any], period: Any, torque_constant: Any, reference: tuple[Any, Any]
+    ) -> tuple[dict[str, Any], tuple[Problem, ...]]:
+        """Whole numbers by name, and what may be wrong."""
+        bits, pressure_range = (settings[quantity.name] for quantity in SETTINGS)
+        steps, limits = over_runs(converter_of, bits, pressure_range, torque_constant)
+        names = tuple(settings)
+
+        def own_numbers(period: float, torque_step: float, *values: float) -> tuple[float, ...]:
+            of_run = dict(zip(names, values, strict=True))
+            size = 0.0 if self.largest is None else self.largest(of_run, period, torque_step)
+            return size, *(() if self.prepare is None else self.prepare(of_run, period, torque_step))
+
+        size, *own = over_runs(own_numbers, period, steps.torque_step, *settings.values())
+        numbers = dict(zip((quantity.name for quantity in self.quantities), (*steps, *limits, *own), strict=True))
+        top, middle = limits
+        low, high = -middle * steps.torque_step, (top - middle) * steps.torque_step
+        return numbers, (
+            (
+                np.asarray(bits % 1.0 != 0.0),
+                lambda run: f"controller.converter_bits = {at(bits, run):g}: must be whole",
+            ),
+            (
+                np.asarray(size > 1.0),
+                lambda run: (
+                    f"controller: a gain of '{self.name}' is {at(size, run):.3g} times the largest: take more "
+                    f"converter_bits, a smaller converter_range, or a smaller gain"
+                ),
+            ),
+            (
+                np.logical_or(reference[0] < low - _ROUNDING, reference[1] > high + _ROUNDING),
+                lambda run: (
+                    f"reference: from {_span(reference, run)}, and the converter shows "
+                    f"{_span((low, high), run)} only: take a larger controller.converter_range"
+                ),
+            ),
+        )
+
+
+def _span(ends: tuple[Any, Any], run: int) -> str:
+    return " to ".join(f"{at(end, run):.6g} N m" for end in ends)
+
+
+def fixed_point_kind(
+    floats: ControllerKind,
+    parameters: type,
+    initial: Any,
+    update: Callable[[Any, Any, float, Any, float], tuple[float, Any]],
+    plan: Numbers,
+) -> ControllerKind:
+    """The integer form of a law as a controller of the catalogue: its settings, and the converter's."""
+    return replace(
+        floats,
+        name=plan.name,
+        summary=f"{floats.summary} In fixed point, as a small processor computes.",
+        quantities=(*floats.quantities, *SETTINGS),
+        parameters=parameters,
+        initial=initial,
+        update=update,
+        restart=None,
+        controls=(TORQUE,),
+        plan=plan,
+    )

@@ -19,13 +19,11 @@ from ppafo.processor.fixed_point import (
     ConverterCounts,
     ConverterLimits,
     CountResolution,
-    converter_with,
     error_of,
     read,
     still_sound,
 )
-from ppafo.processor.planning import Numbers, fixed_point_kind
-from ppafo.processor.torque_laws.law import FixedLaw
+from ppafo.processor.torque_laws.law import FixedLaw, Numbers, fixed_point_kind
 
 
 class OnOffNumbers(NamedTuple):
@@ -58,7 +56,7 @@ def on_off_update(
     parameters: OnOffRows, state: OnOffCounts, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, OnOffCounts]:
     """Command from -1 to 1 that ``on_off_sample`` gives for what the converter shows."""
-    readings = read(converter_with(parameters.steps, parameters.numbers.limits), reference, measurement)
+    readings = read(parameters.steps, parameters.numbers.limits, reference, measurement)
     command, after = on_off_sample(each(int, parameters.numbers), each(int, state), readings)
     return float(command) / COMMAND_STEPS, each(float, after)
 
@@ -121,7 +119,7 @@ def dead_zone_update(
     parameters: DeadZoneRows, state: DeadZoneCounts, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, DeadZoneCounts]:
     """Command from -1 to 1 that ``dead_zone_sample`` gives for what the converter shows."""
-    readings = read(converter_with(parameters.steps, parameters.numbers.limits), reference, measurement)
+    readings = read(parameters.steps, parameters.numbers.limits, reference, measurement)
     command, after = dead_zone_sample(each(int, parameters.numbers), each(int, state), readings)
     return float(command) / COMMAND_STEPS, each(float, after)
 

@@ -8,7 +8,7 @@ commands, the slope at 8191 counts a sample, what anti-windup pulls back by at 3
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from ppafo.control.controllers.feedback import PID as FLOAT_PID
+from ppafo.control.controllers.pid import PID as FLOAT_PID
 from ppafo.engine.composer import each
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
@@ -24,7 +24,6 @@ from ppafo.processor.fixed_point import (
     ConverterLimits,
     CountResolution,
     beyond_band,
-    converter_with,
     error_of,
     fraction_of,
     gain_of,
@@ -33,8 +32,7 @@ from ppafo.processor.fixed_point import (
     shifted,
     still_sound,
 )
-from ppafo.processor.planning import Numbers, fixed_point_kind
-from ppafo.processor.torque_laws.law import FixedLaw
+from ppafo.processor.torque_laws.law import FixedLaw, Numbers, fixed_point_kind
 
 PART_BITS = 6
 HALF_STEP = 2 ** (PART_BITS - 1)
@@ -123,58 +121,42 @@ def pid_update(
     parameters: PidRows, state: PidCounts, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, PidCounts]:
     """Command from -1 to 1 that ``pid_sample`` gives for what the converter shows, once every ``period`` [s]."""
-    readings = read(converter_with(parameters.steps, parameters.numbers.limits), reference, measurement)
+    readings = read(parameters.steps, parameters.numbers.limits, reference, measurement)
     command, after = pid_sample(each(int, parameters.numbers), each(int, state), readings)
     return float(command) / COMMAND_STEPS, each(float, after)
 
 
-class PidFactors(NamedTuple):
-    """Factors of the law: for the error, in parts of a step per count, and in fine parts for its integral.
+def pid_factors(
+    settings: Mapping[str, float], period: float, torque_step: float
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Factors of the law for settings in SI units, a sample period [s] and a torque per count [N m].
 
-    The slope, in parts of a step for 1/65536 count a sample times 2^15; and the shares [-] of a change that the slope
-    takes at once, and of the excess that the integral gives back at a sample.
+    Gains, held as a fraction and places: for the error, in parts of a step per count; for its integral, in fine parts;
+    for the slope, in parts of a step for 1/65536 count a sample times 2^15. Shares [-]: of a change that the slope has
+    at once, of the excess that the integral gives back at a sample, and the dead band.
     """
-
-    proportional: float
-    integral: float
-    derivative: float
-    filter_share: float
-    anti_windup: float
-
-    @property
-    def gains(self) -> tuple[float, float, float]:
-        """The factors that are held as a fraction and places; the others are shares."""
-        return self.proportional, self.integral, self.derivative
-
-
-def pid_factors(settings: Mapping[str, float], period: float, torque_step: float) -> PidFactors:
-    """Return the factors for settings in SI units, a sample period [s] and a torque per count [N m]."""
     # Gains of a torque [N m] and of seconds become gains of counts and samples.
     count = torque_step * FULL
-    return PidFactors(
-        proportional=settings["proportional_gain"] * count,
-        integral=settings["integral_gain"] * period * count * FINE,
-        derivative=settings["derivative_gain"] / period * count * (WIDE / SLOPE_UNIT),
-        filter_share=period / (period + settings["derivative_filter"]),
-        anti_windup=settings["anti_windup"] * period,
+    gains = (
+        settings["proportional_gain"] * count,
+        settings["integral_gain"] * period * count * FINE,
+        settings["derivative_gain"] / period * count * (WIDE / SLOPE_UNIT),
     )
+    shares = (period / (period + settings["derivative_filter"]), settings["anti_windup"] * period)
+    return gains, (*shares, settings["dead_band"])
 
 
 def prepare_pid(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:
     """Return the numbers of ``PidNumbers`` after the limits: for settings in SI units, a period [s], a count [N m]."""
-    factors = pid_factors(settings, period, torque_step)
-    scaled = [number for gain in factors.gains for number in gain_of(gain)]
-    shares = [
-        float(min(LARGEST_FRACTION, int(share * SHARE + 0.5)))
-        for share in (factors.filter_share, factors.anti_windup, settings["dead_band"])
-    ]
-    return (*scaled, *shares)
+    gains, shares = pid_factors(settings, period, torque_step)
+    scaled = (number for gain in gains for number in gain_of(gain))
+    return (*scaled, *(float(min(LARGEST_FRACTION, int(share * SHARE + 0.5))) for share in shares))
 
 
 def largest_pid(settings: Mapping[str, float], period: float, torque_step: float) -> float:
     """Return the largest factor over what its number can hold [-]; above 1 the settings are refused."""
-    factors = pid_factors(settings, period, torque_step)
-    return max(*factors.gains, factors.anti_windup * LARGEST_FRACTION) / LARGEST_FRACTION
+    gains, (_, anti_windup, _) = pid_factors(settings, period, torque_step)
+    return max(*gains, anti_windup * LARGEST_FRACTION) / LARGEST_FRACTION
 
 
 _MOST_OF_FRACTION, _MOST_PLACES = float(LARGEST_FRACTION), float(MOST_PLACES)

@@ -22,7 +22,7 @@ from ppafo.model.effects.kind import Effect
 from ppafo.model.plant import PlantParameters
 from ppafo.model.source import bottle_content, has_liquid
 from ppafo.parameters.device import Device
-from ppafo.parameters.plant import effect_row
+from ppafo.parameters.effects import effect_row
 from ppafo.walking.bottle.course import DIVERGED, UNITS, WALKED, EndKind, SupplyCourse, SupplyEnding
 from ppafo.walking.bottle.supply import BottleSupply
 

@@ -422,6 +422,9 @@ def _stage(comparison: WalkComparison, turns: np.ndarray) -> "tuple[Figure, list
     fine = np.linspace(turns[0], turns[-1], 400)
     atmosphere = configuration.device.supply.atmospheric_pressure
     for channel, name, look in _CHAMBERS:
+        # An actuator may have one chamber.
+        if channel not in worn.recording:
+            continue
         times = fine * walk_of(configuration).gait.stride_time
         pressures = np.interp(times, worn.recording.time, worn.recording[channel])
         shown = display_values(pressures, "pressure")

@@ -2,20 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ppafo.gait.gait import clinical_angle
-from ppafo.metrics import Metric
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import BLACK, BLUE, DASHES, GREY, VERMILION
-from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
-from ppafo.simulation.scenario import Scenario
 from ppafo.walking.motion import walk_of
-from ppafo.walking.strides import PHASES, Curves, healthy_toe_height
+from ppafo.walking.strides import PHASES, healthy_toe_height
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,28 +33,11 @@ _CHANNELS = {
 """Panels from top to bottom, and the channels in each of them that are drawn for every walk."""
 
 
-class _MeanStrideData(Protocol):
-    """A walk as its figure of the mean stride needs it."""
+def walk_figure(walks: Mapping[str, Any]) -> "Figure":
+    """Return the mean stride of one or two walks of the same wearer, and the healthy gait beside them.
 
-    @property
-    def scenario(self) -> Scenario:
-        """Who walks with what."""
-
-    @property
-    def recording(self) -> Recording:
-        """Every sample."""
-
-    @property
-    def averages(self) -> Mapping[str, Curves]:
-        """Mean and deviation of each channel over the stride."""
-
-    @property
-    def metrics(self) -> Mapping[str, Metric]:
-        """Numbers of the whole walk."""
-
-
-def walk_figure(walks: Mapping[str, _MeanStrideData]) -> "Figure":
-    """Return the mean stride of one or two walks of the same wearer by name, and the healthy gait beside them."""
+    ``walks`` are ``WalkResult`` by name, whose own ``plot`` draws this figure.
+    """
     first = next(iter(walks.values()))
     gait = walk_of(first.scenario).gait
     ankle = clinical_angle(gait.ankle_angle.values_at(PHASES))
@@ -80,6 +60,9 @@ def walk_figure(walks: Mapping[str, _MeanStrideData]) -> "Figure":
             label = f"{name}, mean of {result.metrics['counted_strides'].value:.0f}"
             atmosphere = result.scenario.device.supply.atmospheric_pressure
             for channel, dashes in zip(channels, (DASHES.get(colour, "-"), (0, (4, 2))), strict=False):
+                # An actuator may have one chamber.
+                if channel not in result.averages:
+                    continue
                 curves = result.averages[channel]
                 mean = curves.mean - atmosphere if kind is PRESSURE else curves.mean
                 mean = clinical_angle(mean) if kind is ANGLE else mean

@@ -7,11 +7,12 @@ import pytest
 
 from ppafo.control.controllers.model_based import FeedbackLinearisationState, linearising_restart
 from ppafo.control.walking import assistance
-from ppafo.control.walking.assistance import Assistance, Hold, TorqueProfile, profile_torque
+from ppafo.control.walking.assistance import Assistance, TorqueProfile, profile_torque
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.control.walking.phases import DebouncedSensor, PhaseState
-from ppafo.control.walking.timing import ThresholdClock, ThresholdRules, threshold_time
+from ppafo.control.walking.timing import threshold_time
 from ppafo.engine.rows import rebuilt
+from ppafo.model.declaration import EmptyRow
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
@@ -20,7 +21,7 @@ from tests.settings_of_laws import settings_of_law
 PERIOD = 1.0e-3
 PROFILE = TorqueProfile(4.0, 0.5, 0.2, 0.1)
 RULES = Assistance(
-    Hold(1.5, 10.0, 0.5, 0.0),
+    *(1.5, 10.0, 0.5, 0.0),
     landing=TorqueProfile(1.0, 0.05, 0.05, 0.1),
     push_off=PROFILE,
     swing=TorqueProfile(2.0, 0.8, 0.1, 0.3),
@@ -32,9 +33,7 @@ FOLLOWING = [
 
 
 def wanted(phase: PhaseState, angle: float, rate: float, rules: Assistance = RULES) -> float:
-    return assistance.requested_torque(
-        rules, phase, threshold_time(ThresholdRules(), ThresholdClock(), phase), angle, rate
-    )
+    return assistance.requested_torque(rules, phase, threshold_time(EmptyRow(), EmptyRow(), phase), angle, rate)
 
 
 def at(phase: float, share: float) -> PhaseState:
@@ -56,7 +55,7 @@ def test_a_profile_rises_from_zero_to_its_peak_and_falls_to_zero() -> None:
 
 
 def test_each_phase_wants_its_own_torque() -> None:
-    angle = RULES.hold.swing_angle
+    angle = RULES.swing_angle
     assert wanted(at(PUSH_OFF, 0.5), angle, 0.0) == pytest.approx(4.0)
     assert wanted(at(MID_STANCE, 0.5), angle, 9.0) == 0.0
     assert wanted(at(LANDING, 0.05), angle, 0.0) == pytest.approx(-1.0)
@@ -93,7 +92,7 @@ def test_the_rate_of_the_angle_is_filtered_and_has_no_kick_at_the_start() -> Non
     assert first.request.rate == 0.0
     _, state = kind.update(parameters, state, 0.0, seen(1.6, 0.0, 0.0, 0.0), PERIOD)
     second = assistance.assess(parameters, state, seen(1.601, 0.0, 0.0, 0.0), PERIOD, parts=timing)
-    filter_time = parameters.assistance.hold.rate_filter
+    filter_time = parameters.assistance.rate_filter
     assert second.request.rate == pytest.approx(0.001 / (PERIOD + filter_time))
 
 

@@ -58,19 +58,19 @@ def test_a_valve_that_is_not_known_leaves_the_observer_off() -> None:
     off = PAIR._replace(nominal_flow=0.0)
     state = observer.next_observer(off, observer.START, STANDS, ROOM, ROOM, STANDS, 4.0e5, 4.0e5, PERIOD)
     assert state == observer.START
-    assert observer.found_cause(off, state, STANDS, 4.0e5, 4.0e5, PERIOD) == fault_flags.NO_FLAG
+    assert observer.found_cause(off, state, STANDS, 4.0e5, 4.0e5, PERIOD) == fault_flags.NOT_RAISED
 
 
 def found(nominal: NominalDevice, real: NominalDevice, commands: list[float], shown: float | None = None) -> float:
     """The first flag while a real device follows commands at a still angle; chamber 2 may show one pressure [Pa]."""
     volume_1, volume_2 = observer.volumes(real, STANDS)
     content_1, content_2 = ROOM * volume_1, ROOM * volume_2
-    state, cause = observer.START, fault_flags.NO_FLAG
+    state, cause = observer.START, fault_flags.NOT_RAISED
     last = (ROOM, ROOM)
     for command in commands:
         now = (content_1 / volume_1, shown or content_2 / volume_2)
         state = observer.next_observer(nominal, state, STANDS, *last, STANDS, *now, PERIOD)
-        cause = cause or observer.found_cause(nominal, state, STANDS, *now, PERIOD)
+        cause = min(cause, observer.found_cause(nominal, state, STANDS, *now, PERIOD))
         state, last = state._replace(command=command), now
         to_1 = SUPPLY if command == 1.0 else ROOM
         to_2 = real.nominal_dorsiflexion_pressure if command == -1.0 else ROOM
@@ -90,7 +90,7 @@ def test_a_device_that_is_a_little_different_gives_no_sign(nominal: NominalDevic
             real = nominal._replace(
                 nominal_flow=flow * 1.1 * nominal.nominal_flow, nominal_dorsiflexion_pressure=supply * SUPPLY
             )
-            assert found(nominal, real, FILLS) == fault_flags.NO_FLAG
+            assert found(nominal, real, FILLS) == fault_flags.NOT_RAISED
 
 
 @pytest.mark.parametrize("nominal", [PAIR, SPOOL])
@@ -101,8 +101,8 @@ def test_a_dead_volume_of_half_or_twice_what_is_believed_gives_no_sign(nominal: 
         nominal_displacement_per_radian=14.51e-6, nominal_dead_volume_1=36.0e-6, nominal_dead_volume_2=36.0e-6
     )
     real = mostly_dead._replace(nominal_dead_volume_1=dead * 36.0e-6, nominal_dead_volume_2=dead * 36.0e-6)
-    assert found(mostly_dead, real, FILLS) == fault_flags.NO_FLAG
-    assert found(real, mostly_dead, FILLS) == fault_flags.NO_FLAG
+    assert found(mostly_dead, real, FILLS) == fault_flags.NOT_RAISED
+    assert found(real, mostly_dead, FILLS) == fault_flags.NOT_RAISED
 
 
 @pytest.mark.parametrize("nominal", [PAIR, SPOOL])
@@ -125,11 +125,11 @@ def test_gas_that_comes_or_stays_where_the_valve_vents_is_named() -> None:
     closes = PAIR._replace(nominal_flow=1.0e-9)
     half = [-1.0] * 60 + [VENT] * 200
     volume = observer.volumes(PAIR, STANDS)[1]
-    state, content, cause = observer.START, ROOM * volume, fault_flags.NO_FLAG
+    state, content, cause = observer.START, ROOM * volume, fault_flags.NOT_RAISED
     for command in half:
         now = (ROOM, content / volume)
         state = observer.next_observer(PAIR, state, STANDS, *now, STANDS, *now, PERIOD)
-        cause = cause or observer.found_cause(PAIR, state, STANDS, *now, PERIOD)
+        cause = min(cause, observer.found_cause(PAIR, state, STANDS, *now, PERIOD))
         state = state._replace(command=command)
         real = PAIR if command == -1.0 else closes
         content += PERIOD * observer.flow_into(real, content / volume, SUPPLY if command == -1.0 else ROOM, 1.0)
@@ -138,11 +138,11 @@ def test_gas_that_comes_or_stays_where_the_valve_vents_is_named() -> None:
 
 def test_a_closed_chamber_that_loses_gas_leaks() -> None:
     volume = observer.volumes(SPOOL, STANDS)[1]
-    state, content, cause = observer.START, ROOM * volume, fault_flags.NO_FLAG
+    state, content, cause = observer.START, ROOM * volume, fault_flags.NOT_RAISED
     for command in [-1.0] * 300 + [0.0] * 200:
         now = (ROOM, content / volume)
         state = observer.next_observer(SPOOL, state, STANDS, *now, STANDS, *now, PERIOD)
-        cause = cause or observer.found_cause(SPOOL, state, STANDS, *now, PERIOD)
+        cause = min(cause, observer.found_cause(SPOOL, state, STANDS, *now, PERIOD))
         state = state._replace(command=command)
         leak = 0.4 if command == 0.0 else 1.0
         content += leak * PERIOD * observer.flow_into(SPOOL, content / volume, SUPPLY if command else ROOM, 1.0)

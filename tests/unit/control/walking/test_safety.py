@@ -193,14 +193,14 @@ def test_a_large_force_that_is_gone_within_a_sample_stops_and_one_that_falls_qui
     name: str, sensor: str
 ) -> None:
     def after(force: float, period: float = PERIOD) -> float:
-        last = fault_checks.NOTHING_READ._replace(**{name: 500.0})
+        last = fault_checks.LastReadings()._replace(**{name: 500.0})
         seen = GOOD._replace(**{name: force})
         return fault_checks.gone_flag(RULES, last, seen, period)
 
     assert after(0.0) == fault_flags.FORCE_GONE
     assert fault_flags.level_of(fault_flags.FORCE_GONE) == STOPPED
-    assert after(100.0) == fault_flags.NO_FLAG, "no step of a foot that falls flat"
-    assert after(0.0, period=0.01) == fault_flags.NO_FLAG, (
+    assert after(100.0) == fault_flags.NOT_RAISED, "no step of a foot that falls flat"
+    assert after(0.0, period=0.01) == fault_flags.NOT_RAISED, (
         "a slow controller sees a foot leave the ground in one sample"
     )
 

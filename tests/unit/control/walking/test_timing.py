@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ppafo.control.walking import estimated_timing, phases, timing
 from ppafo.control.walking import timing as gait_clock
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.control.walking.estimated_timing import EstimationRules, LearntStride, Window
+from ppafo.control.walking.estimated_timing import EstimatedRules, LearntStride, Window
 from ppafo.control.walking.phases import PhaseRules
 from ppafo.control.walking.timing import TimingKind
 from ppafo.control.walking.timings import TIMINGS, keeps_time, with_timing
@@ -73,7 +73,7 @@ def test_a_force_that_rises_evenly_is_detected_as_late_as_the_known_delays_say()
     seen, times = phases.START, {}
     for sample, (on_heel, on_toe) in enumerate(zip(heel.tolist(), toe.tolist(), strict=True)):
         after = phases.timed_phase_state(RULES, seen, on_heel, on_toe, seen.since_strike + PERIOD, PERIOD)
-        marks = gait_clock.seen_events(seen, after)
+        marks = gait_clock.detected_events(seen, after)
         times |= {name: sample * PERIOD for name, mark in marks._asdict().items() if mark > 0.5}
         seen = after
     for name, time in times.items():
@@ -157,9 +157,15 @@ def test_a_clock_that_a_strike_left_before_it_is_not_moved_where_nothing_is_esti
     assert fraction == pytest.approx(-0.075)
     clock, at = estimated_timing.START._replace(next_knot=29.0), gait_clock.CLOCK_START._replace(fraction=fraction)
     measurement = GaitMeasurement(1.6, 1.0e5, 1.0e5, 0.0, 0.0, 0.0)
-    found = estimated_timing.passed_knot(rules.estimation, clock, at, 0.0, measurement)
+    found = estimated_timing.passed_knot(rules, clock, at, 0.0, measurement)
     assert (found.clock.fraction, found.moved) == (fraction, 0.0)
     assert estimated_timing.gait_time(rules, found, phases.START._replace(phase=LANDING)).since_strike == 0.0
+
+
+def rules_of(**changed: float) -> EstimatedRules:
+    """Rules of the estimation whose estimates count in full, and that learn nothing anew."""
+    rules: EstimatedRules = settings(estimated_timing.ESTIMATED)
+    return rules._replace(relearning=0.0, estimate_weight=1.0, **changed)
 
 
 def learnt(shape: Floats) -> LearntStride:
@@ -194,7 +200,7 @@ def test_the_estimated_shift_is_that_of_brute_force(ahead: float, trust: float) 
 
     stride = shape(turns)
     window = shape(turns + ahead / estimated_timing.KNOTS)[:, -estimated_timing.WINDOW :]
-    rules = EstimationRules(3.0, 0.0, 0.1, 150.0, 100.0, trust, 1.0)
+    rules = rules_of(largest_misfit=100.0, clock_trust=trust)
     moved = (0.0,) * estimated_timing.WINDOW
     found = estimated_timing.estimated_shift(
         learnt(stride), Window(*(tuple(row.tolist()) for row in window), moved), rules
@@ -208,7 +214,7 @@ def test_the_estimated_shift_is_that_of_brute_force(ahead: float, trust: float) 
 def test_nothing_is_estimated_from_what_is_no_stride() -> None:
     stride = learnt(np.zeros((3, estimated_timing.KNOTS)))
     window = Window(*((9.0,) * estimated_timing.WINDOW for _ in range(3)), (0.0,) * estimated_timing.WINDOW)
-    rules = EstimationRules(3.0, 0.0, 0.1, 150.0, 1.0, 2.0, 1.0)
+    rules = rules_of(largest_misfit=1.0, clock_trust=2.0)
     assert estimated_timing.estimated_shift(stride, window, rules) == 0.0
 
 
@@ -225,7 +231,7 @@ def test_an_estimate_follows_a_stride_that_becomes_quicker_before_it_ends() -> N
 def test_the_learnt_stride_is_the_gait_at_the_knots() -> None:
     phase = np.arange(0.5, 10.0, PERIOD)
     clock = followed(estimated_timing.ESTIMATED, phase)[-1]
-    assert clock.learnt == settings(estimated_timing.ESTIMATED).estimation.learning_strides
+    assert clock.learnt == settings(estimated_timing.ESTIMATED).learning_strides
     knots = (clock.next_knot + np.arange(estimated_timing.KNOTS)) % estimated_timing.KNOTS / estimated_timing.KNOTS
     assert np.abs(np.array(clock.stride.angle) - angles(knots)).max() < 0.01
     assert np.abs(np.array(clock.stride.heel_force) - forces(knots, 1.0)[0]).max() < 30.0

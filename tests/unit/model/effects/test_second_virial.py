@@ -11,10 +11,10 @@ from ppafo.model.effects.second_virial import (
     EFFECT,
     SECOND_VIRIAL,
     SecondVirial,
-    compressed,
-    expanded,
     gas_enthalpy,
+    ideal_gas_density,
     real_density,
+    real_gas_density,
     real_pressure,
 )
 from ppafo.model.gas import SPECIES, heat_capacity_at_constant_volume
@@ -36,12 +36,12 @@ def test_density_and_pressure_are_inverse(pressure: float, temperature: float, v
 @given(st.floats(0.1, 30.0), st.floats(-3e-3, 3e-3))
 def test_the_laws_of_the_lanes_are_those_of_the_rig(ideal: float, virial: float) -> None:
     row = SecondVirial(virial)
-    density = compressed(ideal, row)
+    density = real_gas_density(ideal, row)
     assert density == pytest.approx(real_density(ideal * R * T, T, R, virial), rel=1e-12)
-    back, growth = expanded(density, row)
+    back, growth = ideal_gas_density(density, row)
     assert back == pytest.approx(ideal, rel=1e-12)
     step = 1e-6 * density
-    slope = (expanded(density + step, row)[0] - expanded(density - step, row)[0]) / (2.0 * step)
+    slope = (ideal_gas_density(density + step, row)[0] - ideal_gas_density(density - step, row)[0]) / (2.0 * step)
     assert growth == pytest.approx(slope, rel=1e-7)
 
 

@@ -1,0 +1,114 @@
+"""Proportional control with damping on the rate of what is controlled, and a feed-forward table of commands.
+
+Units are those of a torque; of what else is controlled, its unit stands in the place of N m.
+"""
+
+from typing import Annotated, NamedTuple
+
+from ppafo.control.kind import DEAD_BAND, ControllerKind
+from ppafo.control.torque_loop import PROPORTIONAL_GAIN, beyond_dead_band
+from ppafo.model.controlled import ANYTHING, OF_TORQUE, ErrorFunctions, seen_value
+from ppafo.model.declaration import Number, Quantity, quantities_of
+from ppafo.model.sensors import Measurement
+
+KNOTS = 31
+
+
+class DampedGains(NamedTuple):
+    """Gain [1/(N m)], damping [s/(N m)], time constant of its filter [s]."""
+
+    proportional_gain: Annotated[
+        float, Number("1/(N m)", "command per torque error", None, 0.0, 1.0e3, follows=(PROPORTIONAL_GAIN,))
+    ]
+    damping: Annotated[float, Number("s/(N m)", "command per rate of the torque, against it", 0.0, 0.0, 1.0e3)]
+    damping_filter: Annotated[float, Number("s", "time constant of the filter on the torque's rate", 0.001, 0.0, 10.0)]
+
+
+class DampedProportionalParameters(NamedTuple):
+    """Gains, time between knots [s], learnt commands [-] at the knots, and the dead band of the valve [-], believed."""
+
+    gains: DampedGains
+    knot_spacing: float
+    knots: Annotated[tuple[float, ...], KNOTS]
+    dead_band: float
+
+
+class TorqueSlope(NamedTuple):
+    """Torque one sample ago [N m], its filtered rate [N m/s], start mark."""
+
+    torque: float = 0.0
+    slope: float = 0.0
+    started: float = 0.0
+
+
+class DampedProportionalState(NamedTuple):
+    """Time since the start [s], and the torque's course."""
+
+    elapsed: float = 0.0
+    course: TorqueSlope = TorqueSlope()
+
+
+def learnt_command(parameters: DampedProportionalParameters, elapsed: float) -> float:
+    """Command [-] of the table at a time since the start [s]: straight between knots, the last one held."""
+    position = min(elapsed / parameters.knot_spacing, KNOTS - 1.0)
+    # The last knot has no line after it: the line before it is used up to its end.
+    before = min(int(position), KNOTS - 2)
+    fraction = position - before
+    first = parameters.knots[before]
+    return first + fraction * (parameters.knots[before + 1] - first)
+
+
+def damped_command(
+    gains: DampedGains, course: TorqueSlope, reference: float, torque: float, ahead: float, period: float
+) -> tuple[float, TorqueSlope]:
+    """Command u from -1 to 1 for a reference r and a torque T [N m], added to the command ``ahead`` u_0 [-]:
+
+        u = u_0 + proportional_gain (r - T) - damping dT/dt
+
+    The rate is a backward difference over the period [s] through a filter of first order. Damping acts on the rate of
+    the torque, not of the error, so that a step of the reference gives no kick.
+    """
+    change = (torque - course.torque) * course.started
+    # Implicit, as in the PID: a filter of 0 s is the plain difference.
+    slope = course.slope + (change - period * course.slope) / (period + gains.damping_filter)
+    feedback = gains.proportional_gain * (reference - torque) - gains.damping * slope
+    return max(-1.0, min(1.0, feedback + ahead)), TorqueSlope(torque, slope, 1.0)
+
+
+def damped_update(
+    parameters: DampedProportionalParameters,
+    state: DampedProportionalState,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+    *,
+    parts: ErrorFunctions = OF_TORQUE,
+) -> tuple[float, DampedProportionalState]:
+    """Command from -1 to 1 by ``damped_command``, on top of the table's learnt command, beyond the dead band."""
+    ahead = learnt_command(parameters, state.elapsed)
+    wanted, value = parts.steered(reference), parts.steered(seen_value(measurement, parts=parts))
+    opening, course = damped_command(parameters.gains, state.course, wanted, value, ahead, period)
+    return beyond_dead_band(opening, parameters.dead_band), DampedProportionalState(state.elapsed + period, course)
+
+
+GAIN_QUANTITIES = quantities_of(DampedGains)
+"""Fields of ``DampedGains`` in order."""
+
+DAMPED_PROPORTIONAL = ControllerKind(
+    name="damped_proportional",
+    summary="Proportional control with damping injection and a feed-forward table that iterative learning fills.",
+    source="Zhang, Cheah and Collins 2015, Experimental comparison of torque control methods on an ankle exoskeleton",
+    quantities=(
+        *GAIN_QUANTITIES,
+        Quantity("knot_spacing", "s", "time between two knots of the table", 0.1, 1.0e-3, 1.0e3),
+        *(
+            Quantity(f"knot_{number}", "", f"learnt command at knot {number}", 0.0, -1.0, 1.0)
+            for number in range(KNOTS)
+        ),
+        DEAD_BAND,
+    ),
+    parameters=DampedProportionalParameters,
+    initial=DampedProportionalState(),
+    update=damped_update,
+    controls=ANYTHING,
+)

@@ -1,0 +1,105 @@
+"""PID law on the error alone, equation (13).
+
+Units are those of a torque; of what else is controlled, its unit stands in the place of N m.
+"""
+
+from typing import Annotated, NamedTuple
+
+from ppafo.control.kind import BelievedBand, ControllerKind
+from ppafo.control.torque_loop import INTEGRAL_GAIN, INTEGRAL_RATE, PROPORTIONAL_GAIN, beyond_dead_band
+from ppafo.model.controlled import ANYTHING, OF_TORQUE, ErrorFunctions, seen_error
+from ppafo.model.declaration import Number, quantities_of
+from ppafo.model.sensors import Measurement
+
+
+class PidGains(NamedTuple):
+    """Gains [1/(N m)], [1/(N m s)], [s/(N m)]; time constant of the derivative filter [s]; back-calculation [1/s]."""
+
+    proportional_gain: Annotated[float, Number("1/(N m)", "k_p", None, 0.0, 1.0e3, follows=(PROPORTIONAL_GAIN,))]
+    integral_gain: Annotated[float, Number("1/(N m s)", "k_i", None, 0.0, 1.0e6, follows=(INTEGRAL_GAIN,))]
+    derivative_gain: Annotated[float, Number("s/(N m)", "k_d", 0.0, 0.0, 1.0e3)]
+    derivative_filter: Annotated[
+        float, Number("s", "time constant of the derivative filter, 0 for none", 0.0, 0.0, 1.0)
+    ]
+    anti_windup: Annotated[
+        float,
+        Number(
+            "1/s",
+            "rate of back-calculation while the command is clipped, 0 for none",
+            None,
+            0.0,
+            1.0e5,
+            follows=(INTEGRAL_RATE,),
+        ),
+    ]
+
+
+class PidParameters(NamedTuple):
+    """Gains of a PID, and the dead band of the valve [-] that it believes in."""
+
+    gains: PidGains
+    dead_band: BelievedBand
+
+
+class PidState(NamedTuple):
+    """Integral part of the command [-], error one sample ago [N m], filtered slope of the error [N m/s], start mark."""
+
+    integral: float = 0.0
+    error: float = 0.0
+    slope: float = 0.0
+    started: float = 0.0
+
+
+def pid_command(gains: PidGains, state: PidState, error: float, ahead: float, period: float) -> tuple[float, PidState]:
+    """Opening u from -1 to 1 for a torque error e [N m], added to the opening ``ahead`` u_0 [-]. Equation (13):
+
+        u = u_0 + k_p e + k_i (integral of e) + k_d (slope of e)
+
+    The integral is a sum of rectangles. The slope is a backward difference through a filter of first order with the
+    time constant ``derivative_filter``. What a clipped command lacks is taken off the integral, by ``anti_windup`` a
+    second (back-calculation).
+    """
+    # The first sample has none before it: no kick of the derivative.
+    change = (error - state.error) * state.started
+    # Implicit filter: stable for any time constant, also 0, where it is the plain difference.
+    slope = state.slope + (change - period * state.slope) / (period + gains.derivative_filter)
+    integral = state.integral + gains.integral_gain * error * period
+    unlimited = ahead + gains.proportional_gain * error + integral + gains.derivative_gain * slope
+    command = max(-1.0, min(1.0, unlimited))
+    # Back-calculation: it acts only while the command is clipped, since both are equal otherwise.
+    integral = integral + gains.anti_windup * period * (command - unlimited)
+    return command, PidState(integral=integral, error=error, slope=slope, started=1.0)
+
+
+def pid_update(
+    parameters: PidParameters,
+    state: PidState,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+    *,
+    parts: ErrorFunctions = OF_TORQUE,
+) -> tuple[float, PidState]:
+    """Command from -1 to 1 from the torque error [N m], equation (13), beyond the dead band of the valve."""
+    opening, after = pid_command(parameters.gains, state, seen_error(reference, measurement, parts=parts), 0.0, period)
+    return beyond_dead_band(opening, parameters.dead_band), after
+
+
+def pid_restart(state: PidState, requested: float, continues: float) -> PidState:
+    """The state, reset where another task begins (``continues`` 0, else 1); ``requested`` [N m] is not used."""
+    return state._replace(
+        integral=state.integral * continues, slope=state.slope * continues, started=state.started * continues
+    )
+
+
+PID = ControllerKind(
+    name="pid",
+    summary="Proportional, integral and derivative action on the torque error.",
+    source="the paper, equation (13); gains that are not given: Skogestad 2003, Simple analytic rules",
+    quantities=quantities_of(PidParameters),
+    parameters=PidParameters,
+    initial=PidState(),
+    update=pid_update,
+    restart=pid_restart,
+    controls=ANYTHING,
+)

@@ -1,0 +1,118 @@
+"""Fit of a flow curve to the exact function of an orifice, for a gas or for a critical ratio of ISO 6358.
+
+Curves are fitted by plain arithmetic and square roots alone, so that a run begins with the same bits on every machine.
+"""
+
+import math
+from functools import lru_cache
+
+from ppafo.model.columns import over_runs, root
+from ppafo.model.elementary import power
+from ppafo.model.gas import critical_pressure_ratio
+from ppafo.model.orifice import TERMS, FlowCurve
+
+Terms = tuple[float, float, float, float, float, float, float]
+"""Coefficients of a series, ``TERMS`` in number."""
+
+NODES: Terms = (0.01371, 0.117149, 0.300253, 0.522087, 0.735768, 0.900391, 0.988845)
+"""Nodes at which a curve meets the exact function: 1 - r over its value at the critical ratio.
+
+A curve that is best by relative least squares crosses the exact function of helium here, and of other gases nearby.
+"""
+
+
+def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCurve:
+    """Fitted curve [-] of equations (6), (7) for a gas, within 3e-7 of the exact function below ``linear_ratio``."""
+    return FlowCurve(
+        critical_ratio=critical_pressure_ratio(heat_capacity_ratio),
+        linear_ratio=linear_ratio,
+        linear_slope=1.0 / (1.0 - linear_ratio),
+        coefficients=over_runs(_remembered_coefficients, heat_capacity_ratio),
+    )
+
+
+def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
+    """Fitted curve [-] of ISO 6358 for a critical ratio b; within 1e-5 of the exact function below ``linear_ratio``.
+
+    The exact function depends on (1 - r) / (1 - b) alone, so one fit, scaled, serves every b.
+    """
+    # A factor on 1 - r scales the n-th coefficient by its n-th power, and the root in front by its own root.
+    scale = 1.0 / (1.0 - critical_ratio)
+    factor = root(scale)
+    unscaled = _remembered_iso6358_coefficients()
+    coefficients = unscaled
+    for place in range(TERMS):
+        coefficients = _with_item(coefficients, place, unscaled[place] * factor)
+        factor = factor * scale
+    return FlowCurve(
+        critical_ratio=critical_ratio,
+        linear_ratio=linear_ratio,
+        linear_slope=1.0 / (1.0 - linear_ratio),
+        coefficients=coefficients,
+    )
+
+
+def _isentropic_coefficients(heat_capacity_ratio: float) -> Terms:
+    """Coefficients of a gas, through the exact function of equation (7) at nodes in the subsonic region."""
+    k = heat_capacity_ratio
+    critical_gap = 1.0 - critical_pressure_ratio(k)
+    # Choked flow over the factor in front of the subsonic form: the curve is 1 where the flow is choked.
+    choked = math.sqrt(0.5 * (k - 1.0) * power(2.0 / (k + 1.0), (k + 1.0) / (k - 1.0)))
+    gaps, values = NODES, NODES
+    for place in range(TERMS):
+        gap = critical_gap * NODES[place]
+        # Divided by the root of the gap, which the curve has as a factor: what is left to fit is smooth at equal
+        # pressures.
+        value = power(1.0 - gap, 1.0 / k) * math.sqrt((1.0 - power(1.0 - gap, (k - 1.0) / k)) / gap)
+        gaps, values = _with_item(gaps, place, gap), _with_item(values, place, value / choked)
+    return _polynomial_through(gaps, values)
+
+
+# A study asks for the few gases of its runs again and again.
+_remembered_coefficients = lru_cache(maxsize=4096)(_isentropic_coefficients)
+
+
+def _iso6358_coefficients() -> Terms:
+    """Coefficients for a critical ratio of 0, where the function is the root of (1 - r)(1 + r)."""
+    values = NODES
+    for place in range(TERMS):
+        values = _with_item(values, place, math.sqrt(2.0 - NODES[place]))
+    return _polynomial_through(NODES, values)
+
+
+_remembered_iso6358_coefficients = lru_cache(maxsize=1)(_iso6358_coefficients)
+
+
+def _polynomial_through(places: Terms, values: Terms) -> Terms:
+    """Coefficients, from the constant one upwards, of the polynomial that has some values at some places (Newton)."""
+    differences = values
+    for order in range(1, TERMS):
+        for number in range(order, TERMS):
+            index = TERMS - 1 + order - number
+            # Divided differences in place, from the end, so that each still finds its neighbour of the order before.
+            rise = differences[index] - differences[index - 1]
+            differences = _with_item(differences, index, rise / (places[index] - places[index - order]))
+    # Tuples of fixed length, no lists: an exported library fits its curves itself, from this text in C.
+    coefficients = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for number in range(TERMS):
+        place = places[TERMS - 1 - number]
+        # The polynomial so far times (x - place), and the next difference.
+        lower = coefficients
+        for index in range(TERMS):
+            raised = lower[index - 1] if index > 0 else 0.0
+            coefficients = _with_item(coefficients, index, raised - place * lower[index])
+        coefficients = _with_item(coefficients, 0, coefficients[0] + differences[TERMS - 1 - number])
+    return coefficients
+
+
+def _with_item(items: Terms, place: int, value: float) -> Terms:
+    """Some numbers with another one at a place."""
+    return (
+        value if place == 0 else items[0],
+        value if place == 1 else items[1],
+        value if place == 2 else items[2],
+        value if place == 3 else items[3],
+        value if place == 4 else items[4],
+        value if place == 5 else items[5],
+        value if place == 6 else items[6],
+    )
