@@ -140,7 +140,7 @@ def by_path(declared: Mapping[str, Iterable[Quantity]]) -> dict[str, Quantity]:
 
 
 def timing_of(document: Mapping[str, Any]) -> str:
-    """Return which estimator of the gait phase a document names."""
+    """Name of the estimator of the gait phase in a document."""
     return kind_at(document, "timing") or THRESHOLDS
 
 

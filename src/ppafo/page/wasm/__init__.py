@@ -84,6 +84,7 @@ from ppafo.exports.c_library.conditions import conditions_of, conditions_of_prog
 from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, places_of
 from ppafo.exports.c_library.files import OUTPUTS, run_words
 from ppafo.exports.c_library.library import ExportParameter, Library, c_identifier
+from ppafo.model.controlled import TORQUE
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
@@ -103,6 +104,8 @@ from ppafo.units import split_pressure_kind, to_si
 from ppafo.units.shown import quantity_of_unit
 from ppafo.version import __version__
 
+_LOOPS = "ppafo.simulation.torque_loop"
+"""Module of the rules of gains."""
 _KINDS = {VANE: "scenario", WALK: "walk"}
 """Name of each kind of simulation on a page."""
 _TASK = {"origin": "task", "source": "", "note": "", "half_width": None}
@@ -130,7 +133,9 @@ def description_of(scenario: Scenario, library: Library) -> dict[str, Any]:
             "when_set": links[0].when_set,
         }
         for path, links in library.links.items()
+        # The page knows what the gains of a torque follow; those of another loop stay as they are.
         if any(term.function is not itself for term in links[0].terms)
+        and (scenario.controlled == TORQUE or all(term.function.__module__ != _LOOPS for term in links[0].terms))
     }
     program, atmosphere = library.program, scenario.device.supply.atmospheric_pressure
     channels = {"time": ("s", "since the start"), **{name: OUTPUTS[name] for name in program.outputs}}
