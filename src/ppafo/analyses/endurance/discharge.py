@@ -234,7 +234,8 @@ def discharge_of_life(life: BottleLife, draw: GasDemand) -> Discharge:
             TIME_IS_UP if ended.kind == WALKED else ended.kind, ended.message, course.last.mass, usable
         ),
         balance=course.balance,
-        record=lambda: course.recording,
+        # Read where it is wanted; a function of its own could not be pickled.
+        record=partial(getattr, course, "recording"),
     )
 
 
