@@ -96,7 +96,7 @@ _HEAD = ("curve", "lowest", "highest", "unit", "between strides", "series error 
 
 
 def gait_finding(gait: Gait, imported: ImportedGait | None = None) -> Finding[GaitFound]:
-    """Return what ``ppafo gait`` says of a gait; the gait file is among its files."""
+    """Report of a gait as ``ppafo gait`` prints it; the gait file is among its files."""
     speed = f", {gait.walking_speed:.3g} m/s" if gait.walking_speed is not None else ""
     stance = f"{100.0 * gait.stance_share:.1f} %{_plus_minus(100.0 * gait.stance_share_deviation)}"
     return Finding(

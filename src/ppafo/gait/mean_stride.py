@@ -24,7 +24,7 @@ class MeanStride:
 
 
 def other_sign(signs_from: SignSource, key: str, turned: str = "the other sign") -> str:
-    """Return how to reverse a curve: by its key in a gait map, or in the file."""
+    """Remedy for a curve with the other sign: its key in a gait map, or the file."""
     return {
         "map": f"change {key} in the gait map",
         "columns": f"correct it in the file, or change {key} in a gait map",

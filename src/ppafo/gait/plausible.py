@@ -181,7 +181,7 @@ def check_force(walk: MeanStride) -> None:
 
 
 def force_remarks(force: Floats) -> list[str]:
-    """Return what is unusual about the mean of a vertical force [body weights] over a stride, both ends counted."""
+    """Remark on an unusual mean of a vertical force [body weights] over a stride, both ends counted."""
     # Both ends are one phase, which must not count twice.
     mean, (low, high) = float(np.mean(force[:-1])), USUAL_FORCE_MEAN
     if low <= mean <= high:

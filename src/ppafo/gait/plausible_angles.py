@@ -101,7 +101,7 @@ def standing_tilt(shank: Floats, ankle: Floats) -> float:
 
 
 def standing_turns(shank: Floats, ankle: Floats) -> tuple[float, float]:
-    """Return how far the foot turns [deg, RMS] from 15 to 40 % of the stride, as it is and with the ankle reversed.
+    """Turning of the foot [deg, RMS] from 15 to 40 % of the stride, as it is and with the ankle reversed.
 
     ``shank`` and ``ankle`` are curves [rad] of 101 samples in the signs of the package; a foot that stands turns by 0.
     """

@@ -410,7 +410,7 @@ def kind_of(kinds: Iterable[RecordingKind]) -> RecordingKind:
     return min(kinds, key=_KINDS.index, default="measured")
 
 
-def told_of_readings(sources: tuple[RecordingSource, ...]) -> tuple[str, ...]:
+def remarks_on_readings(sources: tuple[RecordingSource, ...]) -> tuple[str, ...]:
     """Return remarks on what the sensors did not show: pauses, and values beyond a limit."""
     remarks = []
     for source in sources:

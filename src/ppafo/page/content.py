@@ -12,7 +12,7 @@ from typing import Any
 
 from ppafo.errors import ScenarioError, UnitError
 from ppafo.page.motions import declared_content, page_look, relations_in_files, usual_changes, with_limits
-from ppafo.page.wasm import WasmModule
+from ppafo.page.wasm import WasmModule, display_of
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import over, read_overrides
 from ppafo.report.display_units import metric_quantity
@@ -21,7 +21,7 @@ from ppafo.simulation.declaration import PRESSURE_WORDS
 from ppafo.simulation.overrides import apply_overrides, is_of_device
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import conversion, from_si, parse_quantity, to_si
-from ppafo.units.shown import QUANTITIES
+from ppafo.units.shown import QUANTITIES, shown_in
 from ppafo.version import __version__
 
 Interval = tuple[float, float]
@@ -82,7 +82,7 @@ def program_content(simulated: PageSimulation, module: str, intervals: Mapping[s
             known = {**entry, "display": {**display, "unit": f"{display['unit'][:-2]}_a", "zero": 0.0}}
         else:
             known = with_limits(entry, scenario)
-        settings.append(_setting(known, gauge, intervals))
+        settings.append(_setting(known, gauge, intervals, scenario.device.supply.atmospheric_pressure))
     overridden = read_overrides(described["overrides"], ScenarioError)
     changed = apply_overrides(described["document"], overridden, described["name"], declared_content(scenario))
     document, own = changed.document, changed.device
@@ -170,7 +170,9 @@ def page_content(
     }
 
 
-def _setting(entry: Mapping[str, Any], gauge: Mapping[str, str], intervals: Mapping[str, Interval]) -> dict[str, Any]:
+def _setting(
+    entry: Mapping[str, Any], gauge: Mapping[str, str], intervals: Mapping[str, Interval], atmosphere: float
+) -> dict[str, Any]:
     key, half = entry["key"], entry["half_width"]
     interval = intervals.get(key) if half is None else (entry["value"] - half, entry["value"] + half)
     # An interval speaks of the value of the set; one that was put there by somebody is known to them.
@@ -185,6 +187,12 @@ def _setting(entry: Mapping[str, Any], gauge: Mapping[str, str], intervals: Mapp
     slider = words()["sliders"].get(entry["key"])
     if slider is not None:
         begin, end = float(slider[0]), float(slider[1])
+        with shown_in({}):
+            usual = display_of(entry["unit"], atmosphere, is_absolute=key == ATMOSPHERE_PATH)
+        if usual["unit"] != display["unit"]:
+            # The file has its ends in the package's own units.
+            sizes = [(usual["zero"] + usual["factor"] * each - zero) / factor for each in (begin, end)]
+            begin, end = (float(f"{size:.2g}") for size in sizes)
     else:
         end = high if high is not None and high <= 1.0 else 1.0
         if value:

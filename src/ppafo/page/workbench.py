@@ -104,10 +104,12 @@ def _content(
     repeated = [name for name, count in Counter(scenario.name for scenario in loaded).items() if count > 1]
     if repeated:
         raise ScenarioError(f"two scenarios are called '{repeated[0]}'; a workbench distinguishes them by name")
-    # A name of one's own stays as it is.
-    simulated = [
-        PageSimulation(scenario, module_of(scenario), _LABELS.get(scenario.name, scenario.name)) for scenario in loaded
-    ]
+    simulated = []
+    for scenario in loaded:
+        with shown_in(scenario.device.shown):
+            module = module_of(scenario)
+        # A name of one's own stays as it is.
+        simulated.append(PageSimulation(scenario, module, _LABELS.get(scenario.name, scenario.name)))
     intervals = known_intervals()
     names: dict[str, str] = {}
     programs = []

@@ -41,7 +41,7 @@ from ppafo.parameters.parameter_set import (
     with_followers,
 )
 from ppafo.parameters.plant import shape_and_growth
-from ppafo.units.shown import shown_text
+from ppafo.units.shown import counted_from, shown_in, shown_text
 from ppafo.wording import nearest_name, one_line
 
 _SAME = 1.0e-9
@@ -199,7 +199,10 @@ def beyond_pressures(device: Device) -> Problem:
         is_beyond, way, end = gauge > _COVERED * highest, "up", highest
 
     def line(run: int) -> str:
-        return f"its file was measured {way} to {end / 1e3:.4g} kPa_g, and the supply has {at(gauge, run) / 1e3:.4g}"
+        atmosphere = at(supply.atmospheric_pressure, run)
+        with shown_in(counted_from(device.units, atmosphere)):
+            covered, has = (shown_text(atmosphere + each, "Pa_a", ".4g") for each in (end, at(gauge, run)))
+        return f"its file was measured {way} to {covered}, and the supply has {has}"
 
     return is_beyond, line
 

@@ -14,7 +14,7 @@ from ppafo.model.declaration import Number
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
 from ppafo.parameters.joint import ANKLE, JointNames
-from ppafo.units.shown import counted_from
+from ppafo.units.shown import counted_from, shown_in, shown_text
 
 VANE = "vane"
 """The kind of actuator that is the paper's; see the catalogue of actuators."""
@@ -231,10 +231,12 @@ class Device:
     def check_pressurised(self, what: str, remedy: str = "") -> None:
         """Raise ParameterError, with a remedy, where ``what`` needs supplies that are not below the atmosphere."""
         if self.supply.is_vacuum:
+            pressures = self.supply.pressure, self.supply.dorsiflexion_pressure
+            with shown_in(self.shown):
+                plantar, dorsi = (shown_text(float(first(pressure)), "Pa_a", ".4g") for pressure in pressures)
             raise ParameterError(
-                f"{what} needs a supply above the atmosphere; '{self.name}' has a vacuum: supply.pressure = "
-                f"{first(self.supply.pressure) / 1e3:.4g} kPa_a, supply.dorsiflexion_pressure = "
-                f"{first(self.supply.dorsiflexion_pressure) / 1e3:.4g} kPa_a{remedy}"
+                f"{what} needs a supply above the atmosphere; '{self.name}' has a vacuum: supply.pressure = {plantar}, "
+                f"supply.dorsiflexion_pressure = {dorsi}{remedy}"
             )
 
     def check_torque_constant(self, what: str) -> None:

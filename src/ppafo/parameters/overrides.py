@@ -286,13 +286,13 @@ def _with_species(parameter_set: ParameterSet, path: str, override: Override) ->
 
 
 def _with_relieving(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
-    if override.text not in _FLAGS:
-        raise ParameterError(f"override '{override}': must be {' or '.join(_FLAGS)}")
-    entry = FlagEntry(value=_FLAGS[override.text], origin="assumed", source=SOURCE, note=_before(parameter_set, path))
+    if override.text not in ("true", "false"):
+        raise ParameterError(f"override '{override}': must be true or false")
+    is_true, note = override.text == "true", _before(parameter_set, path)
+    entry = FlagEntry(value=is_true, origin="assumed", source=SOURCE, note=note)
     return replace(parameter_set, flags={**parameter_set.flags, path: entry})
 
 
-_FLAGS = {"true": True, "false": False}
 _CHANGES = {SPECIES_PATH: _with_species, RELIEVING_PATH: _with_relieving}
 
 

@@ -1,7 +1,7 @@
 """Common access to a result with a recording: channels in any unit, tables, and its display in a notebook."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ArgumentError
@@ -31,6 +31,10 @@ class RecordedResult(Protocol):
     @property
     def metrics(self) -> "Mapping[str, Metric]":
         """Metrics of the run by name."""
+
+    @property
+    def status(self) -> Any:
+        """End of the run, a ``Status``."""
 
     def plot(self) -> "Figure":
         """Return its figure."""

@@ -9,7 +9,8 @@ numerically sensitive. They hold for one run among many, and a check says so.
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from ppafo.engine.run import Run
 from ppafo.engine.scheme.actuators import pressures_of, volumes_of
 from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.at_hand import RecordedResult
 from ppafo.units import without_exponent
 from ppafo.units.shown import in_units, units_in_force
 
@@ -204,27 +205,7 @@ class Check:
         return {"is_determined": self.is_determined, "sentence": self.sentence, **document, **judged}
 
 
-class FinishedRun(Protocol):
-    """A finished run, as its check needs it."""
-
-    @property
-    def scenario(self) -> Scenario:
-        """Scenario of the run."""
-
-    @property
-    def recording(self) -> Recording:
-        """Channels of the run."""
-
-    @property
-    def metrics(self) -> Mapping[str, Any]:
-        """Metrics of the run by name."""
-
-    @property
-    def status(self) -> Any:
-        """End of the run, a ``Status``."""
-
-
-Again = Callable[[Sequence[Run]], Sequence[FinishedRun]]
+Again = Callable[[Sequence[Run]], Sequence[RecordedResult]]
 """Function that runs other plans of the same scenario."""
 
 
@@ -240,7 +221,7 @@ def finer(run: Run) -> Run:
     )
 
 
-def estimated_error(result: FinishedRun, fine: FinishedRun) -> ErrorEstimate:
+def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstimate:
     """The estimated error of a result, from the same run with finer steps; inf where that diverged."""
     courses = list(_courses_of(result).values())
     if not fine.status.is_completed:
@@ -273,7 +254,7 @@ def estimated_error(result: FinishedRun, fine: FinishedRun) -> ErrorEstimate:
     )
 
 
-def _courses_of(result: FinishedRun) -> dict[str, tuple[str, ...]]:
+def _courses_of(result: RecordedResult) -> dict[str, tuple[str, ...]]:
     """Recorded channels of a run that are compared over time, by the words for them."""
     recorded = {
         words: tuple(name for name in channels if name in result.recording) for words, channels in _COURSES.items()
@@ -281,7 +262,7 @@ def _courses_of(result: FinishedRun) -> dict[str, tuple[str, ...]]:
     return {words: channels for words, channels in recorded.items() if channels}
 
 
-def _shares(result: FinishedRun, errors: Mapping[str, float]) -> dict[str, float]:
+def _shares(result: RecordedResult, errors: Mapping[str, float]) -> dict[str, float]:
     """Errors of metrics over their values or the ranges of their quantities [-]; those that have either."""
     pressures = _pressure_range(result)
     scales = {
@@ -292,7 +273,7 @@ def _shares(result: FinishedRun, errors: Mapping[str, float]) -> dict[str, float
     return {name: errors[name] / scale for name, scale in scales.items() if 0.0 < scale < math.inf}
 
 
-def _pressure_range(result: FinishedRun) -> float:
+def _pressure_range(result: RecordedResult) -> float:
     """Highest less lowest pressure [Pa] that the chambers had or are connected to; the atmosphere's if there is one."""
     supply = result.scenario.device.supply
     outside = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
@@ -301,7 +282,7 @@ def _pressure_range(result: FinishedRun) -> float:
     return float(np.ptp(values)) or supply.atmospheric_pressure
 
 
-def checked(result: FinishedRun, run: Run, again: Again) -> Check:
+def checked(result: RecordedResult, run: Run, again: Again) -> Check:
     """Return whether a result can be repeated, from its plan.
 
     SimulationError for a Python controller that gives a different run each time: every change would be its own.
@@ -319,7 +300,16 @@ def checked(result: FinishedRun, run: Run, again: Again) -> Check:
     starts = [start_moved(run, move, apart) for apart in (1.0, -1.0) for move in (MOVE, -MOVE)]
     repeats = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]
     if not run.program.ideal_sensors:
-        repeats += [(MOVED_MEASUREMENT, moved) for moved in _measurements_moved(run, pressures)]
+        # A little more noise on each sensor, either way; one draw alone seldom crosses a step of a coarse sensor.
+        sensors, angles = run.sensors, run.plant.angle_max - run.plant.angle_min
+        draws = 1 if sensors.angle_noise or sensors.pressure_noise else DRAWS
+        for draw, move in product(range(draws), (MOVE, -MOVE)):
+            noisy = sensors._replace(
+                angle_noise=sensors.angle_noise + move * angles,
+                pressure_noise=sensors.pressure_noise + move * pressures,
+                seed=sensors.seed + draw,
+            )
+            repeats.append((MOVED_MEASUREMENT, replace(run, sensors=noisy)))
     results = again([repeat for _, repeat in repeats])
     checked = [(name, repeated) for (name, _), repeated in zip(repeats, results, strict=True)]
     compared = _courses_of(result)
@@ -359,28 +349,9 @@ def start_moved(run: Run, move: float, apart: float) -> Run:
     return replace(run, initial=start._replace(angle=angle, mass_1=mass_1, mass_2=mass_2))
 
 
-def _measurements_moved(run: Run, pressures: float) -> list[Run]:
-    """Runs with a little more noise on each sensor, either way; several draws of it where they have none themselves.
-
-    One draw alone seldom crosses a step of a coarse sensor, which is what matters.
-    """
-    sensors, angles = run.sensors, run.plant.angle_max - run.plant.angle_min
-    draws = 1 if sensors.angle_noise or sensors.pressure_noise else DRAWS
-    return [
-        replace(
-            run,
-            sensors=sensors._replace(
-                angle_noise=sensors.angle_noise + move * angles,
-                pressure_noise=sensors.pressure_noise + move * pressures,
-                seed=sensors.seed + draw,
-            ),
-        )
-        for draw in range(draws)
-        for move in (MOVE, -MOVE)
-    ]
-
-
-def _metrics(result: FinishedRun, repeats: list[tuple[str, FinishedRun]], pressures: float) -> tuple[NumberCheck, ...]:
+def _metrics(
+    result: RecordedResult, repeats: list[tuple[str, RecordedResult]], pressures: float
+) -> tuple[NumberCheck, ...]:
     names = dict.fromkeys(name for one in (result, *(repeat for _, repeat in repeats)) for name in one.metrics)
     rows = []
     for name in names:
@@ -392,7 +363,7 @@ def _metrics(result: FinishedRun, repeats: list[tuple[str, FinishedRun]], pressu
     return tuple(rows)
 
 
-def _value(result: FinishedRun, name: str) -> float:
+def _value(result: RecordedResult, name: str) -> float:
     return result.metrics[name].value if name in result.metrics else math.nan
 
 
@@ -412,7 +383,7 @@ def _largest(changes: Iterable[tuple[str, float]]) -> dict[str, float]:
     return largest
 
 
-def _metric_range(result: FinishedRun, name: str, unit: str, pressures: float) -> float:
+def _metric_range(result: RecordedResult, name: str, unit: str, pressures: float) -> float:
     """Range of the quantity of a metric; 1 for a number of events, 0 for a unit that has none."""
     scenario, recording = result.scenario, result.recording
     actuator = scenario.device.actuator
@@ -451,8 +422,8 @@ def _largest_differences(one: Recording, other: Recording, channels: Iterable[st
 def _course(
     name: str,
     channels: tuple[str, ...],
-    repeats: list[tuple[str, FinishedRun]],
-    result: FinishedRun,
+    repeats: list[tuple[str, RecordedResult]],
+    result: RecordedResult,
     pressures: float,
 ) -> NumberCheck:
     device = result.scenario.device

@@ -52,7 +52,19 @@ def read_clock(reading: DocumentReader) -> RunTimes:
     else:
         step = step_unless_given(duration, period)
 
-    output = _read_output(reading, duration, step) if has_output else output_unless_given(duration, period, step)
+    output = reading.number(_OUTPUT_PATH, _OUTPUT) if has_output else output_unless_given(duration, period, step)
+    if has_output:
+        if output < step * (1.0 - _RELATIVE):
+            raise reading.refusal(
+                _OUTPUT_PATH,
+                f"must not be below {_STEP_PATH} = {shown_text(step, 's')}; take a smaller step or record less often",
+            )
+        _not_above(reading, _OUTPUT_PATH, output, _DURATION_PATH, duration)
+        count = duration / output
+        if abs(count - round(count)) > _RELATIVE * count:
+            raise reading.refusal(
+                _OUTPUT_PATH, f"must divide {_DURATION_PATH} = {shown_text(duration, 's')}, it fits {count:.6g} times"
+            )
     used = dividing_step(period, step)
     if duration / used > MAXIMUM_STEPS:
         raise reading.refusal(
@@ -119,23 +131,6 @@ def nearest_whole(number: Numeric) -> Numeric:
     is_odd_tie = (up - number == 0.5) & (0.5 * up != truncated(0.5 * up))
     found: Numeric = choose(is_odd_tie, up - 1.0, up)
     return found
-
-
-def _read_output(reading: DocumentReader, duration: float, step: float) -> float:
-    """Return the time between two recorded samples: no less than a step, and a whole fraction of the duration."""
-    output = reading.number(_OUTPUT_PATH, _OUTPUT)
-    if output < step * (1.0 - _RELATIVE):
-        raise reading.refusal(
-            _OUTPUT_PATH,
-            f"must not be below {_STEP_PATH} = {shown_text(step, 's')}; take a smaller step or record less often",
-        )
-    _not_above(reading, _OUTPUT_PATH, output, _DURATION_PATH, duration)
-    count = duration / output
-    if abs(count - round(count)) > _RELATIVE * count:
-        raise reading.refusal(
-            _OUTPUT_PATH, f"must divide {_DURATION_PATH} = {shown_text(duration, 's')}, it fits {count:.6g} times"
-        )
-    return output
 
 
 def _not_above(reading: DocumentReader, path: str, value: float, limit_path: str, limit: float) -> None:

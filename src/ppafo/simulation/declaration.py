@@ -165,11 +165,6 @@ def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
     return tuple(settings)
 
 
-def gas_settings(kind: str) -> tuple[Quantity, ...]:
-    """Return the settings of a gas model; the isothermal one has none."""
-    return THERMAL_GAS if kind == THERMAL else ()
-
-
 def shank_settings(kind: str) -> tuple[Quantity, ...]:
     """Return the settings of the shank of a leg: a profile's, or where in its stride a gait begins."""
     return (GAIT_START,) if kind == GAIT_SHANK else profile_settings(kind, SHANK_LEVEL)
@@ -211,7 +206,7 @@ def quantities(document: Mapping[str, Any], of_motion: Mapping[str, Quantity] | 
         **by_path("controller", SAMPLING + controller_settings(kind_at(document, "controller"), controlled)),
         **by_path("reference", reference_settings(kind_at(document, "reference"), controlled)),
         **by_path("sensors", (*SENSORS, SEED)),
-        **by_path("gas_model", gas_settings(kind_at(document, "gas_model"))),
+        **by_path("gas_model", THERMAL_GAS if kind_at(document, "gas_model") == THERMAL else ()),
     }
     return declared | line_paths() if SUPPLY_LINE in document else declared
 

@@ -78,7 +78,13 @@ class DocumentReader:
             result = parse_quantity(value, quantity.unit, atmosphere) if isinstance(value, str) else float(value)
         # A whole number of a file may be larger than any float.
         except (UnitError, OverflowError) as error:
-            raise self.refusal(path, f"{error}{self._of_what(path, quantity)}") from error
+            # What decides the unit of a level of the reference or of a gain.
+            controlled = controlled_in(self.document)
+            followed = CONTROLLED[controlled]
+            is_level = path.startswith("reference.") and quantity.unit in (followed.level.unit, followed.difference)
+            is_gain = path.startswith("controller.") and controlled != TORQUE and followed.plain_unit in quantity.unit
+            of_what = f"; {REFERENCE_OF} is '{controlled}'" if is_level or is_gain else ""
+            raise self.refusal(path, f"{error}{of_what}") from error
         if not isinstance(value, str) and not math.isfinite(result):
             raise self.refusal(path, "is not a finite number")
         if not isinstance(value, str) and quantity.unit not in PLAIN:
@@ -87,14 +93,6 @@ class DocumentReader:
             given = split_quantity(value)[1] if isinstance(value, str) else quantity.unit
             raise self.refusal(path, range_rule(quantity, limits_text(quantity, given)))
         return result
-
-    def _of_what(self, path: str, quantity: Quantity) -> str:
-        """Return what decides the unit of a level of the reference or of a gain; an empty text for any other number."""
-        controlled = controlled_in(self.document)
-        followed = CONTROLLED[controlled]
-        is_level = path.startswith("reference.") and quantity.unit in (followed.level.unit, followed.difference)
-        is_gain = path.startswith("controller.") and controlled != TORQUE and followed.plain_unit in quantity.unit
-        return f"; {REFERENCE_OF} is '{controlled}'" if is_level or is_gain else ""
 
     def section(
         self, section: str, quantities: tuple[Quantity, ...], atmosphere: float = STANDARD_ATMOSPHERE

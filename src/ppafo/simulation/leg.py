@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -78,7 +77,21 @@ def measured_leg(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str,
             channels["toe_difference"] = (toe_difference, "m")
         else:
             channels["foot_angle"] = (shank - angle + 0.5 * np.pi, "rad")
-    external_torque = partial(_torque_on_leg, _leg_of(scenario), run, times, rows)
+
+    def external_torque(torque: Floats) -> Floats:
+        # T_ex by the second row of equation (11): what the foot needs beside T_2. A blow at a stop is not in it.
+        carried, plant = _leg_of(scenario), run.plant
+        assert leg is not None, "the run has the leg of its scenario"
+        # The foot alone: inertia and weight of vane and foot plate are on the other side of T_ex.
+        of_foot = carried.foot_mass, carried.foot_mass_centre, carried.foot_inertia
+        foot = foot_load(0.0, 0.0, *of_foot, carried.shank_length)
+        now = shank_over_samples(shank_kind(carried), leg.shank, times)
+        added, needed = (over_samples(torque_on_foot, load, now, angle) for load in (leg.load, foot))
+        net = net_torques(run, rows, torque + added - plant.external_torque)
+        # A vane at rest is held by friction or a stop.
+        acceleration = np.where(rows["state.angular_velocity"] != 0.0, net / plant.inertia, 0.0)
+        return np.asarray(foot.inertia * acceleration - needed + plant.external_torque)
+
     return measured(scenario, run, times, rows, external_torque, channels)
 
 
@@ -117,18 +130,3 @@ def foot_load(
 def with_load(plant: PlantParameters, load: FootLoad) -> PlantParameters:
     """The plant with the inertia of all that turns; the weight of the foot plate is accounted for in the leg."""
     return plant._replace(inertia=load.inertia, gravity_torque=0.0)
-
-
-def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats], torque: Floats) -> Floats:
-    """T_ex [N m] by the second row of equation (11): what the foot needs beside T_2. A blow at a stop is not in it."""
-    assert run.leg is not None, "the run has the leg of its scenario"
-    angle, rate, plant = rows["state.angle"], rows["state.angular_velocity"], run.plant
-    # The foot alone: inertia and weight of vane and foot plate are on the other side of T_ex.
-    foot = foot_load(0.0, 0.0, leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia, leg.shank_length)
-    kind = shank_kind(leg)
-    now = shank_over_samples(kind, run.leg.shank, times)
-    added, needed = (over_samples(torque_on_foot, load, now, angle) for load in (run.leg.load, foot))
-    net = net_torques(run, rows, torque + added - plant.external_torque)
-    # A vane at rest is held by friction or a stop.
-    acceleration = np.where(rate != 0.0, net / plant.inertia, 0.0)
-    return np.asarray(foot.inertia * acceleration - needed + plant.external_torque)

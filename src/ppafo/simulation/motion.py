@@ -31,9 +31,10 @@ from ppafo.simulation.declaration import (
 )
 from ppafo.simulation.document import DocumentReader, kind_at, value_at
 from ppafo.simulation.motion_kind import VANE, LawSignals, Measured, MotionSection, ProfileTable, RunTimes
-from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile, stops_of
+from ppafo.simulation.profiles import TOLERANCE, profile_problem, read_profile, stops_of
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario, vane_motion
 from ppafo.simulation.schema import profile_table, shank_table
+from ppafo.units.shown import shown_text
 from ppafo.wording import one_line
 
 if TYPE_CHECKING:
@@ -149,7 +150,8 @@ def _read_angle(reading: DocumentReader, device: Device) -> float:
     """Return the angle [rad] of the vane; ScenarioError where it is not between the stops of the device."""
     angle, stops = reading.number(LOCKED_ANGLE, ANGLE), (device.actuator.angle_min, device.actuator.angle_max)
     if not stops[0] - TOLERANCE <= angle <= stops[1] + TOLERANCE:
-        raise reading.refusal(LOCKED_ANGLE, f"must be between the stops of {device.name}, {range_text(stops)}")
+        low, high = (shown_text(stop, "rad") for stop in stops)
+        raise reading.refusal(LOCKED_ANGLE, f"must be between the stops of {device.name}, {low} to {high}")
     return angle
 
 

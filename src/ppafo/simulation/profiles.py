@@ -124,11 +124,6 @@ def profile_problem(
     return ""
 
 
-def range_text(stops: tuple[float, float]) -> str:
-    """Return the range between two stops [rad] for a message."""
-    return f"{shown_text(stops[0], 'rad')} to {shown_text(stops[1], 'rad')}"
-
-
 @in_units(lambda scenario: scenario.device.shown)
 def reference_problem(scenario: Scenario) -> str:
     """Return why no controller could follow the reference of a scenario of a vane; an empty text where one might."""

@@ -21,6 +21,9 @@ from ppafo.wording import nearest_name
 
 logger = logging.getLogger("ppafo")
 
+_SAID: "WeakSet[type]" = WeakSet()
+"""Classes of controllers of which a line said that their commands are limited."""
+
 
 @final
 class SampledRun:
@@ -103,7 +106,15 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
         taken = VENT if is_vent else max(-1.0, min(1.0, float(command)))
         if taken != command:
             allowed = f"-1 to 1, or {VENT:g} to vent both chambers" if batch.program.walks else "-1 to 1"
-            _say_limited(type(controller), f"{command:g} at t = {run.time:.6g} s", allowed)
+            if type(controller) not in _SAID:
+                _SAID.add(type(controller))
+                logger.warning(
+                    "ppafo: %s.update returned %g at t = %.6g s; commands are %s: those beyond are limited",
+                    type(controller).__name__,
+                    command,
+                    run.time,
+                    allowed,
+                )
         run.go_on(taken)
     return run.result()
 
@@ -118,19 +129,6 @@ def _slip(controller: PythonController, error: NameError | AttributeError | Type
     elif name is not None:
         hint = nearest_name(name, [*walked.f_locals, *walked.f_globals])
     return SimulationError(f"{frame.filename}, line {frame.lineno}: {type(controller).__name__}: {error}{hint}")
-
-
-_SAID: "WeakSet[type]" = WeakSet()
-"""Classes of controllers of which a line said that their commands are limited."""
-
-
-def _say_limited(kind: type, returned: str, allowed: str) -> None:
-    """Say once what a controller returned beyond the range of commands."""
-    if kind not in _SAID:
-        _SAID.add(kind)
-        logger.warning(
-            "ppafo: %s.update returned %s; commands are %s: those beyond are limited", kind.__name__, returned, allowed
-        )
 
 
 def _group(batch: Batch, name: str) -> Any:

@@ -1,24 +1,19 @@
-"""Draws from the distributions of a study, as columns of values for runs; levels and limits that texts state."""
+"""Draws from the distributions of a study, as columns of values for runs."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import StudyError, UnitError, refused_as
-from ppafo.metrics import METRICS
-from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.simulation.ensemble.running import lacking, offered
+from ppafo.errors import StudyError
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import NOISE, correlate, uniform_numbers, with_noise
 from ppafo.studies.study import Configuration, RandomValue, SamplingPlan, Study, with_followers
-from ppafo.units import parse_quantity
-from ppafo.wording import first_twice, nearest_name
+from ppafo.wording import nearest_name
 
 FEWEST_DRAWS, MAXIMUM_DRAWS = 32, 2**26
 """Two in each replicate, whose spread needs them, and what Sobol replicates are even for."""
@@ -170,85 +165,3 @@ def drawn_in(
     known = uncertainty_in(chosen, base)
     used = replace(known, scores=None) if independent else known
     return chosen, base, used.with_noise_of([base.scenario])
-
-
-_OUTCOME_LEVELS = {"Pa": "Pa_a", "-": ""}
-_DIFFERENCES = {"Pa": "Pa_d", "-": ""}
-
-
-def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
-    """Refuse a metric that does not exist, or that needs what the scenario has not."""
-    for name in metrics:
-        if name not in METRICS:
-            known = offered(scenario)
-            raise StudyError(f"there is no metric '{name}'{nearest_name(name, known)}; available: {', '.join(known)}")
-        reason = lacking(scenario, METRICS[name])
-        if reason:
-            raise StudyError(f"scenario '{scenario.name}' has no '{name}': {reason}")
-    repeated = first_twice(metrics)
-    if repeated is not None:
-        raise StudyError(f"the metric '{repeated}' is named twice")
-
-
-def check_fraction(value: float, name: str, least: float = 0.0) -> None:
-    """Refuse a number that is below the least one, or not less than 1."""
-    if not least <= value < 1.0:
-        raise StudyError(f"{name} = {value!r}: must be at least {least:g} and less than 1")
-
-
-CONFIDENCE = "confidence", 0.5
-"""Name and lower limit of a confidence for ``check_fraction``: below a half it is a mistake, such as 0.05."""
-
-
-def atmosphere_of(scenario: Scenario, varied: Collection[str]) -> float | None:
-    """Return the pressure [Pa absolute] from which gauge pressures of a scenario count; None where it is varied."""
-    return None if ATMOSPHERE_PATH in varied else scenario.device.supply.atmospheric_pressure
-
-
-def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> float:
-    """Return a value of a metric in SI; gauge pressure counts from ``atmosphere`` [Pa absolute].
-
-    StudyError, whose message ``what`` begins, where the unit does not fit, and for a gauge pressure where the runs have
-    no one atmosphere, which is None then.
-    """
-    atmospheres = (0.0, STANDARD_ATMOSPHERE) if atmosphere is None else (atmosphere,)
-    # The same under two atmospheres: an absolute pressure, or no pressure at all.
-    unit = METRICS[metric].unit
-    levels = {_number(text, _OUTCOME_LEVELS.get(unit, unit), what, atmosphere) for atmosphere in atmospheres}
-    level = levels.pop() if len(levels) == 1 else None
-    if level is None:
-        raise StudyError(
-            f"{what}: a gauge pressure counts from {ATMOSPHERE_PATH}, which varies here; give an absolute pressure, "
-            "for example '446 kPa_a'"
-        )
-    return level
-
-
-def difference_of(text: str, metric: str, what: str) -> float:
-    """Return a difference of two values of a metric in SI; StudyError as in ``level_of``."""
-    unit = METRICS[metric].unit
-    return _number(text, _DIFFERENCES.get(unit, unit), what, 0.0)
-
-
-def _number(text: str, unit: str, what: str, atmosphere: float) -> float:
-    with refused_as(StudyError, what, UnitError):
-        return parse_quantity(text, unit, atmosphere)
-
-
-@dataclass(frozen=True, slots=True)
-class MetricLimit:
-    """A metric with the largest value that it may have [SI], or the smallest where not ``is_most``, and its text."""
-
-    metric: str
-    limit: float
-    is_most: bool
-    text: str
-
-    def is_kept(self, values: Any) -> Any:
-        """Return whether, or where, values of the metric [SI] keep it; nan, of a run without a value, does not."""
-        return values <= self.limit if self.is_most else values >= self.limit
-
-    @property
-    def words(self) -> str:
-        """The limit as it is written, after 'at most' or 'at least'."""
-        return f"at {'most' if self.is_most else 'least'} {self.text}"

@@ -23,7 +23,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.metered import needed_metrics, tracking_excess
 from ppafo.simulation.tracking.rule import REVERSALS, smallest_change
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import check_metrics
+from ppafo.studies.limits import check_metrics
 from ppafo.study.blocks import runs_at_once
 
 Rows = dict[str, NDArray[Any]]

@@ -16,7 +16,7 @@ from ppafo.errors import KindError, ScenarioError, refused_as
 from ppafo.model.declaration import Quantity
 from ppafo.model.fault_catalogue import PLANT_FAULTS, PlantFault
 from ppafo.model.shut_off import SHUT_OFF
-from ppafo.simulation.declaration import PERIOD, RATE, SENSORS, TEXTS, DeclaredContent, gas_settings, line_paths
+from ppafo.simulation.declaration import PERIOD, RATE, SENSORS, TEXTS, THERMAL, THERMAL_GAS, DeclaredContent, line_paths
 from ppafo.simulation.document import kind_at
 from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, WALK, is_walk
 from ppafo.simulation.schema import (
@@ -130,7 +130,7 @@ def sections(controller: str, timing: str, gas: str) -> dict[str, tuple[Quantity
         "timing": TIMINGS[timing].quantities if timing in TIMINGS else (),
         "sensors": (*WALK_SENSORS, SEED),
         "run": (DURATION, STEP),
-        "gas_model": gas_settings(gas),
+        "gas_model": THERMAL_GAS if gas == THERMAL else (),
     }
 
 
@@ -140,7 +140,7 @@ def by_path(declared: Mapping[str, Iterable[Quantity]]) -> dict[str, Quantity]:
 
 
 def timing_of(document: Mapping[str, Any]) -> str:
-    """Return which estimator of the gait phase a document names."""
+    """Name of the estimator of the gait phase in a document."""
     return kind_at(document, "timing") or THRESHOLDS
 
 

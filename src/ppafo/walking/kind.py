@@ -35,15 +35,15 @@ class WalkKind:
     measured = staticmethod(result.measured)
 
     def sees(self, _scenario: Scenario) -> LawSignals:
-        """Return how the controller sees the torque."""
+        """Signals of the torque that the controller sees."""
         return IN_WALK
 
     def follows_reference(self, _scenario: Scenario) -> bool:
-        """Tell that the controller makes what it follows itself, in each phase of the gait."""
+        """False: the controller makes its own reference in each phase of the gait."""
         return False
 
     def asks_gradually(self, law: ControllerKind) -> bool:
-        """Tell whether a law asks for openings between shut and open to follow the torque that it requests."""
+        """True where a law asks for openings between shut and open to follow the torque that it requests."""
         return planning.requests_torque(law) and not law.only_switches
 
     def python_call(self, name: str, overrides: str) -> str:

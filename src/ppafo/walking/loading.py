@@ -192,7 +192,7 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
 
 
 def _without_bottle(scenario: Scenario) -> tuple[Any, ...]:
-    """Return what a walk shares with the same walk on another bottle: all but its length and the bottle."""
+    """Parts of a walk that are the same on another bottle: all but its length and the bottle."""
     hardware = scenario.device, scenario.supply_lines, scenario.gas_model, scenario.sensors, scenario.controller
     return *hardware, scenario.run.step, replace(walk_of(scenario), bottle=None)
 
@@ -306,7 +306,7 @@ def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]
 def _named_by(
     path: str, reading: DocumentReader, request: ScenarioRequest, kind: type[PpafoError]
 ) -> AbstractContextManager[None]:
-    """Return what puts the key at ``path`` before errors about the file that the walk names there.
+    """Context in which errors about a file that a walk names begin with its key at ``path``.
 
     A file that an option names is in the error already.
     """
@@ -358,7 +358,7 @@ def _fault(reading: DocumentReader, part: str) -> FaultSettings:
 
 
 def _assumed(reading: DocumentReader, bottle: BottleSupply | None) -> tuple[Assumption, ...]:
-    """Return what a walk assumes: its file says it, its lines and its bottle."""
+    """Assumptions of a walk: of its file, its lines and its bottle."""
     own = reading.document.get("assumed", {}) | ({} if bottle is None else bottle.assumed)
     values = ((path, value_at(reading.document, path), note) for path, note in own.items())
     assumed = {path: Assumption(path, "" if value is None else str(value), note) for path, value, note in values}

@@ -80,7 +80,7 @@ def walk_of(scenario: Scenario) -> WalkMotion:
 
 
 def person_remarks(scenario: Scenario) -> list[str]:
-    """Return who walks, and what is odd about the zero of the gait's ankle."""
+    """Remarks on the wearer, and on an odd zero of the gait's ankle angle."""
     motion = walk_of(scenario)
     remarks = [f"remark: {text}" for text in gait_file_remarks(motion.gait)]
     return [who_walks(motion.wearer, motion.gait, motion.wearer_origin), *remarks]

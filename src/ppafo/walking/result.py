@@ -214,7 +214,7 @@ class WalkResult:
 
     @in_units(_units_of)
     def __str__(self) -> str:
-        """Return what ``ppafo simulate`` prints: status and metrics in the units that people are shown."""
+        """Status and metrics in the units that people are shown, as ``ppafo simulate`` prints them."""
         from ppafo.report.display_units import metrics_lines
 
         head = f"{self.scenario.name}: {self.status.kind}"

@@ -251,7 +251,7 @@ STATURE, BODY_MASS = "wearer.stature", "wearer.body_mass"
 
 
 def links_of_stature(document: Mapping[str, Any]) -> Graph:
-    """Return how the segments of a walk file follow stature and body mass: now, or once the stature is given."""
+    """Links from stature and body mass to the segments of a walk file: now, or once the stature is given."""
     later = value_at(document, STATURE) is None
     links: dict[str, tuple[LinkedDefault, ...]] = {}
     for name, function in _FOLLOWING.items():
@@ -306,7 +306,7 @@ walk otherwise, and not only with less mass.
 
 
 def wearer_origin(reading: DocumentReader, gait: Gait, is_named: bool) -> str:
-    """Return where the body mass of the wearer comes from, in words."""
+    """Origin of the wearer's body mass, in words."""
     if value_at(reading.document, "wearer.body_mass") is not None:
         return "as wearer.body_mass states"
     return f"the subject of gait '{gait.name}'" if is_named else "the paper's subject"

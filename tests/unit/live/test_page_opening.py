@@ -45,6 +45,16 @@ def test_a_scenario_of_ones_own_is_called_by_its_name_as_it_is() -> None:
     assert labels == ["knoechel-bench", "Step response"]
 
 
+def test_a_pressure_loop_is_shown_in_bar_as_its_file_is_and_keeps_its_gains() -> None:
+    (program,) = workbench_module._content(["pressure-loop"], (), "page")[0]["programs"]
+    settings = {setting["key"]: setting for setting in program["settings"]}
+    supply, gain = settings["supply.pressure"], settings["controller.proportional_gain"]
+    assert (supply["shown"], supply["slider"]) == ("bar_g", (0.69, 8.3))
+    # The page has the rules of a loop of torque: a gain in 1/Pa made by them would be refused.
+    assert gain["made"]["terms"][0]["rule"].startswith("pressure_1.")
+    assert gain["value"] < 1.0e-3
+
+
 @pytest.mark.parametrize("name", ["torque-task-proportional", "swing-foot-angle"])
 def test_what_the_package_keeps_of_a_scenario_is_what_its_program_gives(name: str) -> None:
     """Else run ``python scripts/page_tables.py``."""

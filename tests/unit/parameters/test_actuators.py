@@ -196,7 +196,10 @@ def test_columns_and_lines_may_stand_in_any_order(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("lines", "said"),
     [
-        (("20,0,100", "20,60,130", "110,0,150", "110,60,200"), "was measured up to 60 kPa_g, and the supply has 65.47"),
+        (
+            ("20,0,100", "20,60,130", "110,0,150", "110,60,200"),
+            "measured up to 161.3 kPa_a, and the supply has 166.8",
+        ),
         (("20,0,1000", "20,500,1100", "110,0,500", "110,500,1600"), "chamber 1 must grow with the angle, and grows by"),
     ],
 )

@@ -15,7 +15,8 @@ from ppafo.analyses.sweep.statistic_kind import Statistic, parse_statistic
 from ppafo.errors import StudyError
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.loading import load_scenario
-from ppafo.studies.draws import atmosphere_of, level_of, uncertainty_of
+from ppafo.studies.draws import uncertainty_of
+from ppafo.studies.limits import atmosphere_of, level_of
 from ppafo.studies.loading import load_study
 from ppafo.studies.study import Study
 from ppafo.study.blocks import drawn_values, varied_columns

@@ -19,7 +19,8 @@ from ppafo.loading import json_schema, list_all_scenarios, load_scenario, reload
 from ppafo.simulation.loading import load_scenario as load_vane
 from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.studies.draws import check_metrics
+from ppafo.studies.limits import check_metrics
+from ppafo.walking.kind import WALK_KIND
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 
@@ -278,3 +279,7 @@ def test_the_page_knows_every_rule_by_which_a_default_of_a_walk_follows_others()
 def test_a_duration_is_given_once_in_python_too() -> None:
     with pytest.raises(ScenarioError, match=r"overrides run\.duration: the same as minutes"):
         walk_with_and_without(NAME, minutes=0.2, overrides=["run.duration = 30 s"])
+
+
+def test_the_command_that_compares_a_walk_is_quoted_for_a_file_with_a_space() -> None:
+    assert WALK_KIND.further_command("my walk.toml").startswith("'ppafo walk 'my walk.toml'' compares")

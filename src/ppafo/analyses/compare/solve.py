@@ -15,14 +15,8 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
 from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
 from ppafo.studies.declaration import DEFAULT_SEED
-from ppafo.studies.draws import (
-    CONFIDENCE,
-    FEWEST_DRAWS,
-    MAXIMUM_DRAWS,
-    Uncertainty,
-    check_fraction,
-    uncertainty_of,
-)
+from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, Uncertainty, uncertainty_of
+from ppafo.studies.limits import CONFIDENCE, check_fraction
 from ppafo.studies.sampling import NOISE, with_new_noise
 from ppafo.studies.study import Configuration, Study, with_overrides
 from ppafo.studies.varying import value_at, varied_path

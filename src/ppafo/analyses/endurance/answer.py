@@ -106,7 +106,7 @@ _CAPTION = "Temperature, pressure and gas in the bottle from full to the end."
 
 @in_units(lambda endurance: endurance.shown)
 def finding_of(endurance: Endurance) -> Finding[Endurance]:
-    """Return how long the bottle lasts for one gas use, in words, tables and panels."""
+    """Report of a bottle's duration for one gas use, in words, tables and panels."""
     values = [
         (path, format_quantity(entry.value, entry.unit), entry.origin, entry.source)
         for path, entry in endurance.bottle.entries.items()
@@ -145,7 +145,7 @@ def finding_of(endurance: Endurance) -> Finding[Endurance]:
 
 @in_units(lambda several: next(iter(several.uses.values())).shown)
 def finding_of_several(several: Endurances) -> Finding[Endurances]:
-    """Return how long the bottle lasts for several gas uses, side by side."""
+    """Report of a bottle's durations for several gas uses, side by side."""
     are_strides = all(_counted(use) == "stride" for use in several.uses.values())
     counted, time = ("stride", "walking") if are_strides else ("repetition", "run time")
     titles = ("gas use", (f"gas per {counted}", _MASS), (time, _DURATION), f"{counted}s", "ended")

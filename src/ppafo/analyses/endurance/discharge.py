@@ -234,7 +234,8 @@ def discharge_of_life(life: BottleLife, draw: GasDemand) -> Discharge:
             TIME_IS_UP if ended.kind == WALKED else ended.kind, ended.message, course.last.mass, usable
         ),
         balance=course.balance,
-        record=lambda: course.recording,
+        # Read where it is wanted; a function of its own could not be pickled.
+        record=partial(getattr, course, "recording"),
     )
 
 
@@ -266,7 +267,7 @@ def _recording(bottle: Bottle, stretches: Sequence[DischargeInterval]) -> Record
 
 
 def content_of(bottle: Bottle, mass: float, energy: float) -> BottleContent:
-    """Return what the bottle holds with a mass [kg] of an energy [J]."""
+    """State of the bottle's content with a mass [kg] of an energy [J]."""
     table = bottle.fluid.table
     return bottle_content(table, mass, bottle.volume, content_temperature(table, mass, bottle.volume, energy))
 

@@ -28,7 +28,7 @@ WITHOUT_REST = Schedule(LONGEST, 0.0, LONGEST)
 
 @checked
 def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -> Endurance | None:
-    """Return how long a bottle lasts when the walk continues without rest; None where the walk took no gas.
+    """Duration of a bottle when the walk continues without rest; None where the walk took no gas.
 
     The same device, without faults, walks on the bottle until that ends it, as ``ppafo walk --bottle`` does;
     ``bottle`` is its own, or the paper's, unless given. A stride is one of the leg with the device, or a whole
@@ -47,7 +47,7 @@ def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -
 def endurance_of_walk_gas(
     gas: WalkGas, bottle: str | Path | None, schedule: Schedule, overrides: Iterable[str] = ()
 ) -> Endurance:
-    """Return how long a bottle lasts when a walk continues; DataError where it took no gas, or is not known."""
+    """Duration of a bottle when a walk continues; DataError where it took no gas, or is not known."""
     at_set_pressure = demand_of_walk(gas)
     if gas.scenario is None:
         raise DataError(
@@ -78,7 +78,7 @@ def endurance_of_walk_gas(
 
 
 def follow_bottle(bottle: Bottle, draw: GasDemand, schedule: Schedule) -> Endurance:
-    """Return how long a full bottle lasts at a draw, by the schedule of its use."""
+    """Duration of a full bottle at a gas demand, by the schedule of its use."""
     usable = bottle.mass - smallest_mass_when_warm(bottle, draw)
     return Endurance(
         bottle=bottle,

@@ -10,7 +10,8 @@ from ppafo.errors import ScenarioError, StudyError, UnitError, at_fault, refused
 from ppafo.progress import Report
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import MetricLimit, atmosphere_of, check_metrics, level_of, seeds_of_noise
+from ppafo.studies.draws import seeds_of_noise
+from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, given_in, varied_path
 from ppafo.study.runs import RunCounter, Runs, oscillating, settled, tracking_violation, with_companions

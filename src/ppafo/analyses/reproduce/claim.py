@@ -132,7 +132,7 @@ def stated_claim(
     )
 
 
-def told_claim(
+def claim_on_text(
     identifier: str, statement: str, observations: Sequence[Observation], assumptions: tuple[str, ...]
 ) -> Claim:
     """Return the claim on what the text tells, statement by statement, of a recording."""

@@ -14,10 +14,10 @@ from ppafo.analyses.reproduce.claim import (
     Observation,
     Verdict,
     arithmetic_claims,
+    claim_on_text,
     load_reported,
     observation,
     stated_claim,
-    told_claim,
 )
 from ppafo.analyses.reproduce.decision_phases import PhasedRuns, phased_runs
 from ppafo.analyses.reproduce.meaning_of_u import readings_of_u
@@ -256,14 +256,14 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     phased, of_tasks = phased_runs(solenoid), _used_by(assumed, SOLENOID, PROPORTIONAL)
     claims = (
         *arithmetic_claims(reported),
-        told_claim(
+        claim_on_text(
             "figure_7_words",
             "What the text tells of the pressures and the angle of the step response.",
             step_observed,
             _used_by(assumed, STEP),
         ),
         *torque_task_claims(phased, proportional, of_tasks),
-        told_claim(
+        claim_on_text(
             "oscillation_words",
             "What the text tells of the oscillation with both valves.",
             torque_observed,

@@ -16,7 +16,8 @@ from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import CONFIDENCE, Uncertainty, check_fraction
+from ppafo.studies.draws import Uncertainty
+from ppafo.studies.limits import CONFIDENCE, check_fraction
 from ppafo.studies.sampling import NOISE
 from ppafo.study.runs import Runs, tracking_violation
 

@@ -160,8 +160,8 @@ def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Sect
 def _lines(finding: AuditFinding) -> list[str]:
     lines = [f"{finding.severity}: {finding.title} [{finding.id}]"]
     for value in finding.values:
-        text = value.value if isinstance(value.value, str) else f"{value.value:.6g}"
-        lines.append(f"{_INDENT}{value.path} = {text} {value.unit} ({value.origin})")
+        text = value.value if isinstance(value.value, str) else f"{value.value:.6g} {value.unit}".rstrip()
+        lines.append(f"{_INDENT}{value.path} = {text} ({value.origin})")
     lines += textwrap.wrap(finding.paragraph, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
     if finding.accepted:
         accepted = f"Accepted by the set: {finding.accepted}"

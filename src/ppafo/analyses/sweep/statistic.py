@@ -21,7 +21,8 @@ from ppafo.progress import Report
 from ppafo.report.finding import Finding
 from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
 from ppafo.studies.distributions import floored_interval, noise_interval
-from ppafo.studies.draws import REPLICATES, Columns, Uncertainty, atmosphere_of, check_metrics, drawn_in
+from ppafo.studies.draws import REPLICATES, Columns, Uncertainty, drawn_in
+from ppafo.studies.limits import atmosphere_of, check_metrics
 from ppafo.studies.sampling import with_new_noise
 from ppafo.studies.study import Study
 from ppafo.study.runs import RunCounter, Runs

@@ -22,7 +22,8 @@ from ppafo.studies.distributions import (
     fraction_interval,
     quantile_interval,
 )
-from ppafo.studies.draws import REPLICATES, Columns, Uncertainty, level_of
+from ppafo.studies.draws import REPLICATES, Columns, Uncertainty
+from ppafo.studies.limits import level_of
 
 FEWEST_SEEN = 10_000
 """Draws from which a mean is believed: one in 3,300 that differs would have come (95 %)."""

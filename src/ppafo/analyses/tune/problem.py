@@ -20,15 +20,8 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats, LogUniformBetween, UniformBetween
-from ppafo.studies.draws import (
-    MetricLimit,
-    Uncertainty,
-    atmosphere_of,
-    check_metrics,
-    difference_of,
-    level_of,
-    uncertainty_of,
-)
+from ppafo.studies.draws import Uncertainty, uncertainty_of
+from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, difference_of, level_of
 from ppafo.studies.loading import list_studies, load_study, read_source
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, given_in, in_its_unit, value_at, varied_path

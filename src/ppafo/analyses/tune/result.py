@@ -10,7 +10,7 @@ from ppafo.analyses.tune.problem import Gains, ObjectiveTerm, Problem
 from ppafo.metrics import Metric
 from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.simulate import Result
-from ppafo.studies.draws import MetricLimit
+from ppafo.studies.limits import MetricLimit
 
 INFEASIBLE = 1.0e6
 """Lowest cost of a candidate that violates a constraint."""

@@ -136,12 +136,6 @@ def kind_of_channel(channel: ChannelAgreement) -> Kind:
     return Kind("", "", COMPARED[channel.channel].quantity)
 
 
-def _shown_rms(channel: ChannelAgreement) -> dict[str, Any]:
-    """Return the RMS error of a channel in the unit that people are shown."""
-    kind = kind_of_channel(channel)
-    return {"unit": kind.shown_unit, "rms": display_value(channel.rms, kind.quantity)}
-
-
 def _recording_data(agreement: RecordingAgreement) -> dict[str, Any]:
     """Return the errors of a recording as plain data in SI."""
     return {
@@ -172,7 +166,11 @@ def _recording_data(agreement: RecordingAgreement) -> dict[str, Any]:
                 "bias": channel.bias,
                 "largest": channel.largest,
                 "largest_time": channel.largest_time,
-                "shown": _shown_rms(channel),
+                # In the unit that people are shown.
+                "shown": {
+                    "unit": kind_of_channel(channel).shown_unit,
+                    "rms": display_value(channel.rms, kind_of_channel(channel).quantity),
+                },
             }
             for channel in agreement.channels
         },

@@ -55,7 +55,7 @@ _FAR_ABOVE = 2.0
 
 @in_units(lambda worn: worn.scenario.device.shown)
 def safety_remarks(worn: WalkResult) -> list[str]:
-    """Return what is fitted, torques above the limit, pressures far above the supply, pauses, stop, strides helped."""
+    """Remarks on the shut-off valve, torques above the limit, pressures far above the supply, and losses of help."""
     scenario, supply = worn.scenario, worn.scenario.device.supply
     remarks = []
     fitted = walk_of(scenario).shut_off
@@ -227,7 +227,7 @@ def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
 
 
 def _remarks(comparison: WalkComparison) -> list[str]:
-    """Return who walks, how long a bottle lasts, what was unsafe, how far to trust the walk, and what diverged."""
+    """Remarks on the wearer, the bottle, safety, the trusted range of speeds, and divergence."""
     worn, bare = comparison.with_device, comparison.without_device
     bottle = "" if worn.supply is None else bottle_remark(worn)
     if worn.supply is None and "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:

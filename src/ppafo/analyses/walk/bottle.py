@@ -44,7 +44,7 @@ def bottle_parts(worn: WalkResult) -> tuple[Section, ...]:
 
 
 def bottle_remark(worn: WalkResult) -> str:
-    """Return what ended a walk on its bottle, and when."""
+    """Remark on the end of a walk on its bottle, with its time."""
     supply = worn.supply
     assert supply is not None, "said of a walk on a bottle"
     time = lasted(supply)
@@ -53,7 +53,7 @@ def bottle_remark(worn: WalkResult) -> str:
 
 
 def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
-    """Return what ended the walk and when, the gas used, and the coldest places, each as name and value."""
+    """End of the walk and its time, gas used, and coldest places, each as name and value."""
     values, motion, peaks = supply.values, walk_of(worn.scenario), worn.peak_torques
     end = {name: float(series[-1]) for name, series in values.items()}
     filled = f"{_GAS.text(supply.supply.mass)} at {_WARMTH.text(supply.supply.temperature)}"

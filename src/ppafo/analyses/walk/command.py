@@ -22,7 +22,7 @@ def list_files() -> list[dict[str, Any]]:
 
 
 def default_folder(values: Mapping[str, Any]) -> Path:
-    """Return where the command writes by default: by the name of the configuration."""
+    """Default output folder of the command, by the name of the configuration."""
     names = ("overrides", "gait", "task_sequence", "bottle")
     configuration = load_walk(values["scenario"], **{name: values[name] for name in names})
     walked, bottled = walk_of(configuration).task_sequence, walk_of(configuration).bottle

@@ -17,7 +17,7 @@ from ppafo.walking.walk import WalkComparison
 
 
 def walk_data(name: str, version: int, comparison: WalkComparison) -> dict[str, Any]:
-    """Return what the file of every walk says, of a format with this name and version."""
+    """Plain data in the file of every walk, of a format with this name and version."""
     worn, bare = comparison.with_device, comparison.without_device
     return {
         "format": name,
@@ -98,7 +98,7 @@ def number_texts(shown: ShownNumber, values: Iterable[float | str | None]) -> tu
 
 
 def toes(height: float | None) -> float | str | None:
-    """Return how high the toes are over the ground [m]; of toes below it only that they would drag."""
+    """Height of the toes over the ground [m]; the text that they would drag where it is below 0."""
     return WOULD_DRAG if height is not None and height < 0.0 else height
 
 

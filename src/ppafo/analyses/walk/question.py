@@ -77,7 +77,7 @@ _LONG_WALK = 12.0
 
 
 def _reporter(report: Report, noun: str, above: float) -> Callable[[float, float], None]:
-    """Return what hears how far walks are, and reports it where there is more than ``above`` of the ``noun``."""
+    """Callback of a walk's progress, which reports it where there is more than ``above`` of the ``noun``."""
 
     def forward(done: float, total: float) -> None:
         if total > above:

@@ -150,7 +150,7 @@ def task_sequence_data(comparison: WalkComparison) -> dict[str, Any]:
 
 
 def trust_remark(configuration: Scenario) -> str:
-    """Return which segments go beyond the speeds for which scaling the gait can be trusted; empty where none does."""
+    """Remark on segments beyond the speeds for which scaling the gait can be trusted; empty without any."""
     sequence, gait = walk_of(configuration).task_sequence, walk_of(configuration).gait
     if sequence is None:
         return ""

@@ -66,7 +66,7 @@ class Wearers:
 
 @in_units(lambda population: population.scenario.device.shown)
 def wearers_finding(population: Population) -> Finding[Wearers]:
-    """Return what many wearers get; no figure where every walk diverged."""
+    """Report of the walks of many wearers; no figure where every walk diverged."""
     configuration = population.scenario
     tables = {**population.outcomes, **population.traits}
     rows = []

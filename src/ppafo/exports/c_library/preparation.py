@@ -32,7 +32,7 @@ from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.effects import SEEN_BY_EFFECTS
 from ppafo.parameters.plant import area_restriction, plant_with, sonic_restriction
-from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES, THERMAL, gas_settings
+from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES, THERMAL_GAS
 from ppafo.simulation.leg import foot_load, with_load
 from ppafo.simulation.numbers import path_of_locked_angle
 from ppafo.simulation.plan import StepCounts, relative_tolerance, state_with_volumes, step_counts, thermal_gas
@@ -341,8 +341,8 @@ def set_gas(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     lane.sensors = rebuilt(SensorParameters, (getattr(settings, name) for name in flaws))
     if parts.program.is_thermal:
         lane.thermal = thermal_gas(
-            parts.row("Walls", named(gas_settings(THERMAL)))(
-                *(getattr(settings, name) for name in parts.names("gas_model", named(gas_settings(THERMAL))))
+            parts.row("Walls", named(THERMAL_GAS))(
+                *(getattr(settings, name) for name in parts.names("gas_model", named(THERMAL_GAS)))
             ),
             lane.gas,
         )

@@ -286,7 +286,7 @@ _WITHIN_SWING = 0.1
 
 
 def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> list[str]:
-    """Return which curves have few samples, and by how much the force scatters while the foot is in the air."""
+    """Remarks on curves with few samples, and on the scatter of the force while the foot is in the air."""
     rates: dict[int, list[str]] = {}
     for name, signal in walk.items():
         if signal.rate < _COARSE_RATE:
@@ -312,7 +312,7 @@ def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> 
 
 
 def _remarks(curves: Mapping[str, CurveStatistics], strides: StrideSelection, events: str) -> list[str]:
-    """Return which strides were left out or are not covered, and what the force shows, or that there is none."""
+    """Remarks on strides that were left out or are not covered, and on the vertical force or its absence."""
     remarks = [
         f"stride from {stride.start:.4g} to {stride.end:.4g} s left out: {why}" for stride, why in strides.left_out
     ]

@@ -152,7 +152,7 @@ def column_names(mapped: object) -> tuple[str, ...]:
 
 
 def unsaid_axes(columns: GaitMap) -> list[str]:
-    """Return which way was taken for markers whose map does not say the axis along the walk, or the one upwards."""
+    """Remarks on the axes assumed for markers whose map does not give the axis along the walk, or the one upwards."""
     axes = []
     for name, mapped in (("shank_angle", columns.shank_angle), ("ankle_angle", columns.ankle_angle)):
         unsaid = [key for key in ("forward", "vertical") if key not in mapped.model_fields_set]

@@ -20,7 +20,7 @@ def nearest_column(missing: str, known: Iterable[str]) -> str:
 
 
 def _likeness(missing: str, name: str) -> float:
-    """Return how alike two names are, 0 for those that cannot mean the same."""
+    """Likeness of two names [-], 0 for two that cannot mean the same."""
     (wanted, axis), (found, other_axis) = _parts(missing), _parts(name)
     if axis != other_axis:
         return 0.0

@@ -101,7 +101,7 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
 
 
 def _is_there(mapped: object, table: MotionTable) -> bool:
-    """Return whether a table has all columns of a curve that is mapped."""
+    """True where a table has all columns of a curve that is mapped."""
     return mapped is not None and all(name.removeprefix("-") in table.columns for name in column_names(mapped))
 
 

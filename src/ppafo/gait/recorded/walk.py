@@ -181,7 +181,7 @@ def find_columns(
 
 
 def _why_missing(curve: str, bare: Sequence[str], tables: Sequence[MotionTable]) -> str:
-    """Return which column of a curve no table has, and the nearest; DataError where several have its name."""
+    """Column of a curve that no table has, and the nearest one, in words; DataError where several have its name."""
     known = [name for table in tables for name in table.columns]
     missing = next((name for name in bare if name not in known), bare[0])
     twins = [name for name in known if re.fullmatch(re.escape(_whole(missing)) + r"#\d+(\.[xyz])?", name)]
@@ -199,7 +199,7 @@ def _why_missing(curve: str, bare: Sequence[str], tables: Sequence[MotionTable])
 
 
 def _said_of_columns(tables: Sequence[MotionTable]) -> str:
-    """Return what files have and remark, each to a length that can be read, and where columns are named."""
+    """Columns and remarks of files, cut to a readable length, and the place to name columns, in words."""
     # A marker counts once, not by its coordinates.
     names = list(dict.fromkeys(one_line(_whole(name)) for table in tables for name in table.columns))
     shown = ", ".join(names[:_MOST_SHOWN]) + (", ..." if len(names) > _MOST_SHOWN else "")
@@ -227,7 +227,7 @@ _LEAST_FLAT = 0.1
 def between_markers(
     columns: CurveColumns, mapped: ShankMap | AngleMap, first: str, second: str
 ) -> tuple[Floats, Floats]:
-    """Return how far the second marker is ahead of the first and above it, in the unit of the file."""
+    """Distances of the second marker ahead of the first and above it, in the unit of the file."""
     marker = {name: columns.table.columns[name] for _, name in columns.terms}
     for name, values in marker.items():
         check_recorded(values, f"{columns.table.file}: column {name!r}")
@@ -323,7 +323,7 @@ def knee_signals(
 
 
 def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: float | None) -> list[str]:
-    """Return where the acceleration of the knee comes from, or why there is none; ``stature`` [m].
+    """Remarks on the source of the knee's acceleration, or the reason that there is none; ``stature`` [m].
 
     DataError for a length of the thigh that is not plausible.
     """
@@ -361,7 +361,7 @@ def check_way(walk: Mapping[str, Signal], signs_from: SignSource) -> None:
 
 
 def knee_position(hip_forward: Floats, hip_up: Floats, lean: Floats, thigh_length: float) -> tuple[Floats, Floats]:
-    """Return where the knee is, forward and up [m]; the thigh leans by this [rad], above 0 with the knee in front."""
+    """Position of the knee, forward and up [m]; the thigh leans by this [rad], above 0 with the knee in front."""
     return hip_forward + thigh_length * np.sin(lean), hip_up - thigh_length * np.cos(lean)
 
 

@@ -181,7 +181,7 @@ def open_readings(
     pressures = [pool(sources, name) for name in CHANNELS[:2]]
     check_no_wrong_reading(sources, PROCEDURE, "mass_flow", pressures, is_open)
     direction = pressures[0] - pressures[1]
-    _, is_kept, told = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow, is_open)
+    _, is_kept, meter_remarks = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow, is_open)
     possible = is_kept[is_open]
     labels = [label for label, is_one in zip(recordings_of(sources), is_kept.tolist(), strict=True) if is_one]
-    return upstream[possible], downstream[possible], np.abs(flow[possible]), labels, (*remarks, *told)
+    return upstream[possible], downstream[possible], np.abs(flow[possible]), labels, (*remarks, *meter_remarks)

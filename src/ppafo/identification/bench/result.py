@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
-from ppafo.identification.source import RecordingSource, kind_of, told_of_readings
+from ppafo.identification.source import RecordingSource, kind_of, remarks_on_readings
 from ppafo.identification.wording import conflict_in_words, widened_by
 from ppafo.report.panels import Panel, draw_panels
 from ppafo.signals import RecordingKind
@@ -80,7 +80,7 @@ def result_of(
         panels=panels,
         kind=kind_of(source.recording.kind for source in sources),
         conflict=conflict_in_words(fitted, remedy),
-        remarks=(*remarks, *told_of_readings(sources)),
+        remarks=(*remarks, *remarks_on_readings(sources)),
     )
 
 

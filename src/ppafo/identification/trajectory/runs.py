@@ -343,23 +343,20 @@ def _with_inputs(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
     for number, kind in enumerate(kinds.T):
         members = np.flatnonzero(group.ravel() == number)
         zero_of = {path.removeprefix(ZERO_OF): float(one) for path, one in zip(zeros, kind, strict=True)}
+        # What a run follows less the zeros [rad], [Pa] of the sensors that recorded it; both inlets may have one.
+        both = zero_of.get(SUPPLY, 0.0)
+        off = {
+            "path.level": zero_of.get(ANGLE, 0.0),
+            "plant.supply_pressure": both,
+            "plant.dorsiflexion_pressure": zero_of.get(DORSIFLEXION_SUPPLY, both),
+        }
+        moved = {path: values - off.get(path, 0.0) for path, values in prepared.inputs.parameters.items()}
         own = {path: column[members] for path, column in rest.items()}
-        part = _run_signals(replace(prepared, inputs=_moved(prepared.inputs, zero_of)), own, len(members))
+        inputs = StepInputs(prepared.inputs.command, moved)
+        part = _run_signals(replace(prepared, inputs=inputs), own, len(members))
         for name, values in part.items():
             found.setdefault(name, np.empty((len(values), count)))[:, members] = values
     return found
-
-
-def _moved(inputs: StepInputs, zero_of: Mapping[str, float]) -> StepInputs:
-    """Return what a run follows less the zeros [rad], [Pa] of the sensors that recorded it."""
-    both = zero_of.get(SUPPLY, 0.0)
-    zeros = {
-        "path.level": zero_of.get(ANGLE, 0.0),
-        "plant.supply_pressure": both,
-        "plant.dorsiflexion_pressure": zero_of.get(DORSIFLEXION_SUPPLY, both),
-    }
-    moved = {path: values - zeros.get(path, 0.0) for path, values in inputs.parameters.items()}
-    return StepInputs(inputs.command, moved)
 
 
 def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:

@@ -7,12 +7,11 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple
 
 from ppafo.errors import DataError, IdentificationError, ScenarioError
 from ppafo.identification.estimate import Estimate, interval_factor
 from ppafo.identification.keys import positive_in, quantity_in
-from ppafo.identification.source import RecordingSource, UsedRecording, double_use, told_of_readings
+from ppafo.identification.source import RecordingSource, UsedRecording, double_use, remarks_on_readings
 from ppafo.identification.tolerances import Tolerances, quantity_of
 from ppafo.identification.trajectory.expected import CandidateExperiment, ExpectedBenefit, expected_information
 from ppafo.identification.trajectory.experiment import (
@@ -119,14 +118,6 @@ def candidates_of(section: TrajectorySection, setting: SectionContext) -> tuple[
     return tuple(candidates)
 
 
-class _Explained(NamedTuple):
-    """The scenario that is to explain a recording, the time [s] of the recording at which it begins, its inputs."""
-
-    scenario: Scenario
-    start: float
-    inputs: tuple[str, ...]
-
-
 def _experiment(entry: ExperimentSection, setting: SectionContext) -> FittedExperiment:
     """Return an experiment of a section, with its recording and the scenario that is to explain it."""
     said = f"{setting.file}: experiment '{entry.label}'"
@@ -141,6 +132,12 @@ def _experiment(entry: ExperimentSection, setting: SectionContext) -> FittedExpe
                 )
         scenario = _scenario(entry.scenario, entry.overrides, setting)
         start, inputs = quantity_in(entry, "start", "s", said) or 0.0, entry.inputs or ()
+    channels = entry.channels
+    if channels is None:
+        # All that is neither locked nor followed; of a fixed volume its pressure.
+        is_prescribed = entry.locked is not None or ANGLE in (entry.inputs or ())
+        channels = FITTED_CHANNELS[1:] if is_prescribed else FITTED_CHANNELS
+        channels = channels if entry.volume is None else ("pressure_1",)
     step = quantity_in(entry, "step", "s", said, SHORTEST_STEP, LONGEST_STEP)
     scenario = scenario if step is None else replace(scenario, run=replace(scenario.run, step=step))
     # The scenario of a replay has the state of the samples already.
@@ -150,7 +147,7 @@ def _experiment(entry: ExperimentSection, setting: SectionContext) -> FittedExpe
         scenario=scenario,
         recording=source.recording,
         start=start,
-        channels=_compared_channels(entry),
+        channels=channels,
         noise=noise_of_channels(entry.noise, said),
         inputs=inputs,
         initial_state="recording" if is_read else "scenario",
@@ -191,10 +188,12 @@ def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], setti
     return FreeParameter(entry.path, start, low, high, deviation, entry.recordings)
 
 
-def _replay(entry: ExperimentSection, recording: Recording, setting: SectionContext, said: str) -> _Explained:
-    """Return the replay of a recording on the device of the set; it begins at the first sample unless a start is given.
+def _replay(
+    entry: ExperimentSection, recording: Recording, setting: SectionContext, said: str
+) -> tuple[Scenario, float, tuple[str, ...]]:
+    """Return the replay of a recording on the device of the set, its start [s] in the recording, and its inputs.
 
-    IdentificationError where a scenario is needed.
+    It begins at the first sample unless a start is given. IdentificationError where a scenario is needed.
     """
     if setting.parameter_set is None:
         raise IdentificationError(f"{said}: needs a scenario, because no device was given")
@@ -225,17 +224,7 @@ def _replay(entry: ExperimentSection, recording: Recording, setting: SectionCont
     remedies = dict.fromkeys(FITTED_CHANNELS, "give a scenario, which prescribes the initial state")
     start = start_of(used, device, known, said, remedies)
     motion = locked_vane(start.angle) if known else None
-    return _Explained(replay_scenario(recording, device, start, used.duration, said, motion), first, inputs)
-
-
-def _compared_channels(entry: ExperimentSection) -> tuple[str, ...]:
-    """Return what an experiment is compared in: as given, else all that is neither locked nor followed."""
-    if entry.channels is not None:
-        return entry.channels
-    if entry.volume is not None:
-        return ("pressure_1",)
-    is_prescribed = entry.locked is not None or ANGLE in (entry.inputs or ())
-    return FITTED_CHANNELS[1:] if is_prescribed else FITTED_CHANNELS
+    return replay_scenario(recording, device, start, used.duration, said, motion), first, inputs
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,7 +255,7 @@ def solve_section(section: TrajectorySection, setting: SectionContext, report: R
     sources = tuple(RecordingSource(experiment.recording, experiment.source) for experiment in problem.experiments)
     disagreeing = _against_bench(fitted.estimates, setting.bench)
     return TrajectoryOutcome(
-        fitted, expected, (*told_of_readings(sources), *fitted.outliers, *fitted.remarks, *disagreeing)
+        fitted, expected, (*remarks_on_readings(sources), *fitted.outliers, *fitted.remarks, *disagreeing)
     )
 
 

@@ -84,6 +84,7 @@ from ppafo.exports.c_library.conditions import conditions_of, conditions_of_prog
 from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, places_of
 from ppafo.exports.c_library.files import OUTPUTS, run_words
 from ppafo.exports.c_library.library import ExportParameter, Library, c_identifier
+from ppafo.model.controlled import CONTROLLED
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
@@ -117,11 +118,13 @@ def description_of(scenario: Scenario, library: Library) -> dict[str, Any]:
     # Settings that have the number of another until they are changed by themselves.
     follows = {path: links[0].sources[0] for path, links in library.links.items() if links[0].is_same}
     # Settings that rules make of others until they are changed by themselves; a rule has the name of its function.
+    # The page has the rules of a loop of torque: gains in 1/Pa have others under these names, and stay as they are.
+    own = f"{scenario.controlled}." if CONTROLLED[scenario.controlled].unit.startswith("Pa") else ""
     made = {
         path: {
             "terms": [
                 {
-                    "rule": f"{term.function.__module__.rpartition('.')[2]}.{term.function.__name__}",
+                    "rule": f"{own}{term.function.__module__.rpartition('.')[2]}.{term.function.__name__}",
                     "sources": list(term.sources),
                 }
                 for term in links[0].terms

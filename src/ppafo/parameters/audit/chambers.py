@@ -33,9 +33,8 @@ def check_virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
             sides=(ComparedNumber("torque constant over displacement per radian", ratio, ""),),
             paragraph=(
                 f"Energy closes: the shaft gets {100.0 * ratio:.3g} % of the work p dV of the gas, and the other "
-                f"{100.0 * (1.0 - ratio):.3g} % are the stated loss. The model takes the same ratio where "
-                "the shaft drives "
-                "the vane and compresses gas, where a real loss has the other sign."
+                f"{100.0 * (1.0 - ratio):.3g} % are the stated loss. The model takes the same ratio where the shaft "
+                "drives the vane and compresses gas, where a real loss has the other sign."
             ),
         )
     elif abs(numbers[1] / numbers[0] - 1.0) > _TOLERANCE:
@@ -52,15 +51,14 @@ def check_virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
                 *gas_sides,
             ),
             paragraph=(
-                f"A vane that turns by dtheta does the work T dtheta = (P1 - P2) dV before friction, so that the "
-                f"torque constant {1e6 * torque_constant:.4g} cm^3 and the displacement per radian "
+                "A vane that turns by dtheta does the work T dtheta = (P1 - P2) dV before friction, so that the torque "
+                f"constant {1e6 * torque_constant:.4g} cm^3 and the displacement per radian "
                 f"{1e6 * displacement_per_radian:.4g} cm^3/rad should be one number; the displacement is "
                 f"{displacement_per_radian / torque_constant:.2g} times the torque constant. The model takes it as it "
                 f"is: the shaft gets {100.0 * torque_constant / displacement_per_radian:.3g} % of the work p dV of the "
-                "gas, and nothing takes up the difference, for friction has numbers of its own."
-                f"{gas_text} "
-                f"Leave {_DISPLACEMENT_PER_RADIAN} out, and it follows the torque constant; or measure the volume of "
-                "gas that a full turn displaces. Until then energy and gas are uncertain by the same factor."
+                f"gas, and nothing takes up the difference, for friction has numbers of its own.{gas_text} Leave "
+                f"{_DISPLACEMENT_PER_RADIAN} out, and it follows the torque constant; or measure the volume of gas "
+                "that a full turn displaces. Until then energy and gas are uncertain by the same factor."
             ),
         )
 
@@ -83,11 +81,9 @@ def _gas_use(
     )
     text = (
         f" Filling 1 cm^3 from atmosphere to supply takes {density:.3g} mg of gas, so the "
-        f"{evidence.in_set_unit(path, used)} of one filling occupy {1e6 * needed:.3g} cm^3; over the whole "
-        "range the vane "
-        f"sweeps {1e6 * by_torque:.3g} cm^3 by the torque constant and {1e6 * by_volume:.3g} cm^3 by the "
-        "displacement per "
-        "radian; lines and clearance contain a part of that gas."
+        f"{evidence.in_set_unit(path, used)} of one filling occupy {1e6 * needed:.3g} cm^3; over the whole range the "
+        f"vane sweeps {1e6 * by_torque:.3g} cm^3 by the torque constant and {1e6 * by_volume:.3g} cm^3 by the "
+        "displacement per radian; lines and clearance contain a part of that gas."
     )
     return (path, _SUPPLY, angles[0], angles[2]), sides, text
 
@@ -132,10 +128,9 @@ def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_p
         ),
         paragraph=(
             f"At {end} the volume of chamber {chamber} is {1e6 * smallest:.3g} cm^3; it is not positive over the last "
-            f"{math.degrees(empty):.3g} of {math.degrees(turn):.3g} deg. Count the volume from the "
-            f"end of the range ({stop_path} = {end}) with a dead volume for line and clearance, or give a dead "
-            "volume of "
-            f"more than {-1e6 * slope * travel:.3g} cm^3."
+            f"{math.degrees(empty):.3g} of {math.degrees(turn):.3g} deg. Count the volume from the end of the range "
+            f"({stop_path} = {end}) with a dead volume for line and clearance, or give a dead volume of more than "
+            f"{-1e6 * slope * travel:.3g} cm^3."
         ),
     )
 

@@ -1,7 +1,6 @@
 """Changes of a parameter set against the set that it began as: value by value, whatever the unit."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ppafo.errors import UnitError
@@ -34,7 +33,15 @@ def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[ValueChan
     Numbers are compared in SI, so that a value in another unit is the same value; sources and notes do not count.
     """
     parameter_set, parent = with_followers(parameter_set), with_followers(parent)
-    kinds, old_kinds = _chosen(parameter_set), _chosen(parent)
+    kinds, old_kinds = (
+        {
+            "default_valve": each.default_valve,
+            "actuator.kind": each.actuator_kind,
+            "actuator.file": each.actuator_file,
+            **{f"valves.{name}.kind": kind for name, kind in each.valve_kinds.items()},
+        }
+        for each in (parameter_set, parent)
+    )
     changed = [
         ValueChange(path, old_kinds.get(path, ""), kinds.get(path, ""), "")
         for path in dict.fromkeys((*kinds, *old_kinds))
@@ -50,12 +57,6 @@ def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[ValueChan
             was = "" if old is None else entry_text(old)
             changed.append(ValueChange(path, was, *(("", "") if new is None else (entry_text(new), new.origin))))
     return changed
-
-
-def _chosen(parameter_set: ParameterSet) -> Mapping[str, str]:
-    kinds = {f"valves.{name}.kind": kind for name, kind in parameter_set.valve_kinds.items()}
-    actuator = {"actuator.kind": parameter_set.actuator_kind, "actuator.file": parameter_set.actuator_file}
-    return {"default_valve": parameter_set.default_valve, **actuator, **kinds}
 
 
 def _is_same(path: str, parameter_set: ParameterSet, parent: ParameterSet) -> bool:

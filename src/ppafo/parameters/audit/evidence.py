@@ -1,5 +1,6 @@
 """A finding of an audit, with the numbers on both sides, and the evidence that checks are given."""
 
+import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -126,14 +127,11 @@ class Evidence:
     def in_set_unit(self, path: str, value: float) -> str:
         """Return an SI value in the unit in which the set gives the quantity at a path, for example ``84 g m^2``."""
         entry, quantity = self.parameter_set.numbers.get(path), self.declared[path]
-        for unit in alternatives(quantity) if entry is not None else ():
-            try:
-                converted = (
-                    from_si(value, entry.unit, unit, atmospheric_pressure(self.parameter_set)) if entry else value
-                )
-            except UnitError:
-                continue
-            return f"{converted:.4g} {entry.unit if entry else ''}".rstrip()
+        if entry is not None:
+            for unit in alternatives(quantity):
+                with contextlib.suppress(UnitError):
+                    converted = from_si(value, entry.unit, unit, atmospheric_pressure(self.parameter_set))
+                    return f"{converted:.4g} {entry.unit}".rstrip()
         return f"{value:.4g} {quantity.unit.removesuffix('_a')}".rstrip()
 
     def torque(self, value: float, form: str = ".3g") -> str:

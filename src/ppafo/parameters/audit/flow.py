@@ -33,8 +33,7 @@ def check_orifices(evidence: Evidence) -> Iterator[AuditFinding]:
                 values=evidence.values_of(*(f"{section}.{name}" for name in names)),
                 sides=(),
                 paragraph=(
-                    f"{section} has {', '.join(names)}, which specify one orifice twice, so no device can "
-                    "be built. "
+                    f"{section} has {', '.join(names)}, which specify one orifice twice, so no device can be built. "
                     "Give area and discharge_coefficient alone, or sonic_conductance and critical_ratio alone."
                 ),
             )
@@ -102,9 +101,8 @@ def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[AuditFin
         form, origin = (
             SONIC_FORM,
             (
-                f"of {gas.species} by its sonic conductance, which counts for air as in ISO 6358 and is "
-                "converted: another "
-                "gas passes sqrt(R_air / R) times as much mass at the same temperature"
+                f"of {gas.species} by its sonic conductance, which counts for air as in ISO 6358 and is converted: "
+                "another gas passes sqrt(R_air / R) times as much mass at the same temperature"
             ),
         )
     else:
@@ -287,9 +285,8 @@ def check_flow(evidence: Evidence) -> Iterator[AuditFinding]:
                     f"Fully open at {pressure} the valve '{flow.name}' passes "
                     f"{evidence.in_set_unit(flow_path, flow.predicted)} by Cd A = {flow.coefficient:.4g} x "
                     f"{evidence.in_set_unit(area_path, flow.area)}, reported is {reported}: a factor "
-                    f"{flow.predicted / flow.measured:.3g}. Would be consistent with Cd A = "
-                    f"{1e6 * needed:.4g} mm^2, that is "
-                    f"Cd = {needed / flow.area:.3g} with the reported area, or "
+                    f"{flow.predicted / flow.measured:.3g}. Would be consistent with Cd A = {1e6 * needed:.4g} mm^2, "
+                    f"that is Cd = {needed / flow.area:.3g} with the reported area, or "
                     f"{evidence.in_set_unit(area_path, needed / flow.coefficient)} with the reported Cd; or with "
                     f"{evidence.in_set_unit(flow_path, flow.predicted)} as the flow."
                 ),

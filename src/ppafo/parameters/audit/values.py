@@ -119,10 +119,9 @@ def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
                 ComparedNumber("taken literally", 1.0 / value, quantity.unit),
             ),
             paragraph=(
-                f"{path} = {number_text(entry)} is meant as: {quantity.summary}. That has the unit "
-                f"{quantity.unit}; the reported "
-                f"unit {entry.unit} belongs to its inverse. Turn the ratio over and keep the "
-                f"number: taken literally it would be {1.0 / value:.3g} {quantity.unit}."
+                f"{path} = {number_text(entry)} is meant as: {quantity.summary}. That has the unit {quantity.unit}; "
+                f"the reported unit {entry.unit} belongs to its inverse. Turn the ratio over and keep the number: "
+                f"taken literally it would be {1.0 / value:.3g} {quantity.unit}."
             ),
         )
     if foreign:
@@ -247,9 +246,8 @@ def check_ideal_gas(evidence: Evidence) -> Iterator[AuditFinding]:
         ),
         paragraph=(
             f"With the second virial coefficient {1e6 * virial:.3g} cm^3/mol the real-gas factor at "
-            f"{evidence.in_set_unit(_SUPPLY, pressure)} is {compressibility:.4f}: the ideal gas law "
-            f"{counts} the mass in a "
-            f"full chamber by {100.0 * abs(error):.2g} %. A real-gas factor in equation (3) corrects it, where gas "
-            f"use matters to that precision."
+            f"{evidence.in_set_unit(_SUPPLY, pressure)} is {compressibility:.4f}: the ideal gas law {counts} the mass "
+            f"in a full chamber by {100.0 * abs(error):.2g} %. A real-gas factor in equation (3) corrects it, where "
+            "gas use matters to that precision."
         ),
     )

@@ -62,7 +62,8 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
     declared = declared_numbers(base)
     values: dict[str, Floats] = {}
     for given, path in paths.items():
-        _check_path(base, given, path, declared)
+        if path not in declared:
+            raise ScenarioError(f"{base.name}: {_why_not(base, given, path, declared)}")
         if path in values:
             raise ScenarioError(f"{base.name}: '{given}' and '{path}' are the same value; give one of them")
         values[path] = np.ascontiguousarray(columns[given], dtype=np.float64)
@@ -95,15 +96,14 @@ def absolute(base: Scenario, columns: Mapping[str, Floats], gauge: Collection[st
     return {path: column + atmosphere if path in gauge else column for path, column in columns.items()}
 
 
-def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Quantity]) -> None:
-    if path in declared:
-        return
+def _why_not(base: Scenario, given: str, path: str, declared: Mapping[str, Quantity]) -> str:
+    """Return why a path of an ensemble names no number that could vary."""
     if path in _TEXTS:
-        raise ScenarioError(f"{base.name}: '{given}' is a text and cannot vary; run an ensemble for each value")
+        return f"'{given}' is a text and cannot vary; run an ensemble for each value"
     if base.controller.is_outside and path.startswith("controller."):
-        raise ScenarioError(
-            f"{base.name}: '{given}' cannot vary: a Python object has no declared settings; "
+        return (
+            f"'{given}' cannot vary: a Python object has no declared settings; "
             "a module with a KIND has them (docs/how-to/extend.md)"
         )
     hint = nearest_name(path, declared) or f"; for example {', '.join(list(declared)[:6])}"
-    raise ScenarioError(f"{base.name}: there is no number '{given}' that could vary{hint}")
+    return f"there is no number '{given}' that could vary{hint}"

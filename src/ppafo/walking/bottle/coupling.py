@@ -82,7 +82,7 @@ def run_on_bottle(
     stride_time: float,
     progress: Callable[[float, float], None],
 ) -> tuple[BatchResult, SupplyCourse]:
-    """Return what a run gives on a bottle, up to where that ends it, and the course of the bottle.
+    """Run a walk on a bottle, up to where that ends it; return its states and records, and the course of the bottle.
 
     ``device`` is what the run was planned for; ``stride_time`` [s] is how long a stride takes; ``progress`` gets the
     minutes done and in all.
@@ -133,7 +133,7 @@ class _BottleInUse:
 
 
 def _course_of_use(supply: BottleSupply, use: _BottleInUse) -> SupplyCourse:
-    """Return what a bottle went through; a use that nothing ended went to the end of the walk."""
+    """Course of a bottle in use; a use that nothing ended went to the end of the walk."""
     last = use.met[-1]
     over = f"the walk is over, and {_grams(last.state.mass)} are left in the bottle"
     # In the order of ``UNITS``.
@@ -291,7 +291,7 @@ class _Lanes:
 
 
 def _ending(supply: BottleSupply, meeting: _Meeting, reached: float) -> SupplyEnding | None:
-    """Return what ends a walk, None while it goes on; ``reached`` is the best gauge pressure of late over the set."""
+    """End of a walk by its supply, None while it goes on; ``reached``: recent largest gauge pressure over the set."""
     time, state, now = meeting
     bottle = supply.bottle
     left = _grams(state.mass)

@@ -75,7 +75,7 @@ class SupplyCourse:
 
     @property
     def balance(self) -> SupplyBalance:
-        """Return what went where, from start to end."""
+        """Mass and energy balances of the supply from start to end."""
         first, last, supply = self.first, self.last, self.supply.bottle.supply
         parts = (
             first.energy - last.energy,
@@ -95,7 +95,7 @@ class SupplyCourse:
 
 
 def lasted(course: SupplyCourse) -> float | None:
-    """Return how long a bottle lasted [s], None where the walk ended before it, or left what is possible."""
+    """Time that a bottle lasted [s]; None where the walk ended before it, or diverged."""
     return None if course.ending.kind in (WALKED, DIVERGED) else course.ending.time
 
 

@@ -81,14 +81,14 @@ class BottleSupply:
         )
 
     def offers(self, state: SupplyState, near: float, mass: float) -> SupplyNow:
-        """Return what the supply offers in a state whose content is ``near`` a temperature [K].
+        """Pressures, temperatures and largest flow of the supply in a state, its content ``near`` a temperature [K].
 
         ``mass`` [kg] is what the device drew in the last coupling.
         """
         return supply_now(self.bottle.fluid.table, self.line, self.bottle.supply, state, near, mass)
 
     def offers_first(self) -> SupplyNow:
-        """Return what the supply offers the device at the start."""
+        """Pressures, temperatures and largest flow of the supply at the start."""
         return self.offers(self.start(), self.temperature, 0.0)
 
     def fed(self, line: SupplyLine) -> SupplyLine:

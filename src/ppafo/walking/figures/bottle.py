@@ -81,7 +81,7 @@ def bottle_figure(result: WalkResult) -> "Figure":
 
 
 def _marks_behind(result: WalkResult, supply: SupplyCourse) -> list[Mark]:
-    """Return what the regulator delivers at most, and lowest and highest of each stride of what the line has."""
+    """Largest pressure that the regulator delivers, and the range of the line's pressure in each stride."""
     recording, starts = result.recording, result.starts
     delivered = supply.values["regulated_pressure"]
     marks = [Mark("line", supply.times, delivered, label="delivered at most", colour=GREY, style=_DASHED)]

@@ -156,7 +156,7 @@ def draw_ground(axes: "Axes", left: float, right: float) -> None:
 
 
 def drags(legs: _Legs, index: int) -> bool:
-    """Return whether the toes are more than 1 cm below the ground."""
+    """True where the toes are more than 1 cm below the ground."""
     return bool(legs.worn.toe[index, 1] < DRAG_LIMIT)
 
 

@@ -11,7 +11,8 @@ from ppafo.analyses.tune.result import INFEASIBLE, agreement
 from ppafo.analyses.tune.solve import UNUSABLE, CandidateMetrics, judge, search
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats, NormalAround
-from ppafo.studies.draws import MetricLimit, Uncertainty
+from ppafo.studies.draws import Uncertainty
+from ppafo.studies.limits import MetricLimit
 from ppafo.studies.study import RandomValue
 from ppafo.studies.varying import varied_path
 

@@ -41,7 +41,7 @@ def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Conventio
 
 
 def is_plain(path: str | Path) -> bool:
-    """Return whether a CSV file has other delimiters than the package, or a column without unit in square brackets."""
+    """True for a CSV file with other delimiters than the package's, or a column without unit in square brackets."""
     header = _header(path)
     return _delimiter(header) != "," or not all("[" in cell for cell in header.split(","))
 

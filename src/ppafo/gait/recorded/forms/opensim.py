@@ -19,7 +19,7 @@ _STATE = re.compile(r".*/([^/]+)/value")
 
 
 def _is_table(path: str | Path) -> bool:
-    """Tell whether a file is a table with a header line alone, by its suffix, or of a .txt file by its content."""
+    """True for a table with a header line alone: by the suffix of the file, or the content of a .txt file."""
     suffix = Path(path).suffix.lower()
     if suffix == ".txt":
         return re.search(rb"(?mi)^\s*endheader\s*$", read_bytes(path)) is None
