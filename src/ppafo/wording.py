@@ -4,6 +4,9 @@ import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
+LONGEST_SHOWN = 40
+"""Characters of a name or a cell of a file that a message repeats."""
+
 
 def count_of(number: int, noun: str) -> str:
     """Return a number with its noun, ``1 decay`` or ``3 decays``."""

@@ -135,8 +135,14 @@ class SourceCollector:
         if any(known.function is function for known in self.made_from.functions):
             problem = f"'{function.__name__}' calls itself, which cannot be compiled"
             raise refusal(function.__code__.co_filename, tree, problem)
-        named = dict(function.__kwdefaults__ or {})
-        self.made_from.functions.append(Made(function, function.__code__, function.__defaults__, named))
+        self.made_from.functions.append(
+            Made(
+                function=function,
+                code=function.__code__,
+                defaults=function.__defaults__,
+                named_defaults=dict(function.__kwdefaults__ or {}),
+            )
+        )
         composer = Composer(
             function,
             lambda called: self.add_inside(function, called),

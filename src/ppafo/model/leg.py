@@ -118,8 +118,12 @@ def gravity_torques(
 
 def foot_load(leg: LegParameters) -> FootLoad:
     """Foot of a leg about its ankle, without a device."""
-    moment = leg.foot_mass * leg.foot_mass_centre
-    return FootLoad(moment, foot_inertia_about_ankle(leg), leg.shank_length, leg.gravity)
+    return FootLoad(
+        mass_moment=leg.foot_mass * leg.foot_mass_centre,
+        inertia=foot_inertia_about_ankle(leg),
+        shank_length=leg.shank_length,
+        gravity=leg.gravity,
+    )
 
 
 def torque_of_shank(

@@ -223,7 +223,9 @@ def fixed_point_controller(scenario: Scenario) -> FixedPointController:
     law = FIXED_LAWS[scenario.controller.kind]
     row = plan_run(scenario).controller
     numbers = dict(zip((quantity.name for quantity in law.number_quantities), leaves(row.numbers), strict=True))
-    return FixedPointController(scenario, law, numbers, row.steps, row.numbers.limits, ticks)
+    return FixedPointController(
+        scenario=scenario, law=law, numbers=numbers, steps=row.steps, limits=row.numbers.limits, ticks=ticks
+    )
 
 
 def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:

@@ -9,8 +9,7 @@ import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
-from ppafo.storage.comma_separated import LONGEST_SHOWN
-from ppafo.wording import one_line
+from ppafo.wording import LONGEST_SHOWN, one_line
 
 DateOrder = Literal["day month", "month day"]
 """Order of day and month in a date such as 03/04/2026."""

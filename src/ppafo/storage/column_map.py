@@ -19,8 +19,7 @@ from ppafo.errors import DataError, refused_as
 from ppafo.signals import RecordingKind
 from ppafo.signals.recording import TIME, Between, Floats
 from ppafo.storage.clock import ClockForm, DateOrder
-from ppafo.storage.comma_separated import LONGEST_SHOWN
-from ppafo.wording import nearest_name, one_line
+from ppafo.wording import LONGEST_SHOWN, nearest_name, one_line
 
 Thousands = Literal["point", "comma", "apostrophe", "blank"]
 

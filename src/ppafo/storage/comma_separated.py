@@ -25,7 +25,7 @@ from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
 from ppafo.storage.files import read_bytes, text_of, write_file
-from ppafo.wording import first_twice, nearest_name, one_line
+from ppafo.wording import LONGEST_SHOWN, first_twice, nearest_name, one_line
 
 _OTHERS = (
     (";", "semicolons", 'delimiter = "semicolon", and decimal = "comma" if numbers have decimal commas'),
@@ -151,8 +151,6 @@ _MARKS: dict[RecordingKind, str] = {
 
 _MARK = re.compile(r"#\s*(\w+):.*")
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
-LONGEST_SHOWN = 40
-"""Characters of a name or a cell that a message repeats."""
 
 SPLIT_NUMBERS = (
     "commas seem to separate columns and decimals alike: write the file with decimal points, or with another delimiter "

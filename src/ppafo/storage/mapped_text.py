@@ -17,9 +17,9 @@ from ppafo.errors import DataError
 from ppafo.signals.recording import TIME
 from ppafo.storage.clock import is_clock
 from ppafo.storage.column_map import ColumnMap, MappedTable, in_map, shown_names
-from ppafo.storage.comma_separated import LONGEST_SHOWN, SPLIT_NUMBERS, finite_number, kind_of_comments
+from ppafo.storage.comma_separated import SPLIT_NUMBERS, finite_number, kind_of_comments
 from ppafo.storage.files import text_of
-from ppafo.wording import nearest_name, one_line
+from ppafo.wording import LONGEST_SHOWN, nearest_name, one_line
 
 _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t"}
 _MARKS = {"point": ".", "comma": ",", "apostrophe": "'", "blank": " "}

@@ -15,10 +15,10 @@ import numpy as np
 from ppafo.errors import DataError
 from ppafo.signals import Recording, RecordingKind
 from ppafo.signals.recording import TIME, Floats
-from ppafo.storage.comma_separated import LONGEST_SHOWN, check_clock
+from ppafo.storage.comma_separated import check_clock
 from ppafo.storage.files import write_file
 from ppafo.storage.text_table import doubled, number_in, said_of_doubled, text_lines, told_apart, without_copies
-from ppafo.wording import one_line
+from ppafo.wording import LONGEST_SHOWN, one_line
 
 _END = "endheader"
 _COUNT = re.compile(r"(nRows|nColumns|datarows|datacolumns)\s*(?:=|\s)\s*(\S+)", re.IGNORECASE)

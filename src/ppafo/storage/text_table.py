@@ -8,9 +8,9 @@ import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
-from ppafo.storage.comma_separated import LONGEST_SHOWN, finite_number
+from ppafo.storage.comma_separated import finite_number
 from ppafo.storage.files import read_bytes, text_of
-from ppafo.wording import one_line
+from ppafo.wording import LONGEST_SHOWN, one_line
 
 _MOST_SAID = 3
 """Doubled names of which each has a remark."""

@@ -98,7 +98,7 @@ def torque_of_body_on_foot(
 ) -> float:
     """Torque [N m] of shank, knee and weight about the ankle, on a body on the foot: see ``torque_of_shank``."""
     return torque_of_shank(
-        FootLoad(mass_moment, inertia, leg.shank_length, leg.gravity),
+        FootLoad(mass_moment=mass_moment, inertia=inertia, shank_length=leg.shank_length, gravity=leg.gravity),
         now.sine_shank,
         now.cosine_shank,
         foot.sine,
