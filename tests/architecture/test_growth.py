@@ -7,7 +7,7 @@ from pathlib import Path
 import ppafo
 
 SRC = Path(__file__).parents[2] / "src" / "ppafo"
-CEILING = {"definitions": 6652, "code": 47381, "public": 74, "splinters": 23}
+CEILING = {"definitions": 6119, "code": 46198, "public": 74, "splinters": 23}
 """Functions and classes; lines of code; public names; short files with a single importer.
 
 Raised from 6,461 definitions and 45,170 lines by the verdict on what follows its reference, the angle law, loads,
