@@ -206,8 +206,8 @@ SAME = 1.0e-6
 def flow_into(nominal: NominalDevice, pressure: float, node: float, is_relieving: float) -> float:
     """Flow of gas content [J/s] into a chamber at ``pressure`` from a node [Pa] through the open valve.
 
-    A flow out of the chamber is negative. No gas flows back into a node with ``is_relieving`` 0. Equations (6), (7), with
-    the flow function of ISO 6358-1:2013 at a pressure ratio r and the critical ratio b:
+    A flow out of the chamber is negative. No gas flows back into a node with ``is_relieving`` 0. Equations (6), (7),
+    with the flow function of ISO 6358-1:2013 at a pressure ratio r and the critical ratio b:
     psi(r) = sqrt(1 - ((r - b) / (1 - b))^2), 1 below b, and a straight line to 0 at r = 1 above ``LINEAR_RATIO``.
     """
     upstream = max(pressure, node)
