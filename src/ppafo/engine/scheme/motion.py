@@ -180,7 +180,7 @@ def clamp_angle(plant: PlantParameters, angle: float) -> float:
 def next_velocity(
     plant: PlantParameters, angular_velocity: float, acceleration: float, torque: float, duration: float
 ) -> float:
-    """Angular velocity [rad/s] after ``duration`` [s], trapezoidal rule; ``torque`` [N m] at the end without damping."""
+    """Angular velocity [rad/s] after ``duration`` [s], trapezoidal rule; final ``torque`` [N m] without damping."""
     half = 0.5 * duration
     # Damping is implicit: a strongly damped vane settles instead of ringing.
     momentum = plant.inertia * (angular_velocity + half * acceleration)
