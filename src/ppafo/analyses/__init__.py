@@ -1,1 +1,1 @@
-"""Questions beyond one run: a folder each, with its file, its solution and its answer."""
+"""Analyses beyond a single run: a folder for each, with arguments, computation and report."""

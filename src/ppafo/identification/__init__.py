@@ -1,4 +1,4 @@
-"""Identification: from recordings of a device to the values of its parameters, each with interval and verdict."""
+"""Identification of device parameters from recordings, each with a confidence interval and a verdict."""
 
 from ppafo.identification.estimate import Estimate, Verdict
 

@@ -1,4 +1,4 @@
-"""The simulated bench: a richer model than the identified one, which records synthetic data as a laboratory would."""
+"""Simulated test bench: a more detailed model than the identified one, which records synthetic data."""
 
 from ppafo.rig.experiments import RigRecording, record
 from ppafo.rig.preset import Preset, list_presets, load_preset

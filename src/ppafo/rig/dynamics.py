@@ -1,7 +1,8 @@
-"""The rig in continuous time: what the solver integrates. Pure functions on floats, compiled as one program.
+"""Equations of the simulated bench in continuous time, as pure functions on floats, compiled as one program.
 
-Beyond the identified model: energy of the gas and heat through the walls, a real-gas factor, a line between valve and
-chamber with its own orifice, a laminar part of the leak, friction that grows with pressure, and slow sensors.
+Beyond the identified model: energy balance of the gas with heat transfer through the walls, real-gas factor, line with
+an orifice between valve and chamber, laminar part of the leak, pressure-dependent friction, and sensors of limited
+bandwidth.
 """
 
 from typing import NamedTuple
@@ -26,8 +27,8 @@ from ppafo.model.sensors import follow_rate
 class RigPhysics(NamedTuple):
     """Physics of the rig beyond the plant, SI units.
 
-    ``virial`` is b [m^3/kg]. A sensor with a follow rate [1/s] of 0 shows the present; a ``supply_rate`` [1/s] of 0 is
-    a regulator without droop.
+    ``virial`` is the second virial coefficient b [m^3/kg]. A follow rate [1/s] of 0 means a sensor without lag; a
+    ``supply_rate`` [1/s] of 0 means a regulator without droop.
     """
 
     gas_constant: float
@@ -51,7 +52,7 @@ class RigPhysics(NamedTuple):
 
 
 class RigNumbers(NamedTuple):
-    """Numbers of one run, in the order in which the compiled functions read them."""
+    """Parameters of one run, in the order in which the compiled functions read them."""
 
     plant: PlantParameters
     rig: RigPhysics
@@ -63,8 +64,8 @@ class RigNumbers(NamedTuple):
 class RigState(NamedTuple):
     """Unknowns of the rig, SI units.
 
-    Vane, gas and energy of chambers and lines, totals since the start [kg], [J], fall of the regulated pressures [Pa],
-    and what slow sensors show.
+    Angle and velocity of the vane, mass [kg] and internal energy [J] of chambers and lines, totals since the start
+    [kg], [J], droop of the regulated pressures [Pa], and the outputs of the sensors after their lag.
     """
 
     angle: float
@@ -91,7 +92,7 @@ class RigState(NamedTuple):
 
 
 class Node(NamedTuple):
-    """Gas at one place: absolute pressure [Pa], temperature [K], specific enthalpy [J/kg]."""
+    """Gas state at one point: absolute pressure [Pa], temperature [K], specific enthalpy [J/kg]."""
 
     pressure: float
     temperature: float
@@ -99,16 +100,21 @@ class Node(NamedTuple):
 
 
 class Exchange(NamedTuple):
-    """Mass flow [kg/s] and the enthalpy that it carries [W], both positive from a to b."""
+    """Mass flow [kg/s] and enthalpy flow [W], both positive from a to b."""
 
     mass: float
     energy: float
 
 
 class ChamberFlows(NamedTuple):
-    """Between valve and one chamber: gas from the source and to the room [kg/s], net enthalpy through the valve [W].
+    """Mass flows [kg/s] and enthalpy flows [W] between the valve and one chamber.
 
-    Then what enters the chamber [kg/s], [W], and the slopes of the line's gas [kg/s], [W] and the heat into it [W].
+    ``supplied_mass``: mass flow from the source through the valve
+    ``vented_mass``: mass flow through the valve to the atmosphere
+    ``enthalpy_in``: net enthalpy flow through the valve towards the chamber
+    ``into_mass``, ``into_energy``: mass and enthalpy flow into the chamber
+    ``line_mass``, ``line_energy``: time derivatives of mass and internal energy of the gas in the line
+    ``line_heat``: heat flow from the wall into the gas in the line
     """
 
     supplied_mass: float
@@ -122,9 +128,9 @@ class ChamberFlows(NamedTuple):
 
 
 class VaneInputs(NamedTuple):
-    """Inputs of the equations for the vane: angle [rad], prescribed rate [rad/s] and torque of a leg [N m].
+    """Inputs of the vane equations: angle [rad], prescribed angular velocity [rad/s] and torque of a leg [N m].
 
-    The rate of an unconstrained vane is one of the unknowns; ``rate`` is 0 then.
+    ``rate`` is 0 for an unconstrained vane, whose angular velocity is an unknown of the equations.
     """
 
     angle: float
@@ -133,7 +139,7 @@ class VaneInputs(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """Numbers that come from outside with each call, in the order of their array."""
+    """Valve openings and vane inputs passed with each call, in the order of their array."""
 
     openings: Openings
     vane: VaneInputs
@@ -149,7 +155,7 @@ class Observables(NamedTuple):
 
 
 def gas_node(rig: RigPhysics, mass: float, energy: float, volume: float) -> Node:
-    """Gas in a volume [m^3] from its mass [kg] and internal energy [J]."""
+    """Return the gas state in a volume [m^3] from mass [kg] and internal energy [J]."""
     temperature = gas_temperature(energy, mass, rig.heat_capacity)
     pressure = real_pressure(mass, volume, temperature, rig.gas_constant, rig.virial)
     enthalpy = gas_enthalpy(temperature, mass / volume, rig.gas_constant, rig.heat_capacity, rig.virial)
@@ -157,7 +163,7 @@ def gas_node(rig: RigPhysics, mass: float, energy: float, volume: float) -> Node
 
 
 def ambient_node(rig: RigPhysics, pressure: float, temperature: float) -> Node:
-    """Gas outside the chambers at an absolute pressure [Pa] and a temperature [K]."""
+    """Return the gas state outside the chambers at an absolute pressure [Pa] and a temperature [K]."""
     density = real_density(pressure, temperature, rig.gas_constant, rig.virial)
     enthalpy = gas_enthalpy(temperature, density, rig.gas_constant, rig.heat_capacity, rig.virial)
     return Node(pressure, temperature, enthalpy)
@@ -166,9 +172,10 @@ def ambient_node(rig: RigPhysics, pressure: float, temperature: float) -> Node:
 def orifice_exchange(
     rig: RigPhysics, a: Node, b: Node, fraction: float, orifice: ExactOrifice, is_relieving: float
 ) -> Exchange:
-    """Mass [kg/s] and enthalpy [W] through a fraction of an orifice, positive from a to b. Equations (6) to (8).
+    """Mass flow [kg/s] and enthalpy flow [W] through an orifice, positive from a to b. Equations (6) to (8).
 
-    The gas has the temperature upstream. ``is_relieving`` is 1 where gas may flow back into a, else 0.
+    ``fraction`` [-] scales the conductance of the orifice. The gas enters at the upstream temperature. ``is_relieving``
+    is 1 if gas may flow back into a, else 0.
     """
     flow = admitted_flow(exact_flow(a.pressure, b.pressure, fraction * orifice.conductance, orifice), is_relieving)
     upstream_temperature = a.temperature if flow >= 0.0 else b.temperature
@@ -179,7 +186,7 @@ def orifice_exchange(
 
 
 def leak_exchange(rig: RigPhysics, a: Node, b: Node, orifice: ExactOrifice) -> Exchange:
-    """Leak across the vane [kg/s], [W], positive from a to b: an orifice, and a laminar gap if there is one."""
+    """Leak across the vane [kg/s], [W], positive from a to b: flow through an orifice and a laminar gap."""
     through_orifice = orifice_exchange(rig, a, b, 1.0, orifice, 1.0)
     laminar = rig.laminar_conductance * (a.pressure * a.pressure - b.pressure * b.pressure)
     # Gas brings the enthalpy of where it comes from.
@@ -188,13 +195,13 @@ def leak_exchange(rig: RigPhysics, a: Node, b: Node, orifice: ExactOrifice) -> E
 
 
 def wall_heat(rig: RigPhysics, node: Node, volume: float) -> float:
-    """Heat [W] from the wall of a volume [m^3] into its gas."""
+    """Heat flow [W] from the wall of a volume [m^3] into the gas."""
     area = rig.wall_area_per_volume * volume
     return heat_from_wall(node.temperature, rig.wall_temperature, rig.heat_transfer_coefficient, area)
 
 
 def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> tuple[Node, Node]:
-    """Gas in both chambers [Pa], [K], [J/kg] at an angle [rad]; the air of the room where the chambers are open."""
+    """Return the gas state of both chambers at an angle [rad]; ambient air if the chambers are open."""
     # A number, not a truth value: all that the compiled functions read is a float.
     if rig.chambers_open > 0.5:
         room = ambient_node(rig, plant.atmospheric_pressure, rig.wall_temperature)
@@ -206,7 +213,7 @@ def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angl
 
 
 def observables(given: RigNumbers, state: RigState, inputs: Inputs) -> Observables:
-    """Observable quantities of a bench in a state."""
+    """Return the observable quantities of a bench in a given state."""
     plant, rig, vane = given.plant, given.rig, inputs.vane
     node_1, node_2 = chamber_nodes(plant, rig, state, vane.angle)
     torque = driving_torque(plant, vane.angle, node_1.pressure, node_2.pressure, parts=VANE_FUNCTIONS)
@@ -221,9 +228,10 @@ def observables(given: RigNumbers, state: RigState, inputs: Inputs) -> Observabl
 def side(
     given: RigNumbers, node: Node, regulated: float, line_mass: float, line_energy: float, source: float, vent: float
 ) -> ChamberFlows:
-    """Flows [kg/s], [W] between the valve and one chamber; ``source`` and ``vent`` are openings of the valve [-].
+    """Return the flows [kg/s], [W] between the valve and one chamber.
 
-    ``regulated`` is the pressure of the source [Pa], ``line_mass`` [kg] and ``line_energy`` [J] are of the line.
+    ``source`` and ``vent`` are openings of the valve [-], ``regulated`` is the supply pressure [Pa]; ``line_mass`` [kg]
+    and ``line_energy`` [J] are mass and internal energy of the gas in the line.
     """
     plant, rig, orifice = given.plant, given.rig, given.valve_orifice
     supply = ambient_node(rig, regulated, rig.supply_temperature)
@@ -251,9 +259,10 @@ def side(
 
 
 def rig_rates(given: RigNumbers, state: RigState, inputs: Inputs, direction: float) -> RigState:
-    """Time derivatives of all unknowns [SI]; the vane slides towards ``direction`` (0: it is held or prescribed).
+    """Time derivatives of all unknowns [SI].
 
-    Equations (1), (10): friction in motion is dynamic, and more near standstill (Stribeck).
+    ``direction`` is the sliding direction of the vane, 0 if the vane is stuck or prescribed. Equations (1), (10):
+    kinetic friction, with the Stribeck increase near standstill.
     """
     plant, rig, speed = given.plant, given.rig, state.angular_velocity
     openings, angle = inputs.openings, inputs.vane.angle

@@ -1,11 +1,11 @@
 """Experiments of the rig. To add one: ``ExperimentRequest -> ExperimentResult``, and one line in ``EXPERIMENTS``.
 
-On the steady bench true values go in and what the instruments show comes out: static torque against pressure, flow of
-the open valve, its map, the leak across the vane. Experiments in time are solved by SciPy's LSODA: step response,
-torque task, free decay, leak between closed chambers.
+Steady experiments turn true values into sensor readings: static torque against pressure, flow of the open valve, flow
+map of the valve, leak across the vane. Dynamic experiments are integrated with SciPy's LSODA: step response, torque
+task, free decay, leak between closed chambers.
 
-``record`` does one: a synthetic recording and the truth behind it, in memory or in a folder that has one CSV for each
-experiment, and ``rig.json`` with the truth behind all of them.
+``record`` runs one experiment and returns the synthetic recording with the true parameters, in memory or in a folder
+with one CSV file for each experiment and ``rig.json`` with the true parameters of all.
 """
 
 import copy
@@ -71,7 +71,10 @@ def read_off(
     settings: Mapping[str, float],
     fraction_of_flow_range: float = 1.0,
 ) -> ExperimentResult:
-    """Return a reading every ``interval`` [s] of true values by channel [SI]; what no sensor reads is exact."""
+    """Return sensor readings of true values [SI] by channel, every ``interval`` [s].
+
+    A channel without a sensor is exact.
+    """
     count = len(next(iter(true.values())))
     fractions = {"mass_flow": fraction_of_flow_range}
     sensors = {
@@ -99,9 +102,9 @@ TORQUE_READING_INTERVAL = 10.0
 def record_static_torque(request: ExperimentRequest) -> ExperimentResult:
     """Return torque on the scale [N m] over pressure difference, three times up and down in steps of 5 psi.
 
-    The vane presses on a scale and friction holds it back. It creeps and never slips, so friction is at its static
-    limit against the way the pressure goes: the limit of the rig's law at speed 0, a play operator without inertia, for
-    which no solver is needed.
+    The vane presses on a scale and creeps without slipping, so friction is at the static limit and opposes the
+    direction of the pressure change. This is the rig's friction law at zero speed, a play operator without inertia,
+    which needs no solver.
     """
     device = real_device(
         load_device(request.parameter_set, overrides=request.overrides, valve=request.valve), request.preset
@@ -133,7 +136,10 @@ def record_static_torque(request: ExperimentRequest) -> ExperimentResult:
 
 
 def on_scale(before: float, actuator: float, limit: float) -> float:
-    """Torque [N m] on a scale that carries what friction within its limit cannot; a scale does not pull."""
+    """Return the torque [N m] on a scale, given the previous torque, the actuator torque and the friction limit [N m].
+
+    Friction takes any difference up to the limit; the scale cannot pull.
+    """
     return max(0.0, min(max(before, actuator - limit), actuator + limit))
 
 
@@ -148,7 +154,7 @@ SMALL_METER = 0.1
 
 
 def record_open_valve(request: ExperimentRequest) -> ExperimentResult:
-    """Return the mass flow [kg/s] of the fully open valve at several pressures before and behind it."""
+    """Return the mass flow [kg/s] of the fully open valve at several upstream and downstream pressures."""
     device, physics = _bench(request)
     ambient = device.supply.atmospheric_pressure
     pairs = []
@@ -170,7 +176,7 @@ def record_open_valve(request: ExperimentRequest) -> ExperimentResult:
 
 
 def record_valve_map(request: ExperimentRequest) -> ExperimentResult:
-    """Return the mass flow [kg/s], above 0 into chamber 1, of the valve into the atmosphere over its command."""
+    """Return the mass flow [kg/s] of the valve over command, with outlet to the atmosphere; above 0 into chamber 1."""
     device, physics = _bench(request)
     supply, orifice = device.supply, exact_orifice(device.valve.orifice, device)
     # The openings once nothing moves any more: of the valve with every time and frequency taken out.
@@ -227,7 +233,7 @@ def _bench(request: ExperimentRequest) -> tuple[Device, RigPhysics]:
 
 
 def _flow(physics: RigPhysics, upstream: float, downstream: float, fraction: float, orifice: ExactOrifice) -> float:
-    """Return the mass flow [kg/s] of gas at the supply's temperature."""
+    """Return the mass flow [kg/s] of gas at supply temperature."""
     before = ambient_node(physics, float(upstream), physics.supply_temperature)
     behind = ambient_node(physics, float(downstream), physics.wall_temperature)
     return orifice_exchange(physics, before, behind, fraction, orifice, 1.0).mass
@@ -252,7 +258,7 @@ def record_step_response(request: ExperimentRequest) -> ExperimentResult:
 
 
 def record_torque_task(request: ExperimentRequest) -> ExperimentResult:
-    """Return the torque task of figure 8 with the controller that belongs to the kind of valve."""
+    """Return the torque task of figure 8 with the controller for the kind of valve."""
     # Overrides may be of the scenario, which is chosen by the valve first.
     kind = load_device(request.parameter_set, valve=request.valve).valve.kind
     scenario = _of_package(f"torque-task-{kind}", request)
@@ -260,7 +266,7 @@ def record_torque_task(request: ExperimentRequest) -> ExperimentResult:
 
 
 def record_free_decay(request: ExperimentRequest) -> ExperimentResult:
-    """Return the angle after an impulse, device on its side, both chambers open to the room."""
+    """Return the angle after an impulse, with the device on its side and both chambers open to the atmosphere."""
     motion = {"kind": "free", "angle": "25 deg", "angular_velocity": "380 deg/s", "external_torque": "0 N m"}
     scenario = _of_bench("free-decay", request, motion, {}, "2 s")
     bench_run = rig_run(scenario, request)
@@ -271,7 +277,7 @@ def record_free_decay(request: ExperimentRequest) -> ExperimentResult:
 
 
 def record_vane_leak(request: ExperimentRequest) -> ExperimentResult:
-    """Return both pressures after chamber 1 was filled and both ports were plugged, the vane held in the middle."""
+    """Return both pressures after chamber 1 is filled and both ports are plugged, with the vane locked at mid-range."""
     sections = {section.partition(".")[0] for section in SECTIONS} | {"valve", "valves"}
     # What belongs to the scenario is no override of a device.
     of_device = [override for override in request.overrides if override.strip().partition(".")[0] in sections]
@@ -285,9 +291,9 @@ def record_vane_leak(request: ExperimentRequest) -> ExperimentResult:
 
 
 def rig_run(scenario: Scenario, request: ExperimentRequest, highest_rate: float = math.inf) -> RigRun:
-    """Return the run of a scenario on the rig of a request, recorded at most ``highest_rate`` times a second [Hz].
+    """Return the run of a scenario on the rig of a request, sampled at no more than ``highest_rate`` [Hz].
 
-    ScenarioError for a valve that the rig does not have, and for a reference that is no torque.
+    Raises ScenarioError for a valve that the rig does not have, and for a reference other than a torque.
     """
     if scenario.controlled != TORQUE:
         raise ScenarioError(
@@ -321,7 +327,7 @@ def rig_run(scenario: Scenario, request: ExperimentRequest, highest_rate: float 
 
 
 def initial_state(scenario: Scenario, run: Run, physics: RigPhysics) -> RigState:
-    """Return vane and gas at the start [SI], everything at the temperature of the walls."""
+    """Return the initial state of vane and gas [SI], with all gas at wall temperature."""
     angle, warm = run.initial.angle, physics.wall_temperature
     start = dict.fromkeys(RigState._fields, 0.0)
     start |= {"angle": angle, "angular_velocity": run.initial.angular_velocity, "sensor_angle": angle}
@@ -336,7 +342,7 @@ def initial_state(scenario: Scenario, run: Run, physics: RigPhysics) -> RigState
 
 
 def _recorded(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str, ...]) -> ExperimentResult:
-    """Return what the sensors read at every sample; the torque is computed from the measured pressures."""
+    """Return the sensor readings at every sample; the torque is computed from the measured pressures."""
     solution, plant = solve_rig(bench_run), bench_run.run.plant
     pairs = zip(solution.states, solution.pressures, strict=True)
     signals = np.array([sensor_signals(bench_run.physics, *pair) for pair in pairs])
@@ -401,7 +407,7 @@ EXPERIMENTS: dict[str, tuple[str, Callable[[ExperimentRequest], ExperimentResult
 
 
 def overview() -> tuple[str, dict[str, Any]]:
-    """Return the experiments and the presets with what they are, as text and as plain data."""
+    """Return a list of the experiments and presets with their descriptions, as text and as plain data."""
     experiments = {name: summary for name, (summary, _) in EXPERIMENTS.items()}
     presets = {name: load_preset(name).title for name in list_presets()}
     width = max(map(len, [*experiments, *presets]))
@@ -424,7 +430,11 @@ NOTICE = "synthetic: made by the simulated test bench of ppafo in place of a mea
 
 @dataclass(frozen=True, slots=True)
 class RigRecording:
-    """A synthetic recording; the device as it truly was; everything behind it as plain data, for ``rig.json``."""
+    """Synthetic recording with the true device and the true parameters behind it.
+
+    ``device``: the true device, which the sensors do not know
+    ``truth``: all settings and true values as plain data, for ``rig.json``
+    """
 
     recording: Recording
     device: Device
@@ -439,10 +449,10 @@ def record(
     overrides: Iterable[str] = (),
     valve: str | None = None,
 ) -> RigRecording:
-    """Return what an experiment records on the rig; the same arguments give the same bytes.
+    """Run an experiment on the rig and return its synthetic recording; equal arguments give equal bytes.
 
-    ``overrides`` are texts such as ``friction.static_torque=0.5 N m`` (device), ``run.duration=1 s`` (experiments in
-    time) or ``rig.pressure_sensor.noise=0 Pa_d`` (preset). SimulationError where the solver gives up.
+    ``overrides`` are texts such as ``friction.static_torque=0.5 N m`` (device), ``run.duration=1 s`` (dynamic
+    experiments) or ``rig.pressure_sensor.noise=0 Pa_d`` (preset). Raises SimulationError if the solver fails.
     """
     summary, run = find_experiment(experiment)
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= LARGEST_SEED:
@@ -486,7 +496,7 @@ def record(
 
 
 def find_experiment(name: str) -> tuple[str, Callable[[ExperimentRequest], ExperimentResult]]:
-    """Return summary and function of the experiment of this name. ParameterError where there is none."""
+    """Return summary and function of the experiment with a name. Raises ParameterError for an unknown name."""
     if name not in EXPERIMENTS:
         hint = nearest_name(name, EXPERIMENTS)
         raise ParameterError(f"there is no experiment '{one_line(name)}'{hint}; available: {', '.join(EXPERIMENTS)}")
@@ -498,15 +508,15 @@ FORMAT = "ppafo rig"
 
 
 def check_rig_folder(folder: Path, experiment: str) -> None:
-    """Raise DataError, before anything runs, for a folder that cannot be written or belongs to something else."""
+    """Raise DataError, before any run, if a folder is not writable or contains files of another origin."""
     _earlier(folder, f"{experiment}.csv")
     check_files_can_be_added(folder, [f"{experiment}.csv", RIG_FILE])
 
 
 def write_rig_recording(folder: Path, made: RigRecording) -> tuple[str, ...]:
-    """Write recording and truth into a folder beside other experiments'; returns the file names.
+    """Write recording and true parameters into a folder, beside other experiments; returns the file names.
 
-    DataError for a folder that belongs to something else.
+    Raises DataError if the folder contains files of another origin.
     """
     name = f"{made.truth['experiment']}.csv"
     recordings = {**_earlier(folder, name), name: dict(made.truth)}
@@ -522,9 +532,10 @@ def write_rig_recording(folder: Path, made: RigRecording) -> tuple[str, ...]:
 
 
 def _earlier(folder: Path, name: str) -> dict[str, Any]:
-    """Return what ``rig.json`` says of recordings that are already in a folder.
+    """Return the entries of ``rig.json`` for the recordings that are already in a folder.
 
-    DataError for a folder of others, and for a file of others that the recording ``name`` would replace.
+    Raises DataError if the folder was not written by the rig, or if the recording ``name`` would replace a file of
+    another origin.
     """
     try:
         there = {entry.name for entry in folder.iterdir()} if folder.is_dir() else set()

@@ -1,10 +1,10 @@
-"""Presets of the rig: how far it departs from the identified model. TOML files, each value with its unit and reason.
+"""Presets of the rig: deviations from the identified model, as TOML files with a unit and a reason for each value.
 
-Every value that a preset can hold is declared here: section, name, SI unit, range and meaning. So is what the rig is
-asked to do with one, and what it gives back.
+Every value of a preset is declared here with section, name, SI unit, range and meaning, and so are the request and the
+result of an experiment.
 
-The bandwidth of sensors is integrated with the rig; noise, offset and quantisation come here, from a seed. Every
-channel has a stream of random numbers of its own, so that one more channel changes none of the others.
+The bandwidth of sensors is integrated with the rig; noise, offset and quantisation are applied here, from a seed. Every
+channel has a separate stream of random numbers, so that an additional channel changes no other channel.
 """
 
 import functools
@@ -111,7 +111,7 @@ PATHS: dict[str, Quantity] = {
 
 
 class PresetValue(StrictTable):
-    """A number of the simulated bench in a preset, with its unit and the reason for it."""
+    """Value of a preset of the simulated bench, with unit and reason."""
 
     value: float = Field(description="the number, in the unit beside it")
     unit: str = Field(description="unit of the number, such as 'mm^2'; empty for a plain number")
@@ -120,7 +120,7 @@ class PresetValue(StrictTable):
 
 @functools.cache
 def _layout() -> type[BaseModel]:
-    """Return the layout of a preset file: what it says of itself, and a table for each section of ``SECTIONS``."""
+    """Return the layout of a preset file: name, title and notes, and a table for each section of ``SECTIONS``."""
     fields: dict[str, Any] = {
         "schema_version": (SchemaVersion, ...),
         "name": (str, Field(description="name of the preset")),
@@ -137,7 +137,7 @@ def _layout() -> type[BaseModel]:
 
 
 def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a preset; every value is needed."""
+    """Return the JSON Schema of a preset; every value is required."""
     return make_schema(_layout(), "ppafo rig preset")
 
 
@@ -149,7 +149,7 @@ _FILE = TomlKind("preset of the rig", "rig", resources.files("ppafo.rig") / "pre
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """A preset: values in SI by dotted path, and the reason for each."""
+    """Preset of the rig: values in SI and their reasons, both by dotted path."""
 
     name: str
     title: str
@@ -158,11 +158,14 @@ class Preset:
     reasons: Mapping[str, str]
 
     def section(self, name: str) -> dict[str, float]:
-        """Return the values of one section by name, in SI."""
+        """Return the values [SI] of one section, by name."""
         return {quantity.name: self.values[f"{name}.{quantity.name}"] for quantity in SECTIONS[name]}
 
     def with_value(self, path: str, value: float, reason: str) -> "Preset":
-        """Return the preset with one value [SI] replaced. ParameterError where it is unknown or out of range."""
+        """Return the preset with one value [SI] replaced.
+
+        Raises ParameterError if the path is unknown or the value is out of range.
+        """
         quantity = PATHS.get(path)
         if quantity is None:
             raise ParameterError(f"preset '{self.name}' has no value '{path}'{nearest_name(path, PATHS)}")
@@ -180,8 +183,8 @@ def list_presets() -> tuple[str, ...]:
 def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Preset:
     """Return a preset by its name in the package or by the path of a TOML file.
 
-    ``overrides`` are texts such as ``rig.pressure_sensor.noise=0 Pa_d``. ParameterError for anything that cannot be
-    used.
+    ``overrides`` are texts such as ``rig.pressure_sensor.noise=0 Pa_d``. Raises ParameterError for an invalid preset or
+    override.
     """
     layout, file = read_model(_FILE, _layout(), name_or_path)
     read: Any = layout
@@ -206,7 +209,14 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
 
 @dataclass(frozen=True, slots=True)
 class ExperimentRequest:
-    """Experiment to be run: preset, seed, parameter set, its valve (None: the set's own), overrides of both."""
+    """Request for an experiment on the rig.
+
+    ``preset``: deviations of the rig from the identified model
+    ``seed``: random seed of sensor noise and friction scatter
+    ``parameter_set``: name of the parameter set of the device
+    ``valve``: name of the valve; None for the default valve of the set
+    ``overrides``: changes of device, scenario and preset, as texts
+    """
 
     preset: Preset
     seed: int
@@ -217,7 +227,7 @@ class ExperimentRequest:
 
 @dataclass(frozen=True, slots=True)
 class ExperimentResult:
-    """The result of an experiment: recording, true device, offsets that the sensors had, and further true values."""
+    """Result of an experiment: recording, true device, sensor offsets by channel, and further true values by name."""
 
     recording: Recording
     device: Device
@@ -226,10 +236,10 @@ class ExperimentResult:
 
 
 def real_device(device: Device, preset: Preset) -> Device:
-    """Return the device as it stands on the rig: the valve with its dynamics, the leak of its seals.
+    """Return the true device of the rig: the device with valve dynamics and seal leak of the preset.
 
-    ParameterError for a device with an effect that is on: the rig has physics of its own, and would record without it.
-    So for one on a vacuum: its supplies are regulators.
+    Raises ParameterError for a device with an active effect, because the rig has its own physics and would ignore the
+    effect, and for a device that works on vacuum, because the supplies of the rig are pressure regulators.
     """
     device.check_pressurised("the simulated bench", "; take the recording of a simulated run")
     for effect in (effect for effect, is_on in switches_of(device).items() if is_on):
@@ -256,9 +266,9 @@ def real_device(device: Device, preset: Preset) -> Device:
 
 
 def rig_physics(device: Device, preset: Preset) -> RigPhysics:
-    """Return the numbers that the rig has beyond the plant, in SI; 0 where something is off.
+    """Return the parameters of the rig beyond the plant, in SI; 0 for physics that is switched off.
 
-    ParameterError for a droop without a time.
+    Raises ParameterError for a supply droop without a time constant.
     """
     gas, values = device.gas, preset.values
     constant = gas.specific_gas_constant
@@ -292,9 +302,9 @@ def rig_physics(device: Device, preset: Preset) -> RigPhysics:
 
 
 def with_line(device: Device, plant: PlantParameters, preset: Preset) -> tuple[PlantParameters, ExactOrifice]:
-    """Return the plant with the lines taken out of the dead volumes, of which they are a part, and their orifice.
+    """Return the plant with the line volumes subtracted from the dead volumes, and the orifice of the lines.
 
-    ParameterError for a line larger than a dead volume, and for one without an orifice.
+    Raises ParameterError for a line larger than a dead volume, and for a line without an orifice.
     """
     gas, line = device.gas, preset.section("line")
     volume, smallest = line["volume"], min(plant.dead_volume_1, plant.dead_volume_2)
@@ -345,7 +355,7 @@ _STREAMS = {name: number for number, name in enumerate(CHANNEL_SENSORS)}
 
 @dataclass(frozen=True, slots=True)
 class SimulatedSensor:
-    """Sensor of a run: its offset, its quantisation step, and the noise of every sample to come."""
+    """Sensor of a run: offset, quantisation step, and noise of every sample."""
 
     offset: float
     resolution: float
@@ -361,14 +371,14 @@ class SimulatedSensor:
 
 
 def random_stream(seed: int, channel: str) -> np.random.Generator:
-    """Return the random numbers of a channel for a seed."""
+    """Return the random generator of a channel for a seed."""
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, _STREAMS[channel]])))
 
 
 def sensor(preset: Preset, channel: str, seed: int, samples: int, fraction_of_range: float = 1.0) -> SimulatedSensor:
-    """Return the sensor of a channel for a number of samples; one of a smaller range is finer in everything.
+    """Return the simulated sensor of a channel for a number of samples.
 
-    ``fraction_of_range`` [-] scales offset, noise and step.
+    ``fraction_of_range`` [-] scales offset, noise and quantisation step for a sensor of smaller range.
     """
     numbers = preset.section(CHANNEL_SENSORS[channel])
     offset, noise, resolution = (fraction_of_range * numbers[name] for name in ("offset", "noise", "resolution"))

@@ -1,9 +1,10 @@
-"""Solves one run on the rig from event to event: samples, arriving commands, valve, stick-slip, stops.
+"""Solution of one run on the rig, event by event: samples, arriving commands, valve, stick-slip, stops.
 
-Friction is Coulomb's with a static limit and Stribeck's curve, both growing with pressure, and sticking is a mode that
-root functions begin and end, as in the reference solver. A bristle model would need no modes, but to agree with
-equation (10) to 1e-3 of the angle range its stiffness must be some 1e7 N m/rad, and a solver would crawl through every
-reversal; with modes no kink lies inside a step, and without the extra terms the rig is equation (10) exactly.
+Friction is Coulomb friction with a static limit and a Stribeck curve, both increasing with pressure. Sticking is a
+separate mode, entered and left at zeros of root functions as in the reference solver. A bristle model would need no
+modes, but agreement with equation (10) to 1e-3 of the angle range requires a stiffness of about 1e7 N m/rad, at which a
+solver takes very small steps through every reversal. With modes no kink lies inside a step, and without the additional
+physics the rig is equation (10) exactly.
 """
 
 from dataclasses import dataclass, field
@@ -33,10 +34,13 @@ from ppafo.rig.stretches import Distances, Slopes, solve_stretch
 
 
 class Commands:
-    """The commands of one run: ``decided`` [-] by the controller, and ``at_valve`` [-], behind play and dead time.
+    """Commands of one run: ``decided`` [-] by the controller, and ``at_valve`` [-] after backlash and dead time.
 
-    ``period`` and ``delay`` [s] are the time between two decisions and the dead time before the valve, ``hysteresis``
-    [-] is the play of its spool. SimulationError for a controller in Python, which the rig cannot ask.
+    ``period`` [s]: time between two controller decisions
+    ``delay`` [s]: dead time between controller and valve
+    ``hysteresis`` [-]: backlash of the valve's spool
+
+    Raises SimulationError for a controller written in Python, which the rig cannot run.
     """
 
     def __init__(self, run: Run, period: float, delay: float, hysteresis: float) -> None:
@@ -51,7 +55,7 @@ class Commands:
         self.decided = self.at_valve = 0.0
 
     def decide(self, sample: int, time: float, measurement: Measurement) -> None:
-        """Let the controller see a measurement at a time [s], and send its command on its way."""
+        """Update the controller with a measurement at a time [s], and queue its command for the valve."""
         run = self._run
         reference = run.program.reference.value(run.reference, sample * self._period)[0]
         # A constant command is decided once for the whole run; the law still has the period of its file.
@@ -62,12 +66,12 @@ class Commands:
         self._under_way.append((time + self._delay, self._spool))
 
     def arrive(self, time: float) -> None:
-        """Hand over to the valve what has arrived by a time [s]."""
+        """Pass the commands that have arrived by a time [s] to the valve."""
         while self._under_way and self._under_way[0][0] <= time + SAME_TIME:
             _, self.at_valve = self._under_way.pop(0)
 
     def next_arrival(self, end: float) -> float:
-        """Return the time [s] at which the next command arrives, ``end`` [s] where none does before."""
+        """Return the arrival time [s] of the next command, or ``end`` [s] if no command arrives before."""
         return min(end, self._under_way[0][0]) if self._under_way else end
 
 
@@ -119,7 +123,7 @@ class RigSolution:
 
 
 def sensor_signals(physics: RigPhysics, state: Floats, pressures: Floats) -> tuple[float, float, float]:
-    """Return angle [rad] and both pressures [Pa] behind the bandwidth of the sensors, before noise."""
+    """Return angle [rad] and both pressures [Pa] after the sensors' bandwidth, before noise."""
     now, is_slow = RigState._make(state.tolist()), physics.pressure_follow_rate > 0.0
     first, second = (now.sensor_pressure_1, now.sensor_pressure_2) if is_slow else pressures.tolist()
     return now.sensor_angle if physics.angle_follow_rate > 0.0 else now.angle, first, second
@@ -128,16 +132,16 @@ def sensor_signals(physics: RigPhysics, state: Floats, pressures: Floats) -> tup
 def solve_rig(rig_run: RigRun) -> RigSolution:
     """Return the solution of a run.
 
-    SimulationError where the solver gives up, and for a controller in Python, which the rig cannot ask.
+    Raises SimulationError if the solver fails, and for a controller written in Python, which the rig cannot run.
     """
     return _Solver(rig_run).solve()
 
 
 class CompiledRig:
-    """The compiled equations with the numbers of one run. A call leaves nothing behind that a later one reads.
+    """Compiled equations with the parameters of one run. Calls are independent of each other.
 
-    The valve and a prescribed angle of the vane stay outside, in Python: what they ask for comes in as numbers. So
-    there is one program for all devices and experiments, and a new computer compiles once.
+    Valve and prescribed vane angle are computed outside, in Python, and passed in as numbers. So one compiled program
+    serves all devices and experiments, and a new computer compiles only once.
     """
 
     def __init__(self, given: RigNumbers) -> None:
@@ -149,9 +153,10 @@ class CompiledRig:
         self._show = with_arrays(observed, parameters, self._state, self._inputs, self._observed)
 
     def rates(self, state: Floats, openings: Openings, vane: VaneInputs, direction: float) -> Floats:
-        """Return the slopes of the unknowns of ``RigState`` (unknowns,) [SI]; the array is written anew by each call.
+        """Return the time derivatives of the unknowns of ``RigState`` (unknowns,) [SI]; each call overwrites the array.
 
-        ``openings`` of the valve [-]; the vane slides towards ``direction`` (1 or -1), or is held or prescribed (0).
+        ``openings`` are the valve openings [-]; ``direction`` is the sliding direction of the vane (1 or -1), 0 if the
+        vane is stuck or prescribed.
         """
         self._state[:] = state
         self._inputs[:] = (*openings, *vane)
@@ -159,7 +164,7 @@ class CompiledRig:
         return self._rates
 
     def observe(self, state: Floats, vane: VaneInputs) -> Observables:
-        """Return what a bench could observe in a state, the unknowns of ``RigState`` (unknowns,) [SI]."""
+        """Return the observable quantities of a bench for unknowns of ``RigState`` (unknowns,) [SI]."""
         self._state[:] = state
         self._inputs[len(Openings._fields) :] = vane
         self._show()
@@ -167,9 +172,9 @@ class CompiledRig:
 
 
 class _Equations:
-    """Equations of one run at a time [s], for its unknowns (unknowns,) and its mode; stateless.
+    """Equations of one run: functions of time [s], unknowns (unknowns,) and mode, without internal state.
 
-    The mode is the ``direction`` in which the vane slides: 1, -1, or 0 where it is held or its angle is prescribed.
+    The mode is the sliding ``direction`` of the vane: 1, -1, or 0 if the vane is stuck or its angle is prescribed.
     """
 
     def __init__(self, rig_run: RigRun) -> None:
@@ -191,7 +196,7 @@ class _Equations:
         self.initial = np.array([*rig_run.initial, *numbers(valve_state)], dtype=np.float64)
 
     def valve_state(self, unknowns: Floats) -> Any:
-        """The NamedTuple of the valve's state, from the last of the unknowns."""
+        """NamedTuple of the valve's state, from the last entries of the unknowns."""
         state, values = self.run.program.valve.state, unknowns[UNKNOWNS:].tolist()
         return state(*values) if self._has_flat_valve else rebuilt(state, values)
 
@@ -200,11 +205,11 @@ class _Equations:
         return self.run.program.valve.instant(self.run.valve, self.valve_state(unknowns), command)
 
     def valve_slopes(self, unknowns: Floats, command: float) -> list[float]:
-        """Slopes of the valve's unknowns at a command [-]."""
+        """Time derivatives of the valve's unknowns at a command [-]."""
         return numbers(self.run.program.valve.rates(self.run.valve, self.valve_state(unknowns), command))
 
     def vane(self, time: float, unknowns: Floats) -> VaneInputs:
-        """Angle, prescribed rate and torque of a leg."""
+        """Return angle [rad], prescribed angular velocity [rad/s] and leg torque [N m] at a time [s]."""
         path, leg, angle = self.run.program.angle, self.run.leg, float(unknowns[ANGLE])
         added_torque = 0.0 if leg is None else torque_of_leg(self.run.program, leg, time, angle)
         if path is None:
@@ -213,7 +218,7 @@ class _Equations:
         return VaneInputs(angle, rate, added_torque)
 
     def slopes(self, direction: float, command: float, unknowns: Floats) -> Slopes:
-        """The right-hand side for a stretch that begins with these unknowns."""
+        """Return the right-hand side of the equations for an interval that starts with these unknowns."""
         # A valve whose slopes are 0 stays where it is, because they depend on nothing but its state and the command.
         valve_moves = any(self.valve_slopes(unknowns, command))
         resting = self.openings(unknowns, command)
@@ -228,7 +233,7 @@ class _Equations:
         return slopes
 
     def observe(self, time: float, unknowns: Floats) -> Observables:
-        """Pressures, driving torque and static limit of friction."""
+        """Pressures [Pa], driving torque [N m] and static friction limit [N m] at a time [s]."""
         return self.compiled.observe(unknowns[:UNKNOWNS], self.vane(time, unknowns))
 
     def distances(self, direction: float) -> Distances:
@@ -244,16 +249,16 @@ class _Equations:
         return resting if direction == 0.0 else sliding
 
     def rest_direction(self, time: float, unknowns: Floats) -> float:
-        """The direction in which a vane at rest sets off, 0 where it is held."""
+        """Return the direction in which a vane at rest breaks away, 0 if it sticks."""
         observed = self.observe(time, unknowns)
         return mode_at_rest(self._gripping(observed), float(unknowns[ANGLE]), observed.torque)
 
     def _gripping(self, observed: Observables) -> PlantParameters:
-        """The plant with the static friction of the pressures that are observed."""
+        """Return the plant with the static friction at the observed pressures."""
         return self.plant._replace(static_torque=observed.static_limit)
 
     def with_prescribed_angle(self, time: float, unknowns: Floats) -> Floats:
-        """The unknowns of ``RigState`` (unknowns,) with the prescribed angle put in, where there is one."""
+        """Return the unknowns of ``RigState`` (unknowns,) with the prescribed angle inserted, if there is one."""
         state = np.array(unknowns[:UNKNOWNS])
         path = self.run.program.angle
         if path is not None:
@@ -262,7 +267,7 @@ class _Equations:
 
 
 class _Solver:
-    """Solution under way: time [s], unknowns and mode, which go on from event to event."""
+    """Solver of a run, with the present time [s], unknowns and mode, from event to event."""
 
     def __init__(self, rig_run: RigRun) -> None:
         self.rig_run, self.equations = rig_run, _Equations(rig_run)
@@ -277,12 +282,12 @@ class _Solver:
             self.direction = self.direction_now()
 
     def direction_now(self) -> float:
-        """The direction in which an unconstrained vane slides or sets off, 0 where it is held."""
+        """Return the direction in which an unconstrained vane slides or breaks away, 0 if it sticks."""
         velocity = float(self.unknowns[VELOCITY])
         return float(np.sign(velocity)) if velocity != 0.0 else self.equations.rest_direction(self.time, self.unknowns)
 
     def solve(self) -> RigSolution:
-        """Go to the end, from decision to decision of the controller."""
+        """Integrate to the end of the run, one controller period after another."""
         end, sample = float(self.rig_run.sample_times[-1]), 0
         while self.time < end - SAME_TIME:
             self.commands.decide(sample, self.time, self.measure())
@@ -294,7 +299,7 @@ class _Solver:
         return self.solution
 
     def measure(self) -> Measurement:
-        """Present measurement of the controller."""
+        """Return the present measurement for the controller."""
         rig_run, observed = self.rig_run, self.equations.observe(self.time, self.unknowns)
         state = self.equations.with_prescribed_angle(self.time, self.unknowns)
         pressures = np.array([observed.pressure_1, observed.pressure_2])
@@ -310,7 +315,7 @@ class _Solver:
         return Measurement(angle=angle, pressure_1=pressure_1, pressure_2=pressure_2, torque=torque)
 
     def advance_to(self, end: float) -> None:
-        """Go on to a time [s], from one event of commands and valve to the next."""
+        """Advance to a time [s], stopping at each arrival of a command and each event of the valve."""
         run, valve = self.rig_run.run, self.rig_run.run.program.valve
         while self.time < end - SAME_TIME:
             self.commands.arrive(self.time)
@@ -322,7 +327,7 @@ class _Solver:
             self.integrate(min(self.commands.next_arrival(end), switches))
 
     def integrate(self, end: float) -> None:
-        """Go on to a time [s] or to the next event of the vane, and change the mode there."""
+        """Integrate to a time [s] or to the next event of the vane, and change the mode at the event."""
         if self.equations.is_free and self.direction == 0.0:
             self.direction = self.equations.rest_direction(self.time, self.unknowns)
             if self.direction != 0.0:
@@ -346,7 +351,7 @@ class _Solver:
             self.time = end
 
     def record(self, unknowns: Floats) -> None:
-        """Keep these unknowns as those of the next sample."""
+        """Store the unknowns of the next sample."""
         sample = self.recorded
         time = float(self.rig_run.sample_times[sample])
         observed = self.equations.observe(time, unknowns)
@@ -356,7 +361,7 @@ class _Solver:
         self.recorded += 1
 
     def change_mode(self) -> None:
-        """Let the vane break away, come to rest, or meet a stop."""
+        """Change the mode when the vane breaks away, comes to rest, or hits a stop."""
         if self.direction == 0.0:
             torque = self.equations.observe(self.time, self.unknowns).torque
             self.direction = 1.0 if torque > 0.0 else -1.0

@@ -1,4 +1,4 @@
-"""A stretch of time between two events, solved by LSODA: to its end, or to where a root function falls to 0."""
+"""Integration between two events with LSODA, up to the end time or to the first zero of a root function."""
 
 from collections.abc import Callable
 
@@ -57,10 +57,10 @@ _ROOT_TOLERANCE = 4.0 * float(np.finfo(np.float64).eps)
 def solve_stretch(
     slopes: Slopes, distances: Distances | None, unknowns: Floats, start: float, end: float, wanted: Floats
 ) -> tuple[Floats, Floats]:
-    """Return times [s] and unknowns (times, unknowns) from ``start`` to ``end``, or to where a distance falls to 0.
+    """Return times [s] and unknowns (times, unknowns) from ``start`` to ``end``, or to the first root of ``distances``.
 
-    Those of ``RigState`` come first, then the valve's; they are given at the ``wanted`` times [s] in between, too. A
-    distance that is 0 at the start ends nothing. SimulationError where the solver gives up.
+    The unknowns of ``RigState`` come first, then the unknowns of the valve; rows at the ``wanted`` times [s] are
+    included. A root function that is 0 at the start ends nothing. Raises SimulationError if the solver fails.
     """
     from scipy.integrate import LSODA
 
@@ -97,7 +97,10 @@ def solve_stretch(
 
 
 def _root(distances: Distances, number: int, interpolant: Callable[[float], Floats], start: float, end: float) -> float:
-    """Return the time [s] at which the distance of a number falls to 0 within a step from ``start`` to ``end`` [s]."""
+    """Return the time [s] at which one root function is 0, within a solver step from ``start`` to ``end`` [s].
+
+    ``number`` is the index of the root function.
+    """
     from scipy.optimize import brentq
 
     def distance(time: float) -> float:

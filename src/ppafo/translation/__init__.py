@@ -1,1 +1,1 @@
-"""The composed module of a program in other languages: a typed walk over its text, and emitters of what that finds."""
+"""Translation of a composed Python module into other languages: type inference and code generators."""

@@ -1,9 +1,9 @@
-"""C99, which is C++ too, from the typed functions of a composed module.
+"""Code generator for C99 that is also valid C++, from the typed functions of a composed module.
 
-One C function for each of Python's, with its docstring and its names; rows become structs that are handed over by
-value. There is no heap, no global that changes, no recursion, and no library function but ``sqrt`` and ``fabs``, which
-are exact, unless the walk was told to take others. Built as the flags of ``engine.compilers`` say, it gives the bits of
-the lanes.
+Each Python function becomes one C function with the same name and docstring; rows become structs passed by value. The
+generated code has no heap, no mutable globals and no recursion. The only library functions are ``sqrt`` and ``fabs``,
+which are exact, unless type inference was told to allow others. Compiled with the flags of ``engine.compilers``, the
+code gives results that are bit-identical to compiled Python modules.
 """
 
 import inspect
@@ -66,7 +66,7 @@ _OF_HEADERS = frozenset(
     )
     for word in line.split()
 )
-"""Functions of headers, and names of the files around, that no function of a module may have."""
+"""Names of functions in C headers and in the surrounding files, which no function of a module may have."""
 _MACRO = re.compile(
     r"(_[A-Z_]|(PPAFO|ppafo|DBL|FLT|LDBL|FP|MATH|M|INT|UINT|INTMAX|UINTMAX|SIZE|PTRDIFF|WCHAR|WINT|SIG|INT\d+|UINT\d+)_)"
 )
@@ -74,7 +74,7 @@ _MACRO = re.compile(
 _WORDS = {"and": "&&", "or": "||"}
 _LEVELS = {"or": 2, "and": 3, **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), 5), "+": 8, "-": 8, "*": 9, "/": 9}
 PART = "ppafo_part"
-"""Name in C of the function for a part of an array along its first index."""
+"""C name of the function that returns a slice of an array along the first index."""
 # How strongly a text holds together: C's levels of precedence, as far as terms have them.
 _CHOICE, _SIGN, _ATOM = 1, 10, 11
 _WORKED_OUT = frozenset({"+", "-", "*", "&", "|", "^", ">>", "min", "max", "choice", "negative"})
@@ -91,7 +91,7 @@ _OF_C = {"sqrt": "sqrt", "abs": "fabs", **{name: name for name in LIBRARY}}
 
 
 def c_name(name: str, others: Collection[str] = (), outer: Collection[str] = ()) -> str:
-    """A name of Python as C can have it: not one of C's, of the ``others`` beside it, or of the file around it."""
+    """Valid C identifier for a Python name, distinct from C keywords, from ``others`` and from names in ``outer``."""
     written = name
     # Python allows a final underscore on any name, so one more always ends at a free name.
     while written in _RESERVED or _MACRO.match(written) or written in outer or (written != name and written in others):
@@ -100,21 +100,22 @@ def c_name(name: str, others: Collection[str] = (), outer: Collection[str] = ())
 
 
 def is_free(name: str) -> bool:
-    """True for a name that neither C nor its headers have."""
+    """Return whether a name is used neither by C nor by its headers."""
     return c_name(name) == name and name not in _OF_HEADERS
 
 
 def member_name(kind: Row, name: str) -> str:
-    """The member of a struct for a field of a row."""
+    """Name of the struct member for a field of a row."""
     return c_name(name, [own for own, _ in kind.fields])
 
 
 @dataclass(frozen=True, slots=True)
 class _CTerms:
-    """Writes terms; ``type_name`` gives the name of a type in C, ``name`` a local name.
+    """Writer of terms as C expressions.
 
-    ``places`` has names for the first places of some arrays, ``functions`` other names of functions; ``made`` is told
-    of every row that is made where no name is declared.
+    ``type_name`` returns the C name of a type, ``name`` the C name of a local variable. ``places`` has names for the
+    first indices of some arrays, ``functions`` has replacement names of functions. ``made`` is called with the type of
+    each row that an expression constructs.
     """
 
     type_name: Callable[[Type], str]
@@ -124,7 +125,7 @@ class _CTerms:
     made: Callable[[Type], None]
 
     def term(self, term: Term, least: int = 0) -> str:
-        """A term as text, in brackets where what is around it binds more than ``least``."""
+        """Text of a term, in parentheses if the surrounding operator binds more tightly than ``least``."""
         text, level = self.worked_out(term)
         # An int of 32 bits would carry digits that the small processor does not have.
         if term.type == INT16 and term.kind in _WORKED_OUT:
@@ -133,7 +134,7 @@ class _CTerms:
         return f"({text})" if level < least else text
 
     def worked_out(self, term: Term) -> tuple[str, int]:
-        """A term as C works it out, and how strongly its text holds together."""
+        """Text of a term in C, and the precedence level of the text."""
         match term.kind:
             case "number":
                 return self.number(term)
@@ -149,7 +150,7 @@ class _CTerms:
         return (text, _ATOM) if text else self.operation(term)
 
     def looked_up(self, term: Term) -> str:
-        """A name, or what lies at a place in a row, a tuple or an array; empty for any other term."""
+        """Text of a name, or of an element of a row, tuple or array; empty for any other term."""
         match term.kind:
             case "name":
                 text = self.name(term.detail)
@@ -174,7 +175,7 @@ class _CTerms:
         return text
 
     def element(self, term: Term) -> str:
-        """An element of an array, whose first place may have a name."""
+        """Text of an array element, whose first index may have a name."""
         owner, first, *further = term.parts
         assert isinstance(owner.type, Array)
         name, names = self.name(owner.detail), self.places.get(owner.detail, ())
@@ -190,7 +191,7 @@ class _CTerms:
         return f"{name}.values[{index}]"
 
     def call(self, term: Term) -> str:
-        """A call of a function of the module, the prelude or the C library; empty for any other term."""
+        """Text of a call of a function of the module, the prelude or the C library; empty for any other term."""
         if term.kind in ("min", "max") and term.type in (INT, INT16, INT32):
             # The second operand first, as Python's min and max have it for equal numbers.
             first, second = (self.term(part, 6) for part in term.parts)
@@ -218,7 +219,7 @@ class _CTerms:
         return f"{function}({', '.join(arguments)})"
 
     def operation(self, term: Term) -> tuple[str, int]:
-        """An operator between two terms, and its level."""
+        """Text of a binary operation, and its precedence level."""
         # Operators that many misread get brackets around their operands, sums and products only where they need them.
         level = _LEVELS.get(term.kind, 0)
         inner = level if level >= _LEVELS["+"] else _LEVELS["+"] if level else _SIGN
@@ -229,7 +230,7 @@ class _CTerms:
         return f"{left} {_WORDS.get(term.kind, term.kind)} {right}", level or _CHOICE
 
     def number(self, term: Term) -> tuple[str, int]:
-        """A number as a literal, and how strongly it holds together."""
+        """Text of a numeric literal, and its precedence level."""
         value = term.detail
         if term.type == BOOL:
             return ("true" if value else "false"), _ATOM
@@ -247,7 +248,7 @@ class _CTerms:
         return repr(float(value)), _ATOM if math.copysign(1.0, value) > 0.0 else _SIGN
 
     def listed(self, term: Term) -> str:
-        """A struct or tuple as an initialiser: its numbers in braces, and inner structs likewise."""
+        """Text of a brace-enclosed initialiser for a struct or tuple, with nested braces for inner structs."""
         if term.kind != "build":
             return self.term(term)
         text = ", ".join(self.listed(part) for part in term.parts if not is_empty(part.type))
@@ -255,7 +256,7 @@ class _CTerms:
         return f"{{{{{text}}}}}" if is_array else f"{{{text}}}"
 
     def conversion(self, term: Term) -> tuple[str, int]:
-        """A value as another type, and how strongly its text holds together."""
+        """Text of a type conversion, and its precedence level."""
         source = term.parts[0]
         if term.type in (INT16, INT32):
             text = f"({self.term(source, _CHOICE + 1)} ? 1 : 0)" if source.type == BOOL else self.term(source, _SIGN)
@@ -271,7 +272,7 @@ class _CTerms:
 
 WIDTH = 118
 TIED = "\N{NO-BREAK SPACE}"
-"""Stands between two words that stay on one line."""
+"""Non-breaking separator between two words that must stay on one line."""
 
 _SCALARS = {"bool": "bool", "int": "int64_t", "float": "double", "int16": "int16_t", "int32": "int32_t"}
 _PART = f"""
@@ -284,36 +285,36 @@ PPAFO_INLINE ppafo_array {PART}(ppafo_array whole, int64_t first, int64_t beyond
 }}
 """
 LANE = "lane"
-"""Iterations of loops over this name are independent, which the compiler is told."""
+"""Name of loop variables whose iterations are independent; the compiler is told so."""
 
 
 def program_source(program: Program) -> str:
-    """A translation unit whose ``advance`` takes one block of a program through its steps, as the compiled module does.
+    """Return the C translation unit of a program; its function ``advance`` advances one block of runs.
 
-    ProgramError for what is outside the subset, with file and line.
+    Raises ProgramError, with file and line, for code outside the supported subset of Python.
     """
     collector = SourceCollector(INLINE)
     return translated(write_lanes(program, collector), collector)
 
 
 def translated(composed: str, collector: SourceCollector) -> str:
-    """The translation unit of a composed module that ``collector`` gathered."""
+    """Return the C translation unit of a composed module whose definitions are in ``collector``."""
     return c_source(
         walk_module(composed), documents_of(collector), "Generated from the functions of ppafo. Not to be edited."
     )
 
 
 def documents_of(collector: SourceCollector) -> dict[str, str]:
-    """Docstrings of what was gathered, by the name that it has in a composed module."""
+    """Return the docstrings of the collected functions and classes, by their names in the composed module."""
     return {name: inspect.getdoc(owner) or "" for name, owner in collector.owners.items()}
 
 
 @dataclass(frozen=True, slots=True)
 class ReadableUnit:
-    """Readable form of a translation unit: short names, and nothing unused.
+    """Options for a translation unit meant for readers: short names, and no unused definitions.
 
-    ``names`` are the short names by the module's own, where no two are the same; ``declared`` are structs that the
-    file around it declares, by their rows; ``around`` is that file. Functions are plain static ones.
+    ``names`` maps names in the module to unique short names. ``declared`` maps rows to structs that the surrounding
+    file declares. ``around`` is the text of the surrounding file. All functions are static.
     """
 
     names: Mapping[str, str]
@@ -329,11 +330,11 @@ def c_source(
     prelude: str = "prelude.h",
     reading: ReadableUnit | None = None,
 ) -> str:
-    """A translation unit with all functions of a module; one for ``reading`` is shorter.
+    """Return the C translation unit with all functions of a module; shorter if ``reading`` is given.
 
-    ``documents`` has the docstrings of rows and functions; ``places`` has names for the first places of some arrays,
-    which the file around it defines, ``x`` in all functions, ``advance.x`` in one. ``prelude`` is
-    the file with what stands before all of them.
+    ``documents`` has the docstrings of rows and functions. ``places`` has names for the first indices of some arrays,
+    which the surrounding file defines; the key ``x`` applies to all functions, ``advance.x`` to one. ``prelude`` is the
+    name of the file that precedes all functions.
     """
     # What returns nothing but empty rows is never called: an empty value is not written.
     functions = [function for function in module if function.returns is None or not is_empty(function.returns)]
@@ -369,7 +370,7 @@ _DEFINES = re.compile(r"(?:^|\s|\*)(ppafo_\w+)\(|\} (ppafo_\w+);|#define (PPAFO_
 
 
 def _prelude_for(prelude: str, used: str) -> str:
-    """The parts of a prelude that something after them uses."""
+    """Return the parts of a prelude that the following code uses."""
     kept: list[str] = []
     # From the end, so that a part which only a later part uses is kept with it.
     for part in reversed(prelude.split("\n\n")):
@@ -382,7 +383,7 @@ def _prelude_for(prelude: str, used: str) -> str:
 
 
 def _comment(text: str, further: Iterable[str] = ()) -> str:
-    """A block comment."""
+    """Return a block comment with the lines of ``text`` and ``further``."""
     # A docstring may contain the end of a C comment.
     lines = [line.rstrip() for line in text.replace("*/", "* /").replace("/*", "/ *").strip().splitlines()] + list(
         further
@@ -392,7 +393,7 @@ def _comment(text: str, further: Iterable[str] = ()) -> str:
 
 @dataclass(slots=True)
 class _Writer:
-    """State of the writer: structs by type; ``outer`` are names of functions, and of structs in the end."""
+    """State of the code generator: structs by type; ``outer`` has the names of functions, finally also of structs."""
 
     documents: Mapping[str, str]
     outer: set[str]
@@ -406,7 +407,7 @@ class _Writer:
     owner: str = ""
 
     def type_name(self, kind: Type) -> str:
-        """Name of a type in C; a struct is written where it is met first."""
+        """C name of a type; a struct is declared at its first use."""
         if isinstance(kind, Scalar):
             return _SCALARS[kind.name]
         if isinstance(kind, Array):
@@ -430,7 +431,7 @@ class _Writer:
         return self.names[kind]
 
     def struct_name(self, kind: Items | Row) -> str:
-        """Preferred name of a struct."""
+        """Preferred C name of a struct."""
         if isinstance(kind, Row):
             return kind.name if self.reading is None else self.reading.names.get(kind.name, kind.name)
         if kind.is_uniform:
@@ -439,7 +440,7 @@ class _Writer:
         return f"{owner}_result"
 
     def written_struct(self, kind: Items | Row) -> list[str]:
-        """A struct, and the function that makes one; where people read, only one that is called."""
+        """Declaration of a struct with its constructor function; readable units omit uncalled constructors."""
         name = self.names[kind]
         if isinstance(kind, Items) and kind.is_uniform:
             inner, count = self.type_name(kind.types[0]), len(kind.types)
@@ -473,7 +474,7 @@ class _Writer:
         return ["\n".join([*struct, *head, *body])]
 
     def function(self, function: Function) -> str:
-        """Text of a function with its comment."""
+        """C text of a function, with its comment."""
         self.owner = function.source
         writer = _Body(self, function, scopes_of(function))
         # An unused parameter is a warning, and warnings are errors where people read the export.
@@ -498,7 +499,7 @@ class _Writer:
 
 
 class _Body:
-    """The lines of one function."""
+    """Writer of the lines of one function body."""
 
     def __init__(self, writer: _Writer, function: Function, scopes: Scopes) -> None:
         self.writer = writer
@@ -511,14 +512,14 @@ class _Body:
         self.used: set[str] = set()
 
     def name(self, name: str) -> str:
-        """A local name in C: no two of a function are the same, and none hides what the file has."""
+        """C name of a local variable, unique in the function and distinct from all names of the file."""
         if name not in self.written:
             self.written[name] = c_name(name, self.kinds, self.writer.outer)
             self.used.add(self.written[name])
         return self.written[name]
 
     def block(self, body: tuple[Statement, ...], level: int) -> list[str]:
-        """Some statements, with what must be declared before them."""
+        """Lines of a block of statements, preceded by the declarations that they need."""
         lines: list[str] = []
         for name in self.scopes.before.get(id(body), []):
             kind = self.kinds[name]
@@ -532,7 +533,7 @@ class _Body:
         return lines
 
     def statement(self, statement: Statement, level: int) -> Iterator[str]:
-        """A statement with its blocks, line by line."""
+        """Yield the lines of a statement, including nested blocks."""
         match statement:
             case typed.Assign():
                 # What nobody reads is not written: a compiler would warn of it.
@@ -566,7 +567,7 @@ class _Body:
                 yield from self.line(self.plain_line(statement), level)
 
     def plain_line(self, statement: typed.Note | typed.LocalArray | typed.ProcedureCall | typed.LoopExit) -> str:
-        """A statement that is one line as it stands."""
+        """Text of a statement that fits on one line."""
         match statement:
             case typed.Note():
                 return _comment(statement.text)
@@ -583,7 +584,7 @@ class _Body:
         yield from _wrapped("    " * level + text, "    " * (level + 1))
 
     def store(self, store: typed.Store, level: int) -> Iterator[str]:
-        """An element of an array or a field of a row gets a value."""
+        """Yield the lines of an assignment to an array element or to a field of a row."""
         value = store.value
         # Member by member reads better, but only where no member is read on the right.
         is_read = self.writer.reading is not None and not value.reads & store.element.reads
@@ -595,7 +596,7 @@ class _Body:
         yield from self.line(f"{self.terms.term(store.element)} = {self.terms.term(store.value)};", level)
 
     def counted_loop(self, loop: typed.CountedLoop, level: int) -> Iterator[str]:
-        """A loop that counts; a name that lives beyond it gets the number from a counter of its own."""
+        """Yield the lines of a counted loop; a variable used after the loop is set from a separate counter."""
         name = self.name(loop.name)
         is_own = id(loop) in self.scopes.counted or loop.name not in self.scopes.read
         # A loop's name ends at its last value in Python, one further in C.
@@ -620,7 +621,7 @@ class _Body:
 
 
 def _together(members: Iterable[str]) -> list[str]:
-    """Members of a struct; neighbours of one type share a declaration."""
+    """Declarations of struct members; neighbouring members of one type share a declaration."""
     lines: list[str] = []
     for kind, group in itertools.groupby((text.split(TIED) for text in members), key=lambda pair: pair[0]):
         lines += _wrapped(f"    {kind} {', '.join(pair[1] for pair in group)};", " " * 8)
@@ -628,7 +629,7 @@ def _together(members: Iterable[str]) -> list[str]:
 
 
 def _wrapped(line: str, further: str = "    ") -> list[str]:
-    """A line of C as lines that are not too long."""
+    """Split a line of C code into lines within the length limit."""
     if len(line) <= WIDTH:
         return [line.replace(TIED, " ")]
     margin = line[: len(line) - len(line.lstrip())]

@@ -1,6 +1,6 @@
 """Call of a C compiler: its arguments, its time limit, and its message if it fails.
 
-A program that is kept from earlier is loaded without this.
+Loading a cached program does not import this module.
 """
 
 import contextlib
@@ -18,9 +18,9 @@ from ppafo.errors import SimulationError
 from ppafo.wording import one_line, reason
 
 LONGEST_COMPILING = 300.0
-"""Seconds after which a compiler is ended that has not ended by itself; the longest program takes a tenth of it."""
+"""Time limit of a compilation [s], after which the compiler is stopped; the longest program takes a tenth of it."""
 LONGEST_ANSWER = 10.0
-"""Seconds that it has to say its version."""
+"""Time limit [s] for a compiler to report its version."""
 # Between two looks at an interrupt while a compiler runs [s].
 _PAUSE = 0.25
 
@@ -32,10 +32,11 @@ def asked(
     scratch: Path | None = None,
     limit: float | None = None,
 ) -> "subprocess.CompletedProcess[str]":
-    """Output and exit status of a compiler run in ``folder``; CompilerError, with a remedy, if it cannot be run.
+    """Return output and exit status of a compiler run in ``folder``; CompilerError, with a remedy, if it cannot be run.
 
-    ``scratch`` is where it has its temporary files, which it leaves there when it is killed. CompilerError if it does
-    not end within ``limit`` [s], ``LONGEST_COMPILING`` unless given; it is ended then, with what it has started.
+    ``scratch`` is the folder for temporary files, which remain there if the compiler is killed. A compiler that runs
+    longer than ``limit`` [s] (``LONGEST_COMPILING`` by default) is stopped with its child processes, and raises
+    CompilerError.
     """
     # A compiler that is killed leaves its files here, where the whole folder goes away.
     temporary = {} if scratch is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(scratch))
@@ -76,7 +77,7 @@ def asked(
 
 
 def _home() -> dict[str, str]:
-    """The home of this user where the environment does not say it: zig works with none else."""
+    """Return the home folder of the user if the environment does not set it, because zig needs a home folder."""
     if os.environ.get("HOME") or os.name != "posix":
         return {}
     try:
@@ -86,7 +87,7 @@ def _home() -> dict[str, str]:
 
 
 def complaint(done: "subprocess.CompletedProcess[str]") -> str:
-    """The line in which a compiler says what is wrong; how it ended where it says nothing."""
+    """Return the line of the compiler output that states the error, or the exit status if there is no output."""
     # gcc and clang say it on stderr, some wrappers on stdout.
     lines = [*done.stderr.splitlines(), *done.stdout.splitlines(), f"it ended with {done.returncode}"]
     return one_line(next((text for text in lines if "error" in text), next(filter(str.strip, lines))))
@@ -106,7 +107,7 @@ _PASSING = (
 
 
 def compile_library(source: str, library: Path, command: Sequence[str], flags: Sequence[str]) -> None:
-    """Let a compiler make a library of C, in a folder; CompilerError where it does not."""
+    """Compile C source text into a shared library; CompilerError if the compilation fails."""
     folder = library.parent
     # Windows has no mounts without execution, nor the flag.
     if hasattr(os, "ST_NOEXEC") and os.statvfs(folder).f_flag & os.ST_NOEXEC:

@@ -1,6 +1,6 @@
-"""Compilers of C of this machine: how each is found and called, and what its programs depend on.
+"""C compilers of this computer: detection, command line, and identity for the cache key of compiled programs.
 
-What they make does what Python does with the composed text, to the bit.
+Compiled programs give results that are bit-identical to Python running the composed text.
 """
 
 import hashlib
@@ -25,20 +25,22 @@ FOR_GCC = (
     *("--param", "sra-max-scalarization-size-Ospeed=4096"),
     *("-fira-region=one", "--param", "max-combine-insns=2"),
 )
-"""Flags by which gcc vectorises over lanes: without the first four it turns choices into jumps. With the last two it
-needs two thirds of the time and a third of the memory for the largest programs. The bits stay the same."""
+"""Flags with which gcc vectorises loops over runs. Without the first four, gcc turns conditional expressions into
+jumps. The last two save a third of the time and two thirds of the memory for the largest programs. No flag changes
+results.
+"""
 _LIBRARY_AS_IT_RUNS = tuple(f"-fno-builtin-{name}" for name in sorted(LIBRARY))
-"""Flags against constant folding of library calls, whose last bits would differ from the library's."""
+"""Flags that disable constant folding of library calls, whose last bits may differ from the run-time library."""
 _THIS_PROCESSOR = "-march=native" if platform.machine().lower() in ("x86_64", "amd64", "i686") else "-mcpu=native"
-"""gcc and clang name the processor that they run on by one flag on x86, by another one elsewhere."""
+"""Flag of gcc and clang that selects the present processor; x86 and other architectures use different flags."""
 _WIDEST_VECTORS = ("-mprefer-vector-width=512",) if _THIS_PROCESSOR.startswith("-march") else ()
 LIBRARY_FILE = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.platform, "program.so")
-"""Name of a compiled library, beside its composed text, as this system loads it."""
+"""File name of a compiled library on this operating system; the library is stored next to its composed text."""
 
 
 @dataclass(frozen=True, slots=True)
 class CCompiler:
-    """A compiler of C of this machine, as the engine takes one: its name, the command that runs it."""
+    """C compiler of this computer, with the interface that the engine expects: name, command line and optimisation."""
 
     name: str
     command: tuple[str, ...]
@@ -50,7 +52,7 @@ class CCompiler:
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """Flags for the bits, and for this processor."""
+        """Flags for reproducible arithmetic and for the present processor."""
         return (
             *FLAGS,
             self.effort.value,
@@ -61,11 +63,11 @@ class CCompiler:
         )
 
     def identity(self) -> str:
-        """The compiler's own file, flags, what the processor can do, and the translator itself."""
+        """Identity of the compiler file, its flags, the processor features and the translator."""
         return repr((_file_identity(self.command[0]), self.flags, described_processor(), translator_hash()))
 
     def described(self) -> str:
-        """Name and version of the compiler, as it says them."""
+        """Name and version of the compiler, as reported by the compiler."""
         from ppafo.translation.compiling import LONGEST_ANSWER, asked  # a run asks no compiler
 
         try:
@@ -76,7 +78,7 @@ class CCompiler:
         return f"C by {self.name}: {version}" if version else f"C by {self.name}"
 
     def compile_text(self, source: str, path: str, module: ModuleType) -> None:
-        """Take a composed text to C and compile it; the library stays beside ``path`` where that is a place."""
+        """Compile a composed text through C; the library is kept next to ``path`` if ``path`` is absolute."""
         # Most programs are there: they are loaded without the translator.
         from ppafo.translation.compiling import compile_library
         from ppafo.translation.native_source import translated_text
@@ -97,12 +99,12 @@ class CCompiler:
             raise CompilerError(problem, passing=True) from error
 
     def run_text(self, source: str, path: str, module: ModuleType) -> None:
-        """Load the library beside ``path``."""
+        """Load the library next to ``path`` and fill the module with its entries."""
         fill_module(module, Path(path).with_name(LIBRARY_FILE), parameters_of(source))
 
 
 def compiler(name: str) -> CCompiler:
-    """Return a compiler of C by name, ``gcc``, ``clang`` or ``zig``; SimulationError where it is not here."""
+    """Return the C compiler ``gcc``, ``clang`` or ``zig``; SimulationError if the compiler is not installed."""
     command = _command(name)
     if not command:
         raise SimulationError(f"PPAFO_BACKEND={name}: '{name}' is not on this computer: {HOW_TO_INSTALL}; {WITHOUT_C}")
@@ -110,7 +112,7 @@ def compiler(name: str) -> CCompiler:
 
 
 def _command(name: str) -> tuple[str, ...]:
-    """The command of a compiler; empty where it is not on this machine."""
+    """Return the command line of a compiler; empty if the compiler is not installed."""
     found = which(name)
     if name != "zig":
         return (found,) if found else ()
@@ -123,7 +125,7 @@ def _command(name: str) -> tuple[str, ...]:
 
 @cache
 def _file_identity(command: str) -> tuple[str, int, int]:
-    """Path, size and time of a compiler's file: an update changes them, and no process need be started."""
+    """Path, size and modification time of a compiler file, which change in an update; no process is started."""
     file = Path(command).resolve()
     try:
         status = file.stat()
@@ -134,7 +136,7 @@ def _file_identity(command: str) -> tuple[str, int, int]:
 
 @cache
 def described_processor() -> str:
-    """Description of the processor by the system."""
+    """Return the description of the processor by the operating system."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
@@ -146,7 +148,7 @@ def described_processor() -> str:
 
 @cache
 def translator_hash() -> str:
-    """Hash of the translator: the same text may become other C in another version of it."""
+    """Return the hash of the translator sources, because another version may translate the same text differently."""
     digest = hashlib.sha256()
     # Sorted: folders list their files in no order.
     for file in sorted(Path(__file__).parent.iterdir()):

@@ -1,7 +1,7 @@
-"""Entries of a library of C, which Python calls as it calls the functions of the composed text.
+"""Entries of a compiled C library, called like the Python functions of the composed text.
 
-Handing an array to C costs Python about a microsecond, a number a twentieth of that. So the arrays of an entry are
-packed into one block of memory, once where they stay the same.
+Passing an array to C costs Python about a microsecond, passing a number a twentieth of a microsecond. The arrays of an
+entry are therefore packed into one block of memory, only once if the arrays stay the same.
 """
 
 import ctypes
@@ -21,15 +21,15 @@ from ppafo.engine.entries import FLOAT, INT, entry_types
 from ppafo.wording import one_line
 
 PACKED = "_packed"
-"""Stands behind the name of an entry that takes its arrays in one block (``ppafo_array``, ``prelude.h``)."""
+"""Suffix of the name of an entry that takes its arrays in one block (``ppafo_array``, ``prelude.h``)."""
 ROUNDS_AS_WRITTEN = "ppafo_rounds_as_written"
-"""Name of a function of every library: 1 where each operation is rounded by itself."""
+"""Name of a function in every library that returns 1 if each operation is rounded separately."""
 _NO_FLOATS, _FLOATS = ctypes.c_double * 0, np.dtype(np.float64)
 _NUMBERS: dict[str, Any] = {FLOAT: ctypes.c_double, INT: ctypes.c_int64}
 
 
 class Parameters(NamedTuple):
-    """Parameters of an entry: the dimensions of its arrays, which come first, and the types of its numbers."""
+    """Parameters of an entry: number of dimensions of each array, followed by the types of the numbers."""
 
     dimensions: tuple[int, ...]
     numbers: tuple[str, ...]
@@ -49,9 +49,10 @@ def parameters_of(source: str) -> dict[str, Parameters]:
 
 @dataclass(frozen=True, slots=True)
 class NativeEntry:
-    """An entry of a library, called as Python calls it: arrays, then numbers.
+    """Callable entry of a library, which takes arrays followed by numbers.
 
-    ``function`` takes its arrays, of these dimensions, one after another as ``layout`` writes each ``ppafo_array``.
+    ``function`` takes all arrays packed into one block; ``dimensions`` has the number of dimensions of each array, and
+    ``layout`` is the binary layout of the ``ppafo_array`` structs in the block.
     """
 
     function: Any
@@ -59,14 +60,15 @@ class NativeEntry:
     layout: struct.Struct
 
     def __call__(self, *arguments: Any) -> None:
-        """Call it with arrays, and the numbers that follow them."""
+        """Call the entry with arrays followed by numbers."""
         count = len(self.dimensions)
         self.function(self._packed(arguments[:count]), *arguments[count:])
 
     def with_arrays(self, *arrays: NDArray[np.float64]) -> Callable[..., None]:
-        """The entry as a function of what follows these arrays, which it keeps.
+        """Return the entry as a function of its numbers alone, bound to these arrays.
 
-        TypeError for what C would misread: arrays of other numbers or dimensions, or that lie otherwise in memory.
+        Raises TypeError for arrays that C would misread: wrong data type, wrong number of dimensions, or not
+        contiguous.
         """
         called: partial[None] = partial(self.function, self._packed(arrays))
         called.arrays = arrays  # type: ignore[attr-defined]
@@ -87,8 +89,9 @@ class NativeEntry:
 def load_entries(library: Path, parameters: Mapping[str, Parameters]) -> dict[str, NativeEntry]:
     """Return the entries of a library by name.
 
-    OSError where it cannot be loaded, AttributeError where it lacks one, CompilerError where its arithmetic is not
-    IEEE 754's; an environment variable or a wrapper can make any compiler leave it.
+    Raises OSError if the library cannot be loaded, AttributeError if an entry is missing, and CompilerError if the
+    arithmetic of the library does not follow IEEE 754, which environment variables and wrappers of a compiler can
+    cause.
     """
     loaded = ctypes.CDLL(str(library))
     # (1 + 2^-30)(1 - 2^-30) - 1 rounds to 0 where the product is rounded by itself, and to -2^-60 where it is fused.
@@ -112,7 +115,7 @@ def load_entries(library: Path, parameters: Mapping[str, Parameters]) -> dict[st
 
 
 def fill_module(module: ModuleType, library: Path, parameters: Mapping[str, Parameters]) -> None:
-    """Give a module the entries of a library; CompilerError where it has none that could be called."""
+    """Add the entries of a library to a module; CompilerError if the library cannot be loaded or lacks an entry."""
     try:
         module.__dict__.update(load_entries(library, parameters))
     except OSError as error:

@@ -1,6 +1,6 @@
-"""The C of a composed text as one library has it: what it shows, and how it says whether it rounds as it is written.
+"""C source of a composed text as a shared library: exported entries, and a test for separate rounding of operations.
 
-A program that is kept from earlier is loaded without this.
+Loading a cached program does not import this module.
 """
 
 from collections.abc import Mapping
@@ -27,19 +27,21 @@ int {ROUNDS_AS_WRITTEN}(double a, double b, double c, double d)
     return a * b + c == 0.0 && (b + d) - b == 0.0;
 }}
 """
-"""1 where each operation is rounded by itself; fused or reordered ones leave a rest of what ``load_entries`` gives."""
+"""Function that returns 1 if each operation is rounded separately; fused or reordered operations leave a remainder for
+the arguments in ``load_entries``.
+"""
 
 
 def translated_text(source: str) -> str:
-    """Return the C of a composed text; ProgramError for what has none."""
+    """Return the C translation of a composed text; ProgramError if it cannot be translated."""
     return with_packed_entries(c_source(walk_module(source, library=LIBRARY), {}, _TITLE), parameters_of(source))
 
 
 def with_packed_entries(source: str, parameters: Mapping[str, Parameters]) -> str:
-    """Return a translation unit that shows nothing but its entries, which take their arrays in one block.
+    """Return a translation unit that exports only its entries, which take their arrays in one block.
 
-    All else is of the file alone. A call of ``advance`` that other libraries see would be one of what the C library of
-    GNU has under this name.
+    All other functions are static. An exported function ``advance`` would conflict with the function of this name in
+    the GNU C library.
     """
     texts = ["#define PPAFO_ENTRY static", source]
     for name, (dimensions, types) in parameters.items():

@@ -1,4 +1,4 @@
-"""Needed assignments of a function, and scopes of its names: declared as deep and as late as possible."""
+"""Removal of unused assignments in a function, and the innermost scope in which each local name is declared."""
 
 import ast
 from collections.abc import Iterable, Iterator
@@ -13,9 +13,13 @@ Block = tuple[Statement, ...]
 
 @dataclass(slots=True)
 class Scopes:
-    """Names that are read at all, types, names that a block declares before its first line or with an assignment.
+    """Analysis of the local names of a function: use, types and place of declaration.
 
-    Blocks and statements are known by their identity; ``counted`` are the loops whose name lives in them alone.
+    ``read`` are names that are read at all, ``types`` the types of assigned names. ``before`` has the names declared at
+    the start of a block, ``first`` the keyword of statements that declare a name with their assignment, ``counted`` the
+    loops whose variable is used only inside them. ``direct`` has the names mentioned by a statement itself, ``inside``
+    also by its blocks, and ``changes`` the number of assignments to each name in a block. Blocks and statements are
+    keyed by ``id``.
     """
 
     read: set[str] = field(default_factory=set)
@@ -28,7 +32,7 @@ class Scopes:
     changes: dict[int, dict[str, int]] = field(default_factory=dict)
 
     def look(self, body: Block) -> tuple[set[str], dict[str, int]]:
-        """Note which names each statement mentions, itself and in its blocks, and how often a block changes each."""
+        """Record the names that each statement mentions, and the number of assignments to each name in each block."""
         every: set[str] = set()
         changes: dict[str, int] = {}
         for statement in body:
@@ -56,11 +60,11 @@ class Scopes:
         return every, changes
 
     def mentions(self, name: str, body: Block) -> Block:
-        """Statements of a block that mention a name, themselves or in their blocks."""
+        """Statements of a block that mention a name, directly or in nested blocks."""
         return tuple(statement for statement in body if name in self.inside[id(statement)])
 
     def place(self, name: str, body: Block) -> None:
-        """Declare a name in a block in which it is mentioned, or further in."""
+        """Declare a name in the innermost possible block that mentions the name."""
         mentions = self.mentions(name, body)
         if isinstance(mentions[0], typed.LocalArray):
             return
@@ -77,7 +81,7 @@ class Scopes:
                 self.place(name, inner)
 
     def is_own(self, name: str, body: Block) -> bool:
-        """True where a block, or each block in it that mentions a name, gives it its value before it reads it."""
+        """Return whether a block, or each nested block that mentions a name, assigns the name before reading it."""
         mentions = self.mentions(name, body)
         return _begins(mentions[0], name) or all(
             self.counts(name, statement)
@@ -89,7 +93,7 @@ class Scopes:
         )
 
     def counts(self, name: str, statement: Statement) -> bool:
-        """True for a loop of that name, which does not change it otherwise."""
+        """Return whether a statement is a counted loop over a name without other assignments to the name."""
         return (
             isinstance(statement, typed.CountedLoop)
             and statement.name == name
@@ -98,12 +102,12 @@ class Scopes:
         )
 
     def blocks(self, name: str, mentions: Block) -> list[Block]:
-        """Blocks of some statements that mention a name."""
+        """Nested blocks of some statements that mention a name."""
         return [inner for statement in mentions for inner in _blocks(statement) if self.mentions(name, inner)]
 
 
 def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozenset()) -> tuple[Block, frozenset[str]]:
-    """A block without assignments that nothing reads, and the names that it reads.
+    """Return a block without unused assignments, and the names that the block reads.
 
     ``after`` are the names that are read later, ``leaving`` the names read after ``break`` and ``continue``.
     """
@@ -135,7 +139,7 @@ def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozens
 
 
 def scopes_of(function: Function) -> Scopes:
-    """Block in which each local name of a function is declared."""
+    """Return the block in which each local name of a function is declared."""
     scopes = Scopes()
     scopes.look(function.body)
     # In order of names: the order of a set changes from process to process, and an export has one text.
@@ -145,12 +149,12 @@ def scopes_of(function: Function) -> Scopes:
 
 
 def _begins(statement: Statement, name: str) -> bool:
-    """True for an assignment of a name that does not read it."""
+    """Return whether a statement assigns a name without reading the name."""
     return isinstance(statement, typed.Assign) and statement.name == name and name not in statement.value.reads
 
 
 def _made(statement: Statement) -> tuple[str, Type] | None:
-    """The name that a statement gives a value, with its type."""
+    """Return the name that a statement assigns, with its type; None if there is none."""
     if isinstance(statement, typed.Assign):
         return statement.name, statement.value.type
     if isinstance(statement, typed.LocalArray):
@@ -159,14 +163,14 @@ def _made(statement: Statement) -> tuple[str, Type] | None:
 
 
 def _blocks(statement: Statement) -> list[Block]:
-    """Blocks in a statement."""
+    """Nested blocks of a statement."""
     if isinstance(statement, typed.If):
         return [statement.body, statement.otherwise]
     return [statement.body] if isinstance(statement, typed.CountedLoop | typed.While) else []
 
 
 def _names_of(statement: Statement) -> frozenset[str]:
-    """Names that a statement itself reads, not those of its blocks."""
+    """Names that a statement itself reads, without nested blocks."""
     terms: tuple[Term, ...] = ()
     if isinstance(statement, typed.Assign | typed.Return):
         terms = (statement.value,)
@@ -183,7 +187,7 @@ def _names_of(statement: Statement) -> frozenset[str]:
 
 @dataclass(frozen=True, slots=True)
 class ScopeNames:
-    """Names of a definition: all of them, those that are read, those that only count; looked for once."""
+    """Names in a function definition, determined once: all names, names that are read, and pure loop counters."""
 
     every: frozenset[str]
     read: frozenset[str]
@@ -191,7 +195,7 @@ class ScopeNames:
 
     @classmethod
     def of(cls, definition: ast.FunctionDef) -> "ScopeNames":
-        """The names of a definition."""
+        """Collect the names of a function definition."""
         nodes = list(_nodes(definition))
         named = [node for node in nodes if isinstance(node, ast.Name)]
         every = {node.id for node in named}
@@ -206,7 +210,7 @@ class ScopeNames:
 
 
 def changed(body: Iterable[ast.stmt]) -> set[str]:
-    """Return the names to which some statements assign."""
+    """Return the names that some statements assign."""
     names: set[str] = set()
     for statement in body:
         targets: list[ast.expr] = []
@@ -223,7 +227,7 @@ def changed(body: Iterable[ast.stmt]) -> set[str]:
 
 
 def _nodes(definition: ast.FunctionDef) -> Iterator[ast.AST]:
-    """Names, arguments and loops of a definition, in a third of the time that ``ast.walk`` takes."""
+    """Yield names, arguments and loops of a definition, in a third of the time of ``ast.walk``."""
     waiting: list[ast.AST] = [definition]
     while waiting:
         node = waiting.pop()
@@ -247,7 +251,7 @@ _WITH_PARTS = (ast.expr, ast.stmt, ast.arguments)
 
 
 def _counts_up(node: ast.For) -> bool:
-    """True for a loop over ``range`` whose start and step are written out and not negative."""
+    """Return whether a loop runs over ``range`` with a literal start and step that are not negative."""
     if not isinstance(node.iter, ast.Call) or ast.unparse(node.iter.func) != "range":
         return False
     bounds = node.iter.args

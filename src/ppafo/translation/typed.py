@@ -1,6 +1,7 @@
-"""A composed module with its types: terms and statements that mean the same in every language.
+"""Typed intermediate representation of a composed module, independent of the target language.
 
-The typed walk (``walk.py``) makes them of Python's syntax trees; writers of C, of expressions and of ranges read them.
+Type inference (``walk.py``) creates the representation from Python syntax trees. The code generator for C and the range
+analysis read it.
 """
 
 from dataclasses import dataclass
@@ -10,21 +11,21 @@ from typing import Any, NamedTuple, TypeAlias
 from ppafo.translation.value_types import FLOAT, Array, Items, Row, RowReference, Scalar, Type, types_in
 
 FUNCTIONS = frozenset({"abs", "min", "max", "sqrt"})
-"""Functions that every language has; those of a C library may come with them (``engine.compilers.LIBRARY``)."""
+"""Functions available in every language; functions of a C library may be added (``engine.compilers.LIBRARY``)."""
 _NONE: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
 class Term:
-    """A value. Its ``kind`` says what makes it, and with it what ``parts`` and ``detail`` are.
+    """Expression with its type. The ``kind`` of the term determines the meaning of ``parts`` and ``detail``.
 
-    - number and name: no parts; the number, the local name.
-    - field and item: the row or tuple that has it; the field's name, the item's place.
-    - build: the values of a row or tuple in order. call: the arguments; the function's name.
-    - choice: the test, the value where it holds, the value where not. convert, negative, not: the one value.
-    - element: an array and an index for each of its places. part: an array and indexes of its first places.
-      extent: an array; which of its extents, from 0.
-    - a sign of arithmetic or comparison as Python writes it, ``and``, ``or``: the left and the right side.
+    - number and name: no parts; ``detail`` is the number or the local name.
+    - field and item: the part is the row or tuple; ``detail`` is the field name or the item index.
+    - build: values of a row or tuple in order. call: arguments; ``detail`` is the function name.
+    - choice: condition, value if true, value if false. convert, negative, not: the single operand.
+    - element: an array and one index per dimension. part: an array and the bounds of a slice along the first index.
+      extent: an array; ``detail`` is the dimension, from 0.
+    - an arithmetic or comparison operator in Python notation, ``and``, ``or``: the left and the right operand.
     - a function of ``FUNCTIONS`` or of the C library: its arguments.
     """
 
@@ -35,7 +36,7 @@ class Term:
 
     @cached_property
     def reads(self) -> frozenset[str]:
-        """Local names whose values it takes."""
+        """Local names whose values the expression uses."""
         # Gathered once: asked again and again while scopes are found.
         names = frozenset((self.detail,)) if self.kind == "name" else _NONE
         return names.union(*(part.reads for part in self.parts)) if self.parts else names
@@ -43,7 +44,7 @@ class Term:
 
 @dataclass(frozen=True, slots=True)
 class Assign:
-    """An assignment to a local name."""
+    """Assignment to a local name."""
 
     name: str
     value: Term
@@ -51,7 +52,7 @@ class Assign:
 
 @dataclass(frozen=True, slots=True)
 class LocalArray:
-    """A local array whose elements are not set yet."""
+    """Declaration of a local array with uninitialised elements."""
 
     name: str
     type: Array
@@ -59,7 +60,7 @@ class LocalArray:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """An assignment to an element of an array."""
+    """Assignment to an element of an array or to a field of a row."""
 
     element: Term
     value: Term
@@ -67,7 +68,7 @@ class Store:
 
 @dataclass(frozen=True, slots=True)
 class If:
-    """A branch on a test: one body or the other."""
+    """Conditional statement with the branches ``body`` and ``otherwise``."""
 
     test: Term
     body: tuple["Statement", ...]
@@ -76,7 +77,7 @@ class If:
 
 @dataclass(frozen=True, slots=True)
 class CountedLoop:
-    """A loop of ``name`` from ``start`` by ``step`` up to ``stop``, which it does not reach."""
+    """Counted loop: ``for name in range(start, stop, step)``."""
 
     name: str
     start: Term
@@ -87,7 +88,7 @@ class CountedLoop:
 
 @dataclass(frozen=True, slots=True)
 class While:
-    """A loop as long as ``test`` holds."""
+    """Loop that repeats while ``test`` is true."""
 
     test: Term
     body: tuple["Statement", ...]
@@ -95,21 +96,21 @@ class While:
 
 @dataclass(frozen=True, slots=True)
 class LoopExit:
-    """``break`` or ``continue`` of the loop around it."""
+    """``break`` or ``continue`` of the innermost loop."""
 
     word: str
 
 
 @dataclass(frozen=True, slots=True)
 class Return:
-    """The end of a function, with its value."""
+    """Return statement with a value."""
 
     value: Term
 
 
 @dataclass(frozen=True, slots=True)
 class ProcedureCall:
-    """A call of a function that returns nothing and writes into arrays which it is handed."""
+    """Call of a function that returns nothing and writes into arrays passed as arguments."""
 
     function: str
     given: tuple[Term, ...]
@@ -117,7 +118,7 @@ class ProcedureCall:
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """Comment in a translated text about the lines after it."""
+    """Comment in a translated text about the following lines."""
 
     text: str
 
@@ -126,7 +127,7 @@ Statement: TypeAlias = Note | Assign | LocalArray | Store | If | CountedLoop | W
 
 
 class Parameter(NamedTuple):
-    """A parameter of a function; a row without numbers is none."""
+    """Parameter of a function; rows without numbers are omitted."""
 
     name: str
     type: Type
@@ -134,27 +135,27 @@ class Parameter(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """Function for one choice of types."""
+    """Function specialised for one combination of parameter types."""
 
     name: str
     source: str
-    """Name in the composed module, which has the function once for all types."""
+    """Name in the composed module, where the function is defined once for all types."""
     parameters: tuple[Parameter, ...]
     returns: Type | None
-    """None where it returns nothing."""
+    """Type of the return value; None if the function returns nothing."""
     body: tuple[Statement, ...]
     bound: tuple[str, ...] = ()
     """Functions passed as arguments, each as ``NAME is FUNCTION``."""
     is_entry: bool = False
-    """True where it returns nothing and is called from outside."""
+    """True if the function returns nothing and is called from outside."""
 
 
 Module: TypeAlias = list[Function]
-"""All functions of a translated text, each after those that it calls."""
+"""All functions of a translated text, each after the functions that it calls."""
 
 
 def converted(term: Term, kind: Type) -> Term:
-    """The value of a term as another type that holds it."""
+    """Return a term converted to a wider type."""
     if term.type == kind:
         return term
     if isinstance(kind, Scalar):

@@ -1,4 +1,4 @@
-"""Types of the values of a composed module, which say the same in every language; and those of its entries."""
+"""Types of values in a composed module, independent of the target language, and parameter types of its entries."""
 
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -15,13 +15,13 @@ class Scalar:
 
 BOOL, INT, FLOAT = Scalar("bool"), Scalar("int"), Scalar("float")
 INT16, INT32 = Scalar("int16"), Scalar("int32")
-"""Integer types that ``widths`` assigns for small processors; type inference itself finds none."""
+"""Integer types that ``widths`` assigns for small processors; type inference never produces them."""
 _ORDER = (BOOL, INT, FLOAT)
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A NamedTuple with the types that its fields have in one place."""
+    """NamedTuple type, with the types of its fields at one place of use."""
 
     name: str
     fields: tuple[tuple[str, "Type"], ...]
@@ -29,19 +29,19 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Items:
-    """The type of a tuple without names, by the types of its items."""
+    """Type of a plain tuple: the types of its items."""
 
     types: tuple["Type", ...]
 
     @property
     def is_uniform(self) -> bool:
-        """True where all items are of one type."""
+        """True if all items have the same type."""
         return len(set(self.types)) == 1
 
 
 @dataclass(frozen=True, slots=True)
 class Array:
-    """An array of floats; ``shape`` is () for one that is handed over, whose extents are known when it runs."""
+    """Array of floats; ``shape`` is () for an array passed as an argument, whose extents are known only at run time."""
 
     dimensions: int
     shape: tuple[int, ...] = ()
@@ -49,14 +49,14 @@ class Array:
 
 @dataclass(frozen=True, slots=True)
 class FunctionArgument:
-    """A function that was handed over: it is bound when the call is translated."""
+    """Function passed as an argument; the call is bound at translation."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
 class RowReference:
-    """A row that is handed over by its place: what a function writes into it is seen outside."""
+    """Row passed by reference, so that assignments to its fields are visible to the caller."""
 
     row: Row
 
@@ -65,7 +65,7 @@ Type: TypeAlias = Scalar | Row | Items | Array | FunctionArgument | RowReference
 
 
 def entries_of(source: str) -> dict[str, tuple[Type, ...]]:
-    """Functions of a composed module that are called from outside, with the types of their parameters."""
+    """Return the functions of a composed module that are called from outside, with their parameter types."""
     plain: dict[str, Type] = {"int64": INT, "float64": FLOAT}
     return {
         name: tuple(plain.get(word) or Array(word.count(":") - 1) for word in words)
@@ -74,17 +74,17 @@ def entries_of(source: str) -> dict[str, tuple[Type, ...]]:
 
 
 def is_empty(kind: Type) -> bool:
-    """True for what holds no number: a function, a row or a tuple of nothing."""
+    """Return whether a type contains no number: a function, or a row or tuple without numbers."""
     return all(map(is_empty, types_in(kind))) if isinstance(kind, Items | Row) else isinstance(kind, FunctionArgument)
 
 
 def types_in(kind: Items | Row) -> tuple[Type, ...]:
-    """Types of the items of a tuple, or of the fields of a row."""
+    """Return the types of the items of a tuple or of the fields of a row."""
     return kind.types if isinstance(kind, Items) else tuple(inner for _, inner in kind.fields)
 
 
 def joined(first: Type, other: Type) -> Type | None:
-    """The type that holds both, as where two branches meet; None where there is none."""
+    """Return the common type of two types, for instance where two branches meet; None if there is none."""
     if first == other:
         return first
     if isinstance(first, Scalar) and isinstance(other, Scalar):
@@ -102,7 +102,7 @@ def joined(first: Type, other: Type) -> Type | None:
 
 
 def mixes(first: Type, other: Type) -> bool:
-    """True where one has a whole number or truth value in the place of a float: -0 and large ones would differ."""
+    """Return whether an integer or truth value meets a float, where -0 and large numbers would differ from Python."""
     if isinstance(first, Scalar) and isinstance(other, Scalar):
         return first != other and FLOAT in (first, other)
     if isinstance(first, Items | Row) and isinstance(other, Items | Row):

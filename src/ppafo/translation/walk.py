@@ -1,7 +1,7 @@
-"""The typed walk over a composed module: which types its names have, and what each line does with them.
+"""Type inference for a composed module: types of all names, and typed statements for each line.
 
-A function is walked once for each choice of types that it is called with; a function that is handed over counts as a
-type, so that it is bound here. What is outside the subset is refused with the file and the line that it comes from.
+A function is analysed once for each combination of parameter types. A function passed as an argument counts as a type,
+so that the call is bound at translation. Code outside the subset is refused with the file and line of its source.
 """
 
 import ast
@@ -46,16 +46,18 @@ SIGN_OF: dict[type[ast.AST], str] = {
 }
 CONSTANTS = {"inf": math.inf, "nan": math.nan, "pi": math.pi}
 EXACT = 2**53
-"""Up to here a float holds every whole number."""
+"""Largest magnitude up to which a float represents every integer."""
 WHOLE_ONLY = frozenset({"&", "|", "^", ">>"})
 
 
 @dataclass(frozen=True, slots=True)
 class Expressions:
-    """Expressions of one function: its names with their types, those that only count up from 0, rows and functions.
+    """Type inference for the expressions of one function.
 
-    ``library`` has the functions of the C library that it may call. ``made`` gives a function for types of its
-    parameters, ``refused`` the error for what has no translation, ``mistaken`` that for what has no meaning either.
+    ``types`` has the types of local names, ``counters`` names that only count up from 0, ``rows`` the fields of each
+    row class, ``definitions`` the functions of the module, and ``library`` the C library functions that may be called.
+    ``made`` returns the function for given parameter types. ``refused`` creates the error for untranslatable code,
+    ``mistaken`` the error for code that is invalid in Python as well.
     """
 
     types: Mapping[str, Type]
@@ -68,14 +70,14 @@ class Expressions:
     mistaken: Callable[..., ProgramError]
 
     def term(self, node: ast.expr) -> Term:
-        """The value of an expression."""
+        """Return the typed term of an expression."""
         handler: Callable[[Any], Term] | None = getattr(self, f"_of_{type(node).__name__.lower()}", None)
         if handler is None:
             raise self.refused(node, f"'{ast.unparse(node)}' is not supported in compiled functions")
         return handler(node)
 
     def scalar(self, node: ast.expr, least: Scalar = BOOL) -> Term:
-        """The value of an expression that must be one number, as ``least`` or a wider type."""
+        """Return the term of an expression that must be a single number, converted to ``least`` or a wider type."""
         term = self.term(node)
         if not isinstance(term.type, Scalar):
             raise self.refused(node, f"'{ast.unparse(node)}' is not one number")
@@ -84,27 +86,27 @@ class Expressions:
         return converted(term, kind)
 
     def whole(self, node: ast.expr) -> Term:
-        """The value of an expression that must be a whole number."""
+        """Return the term of an expression that must be an integer."""
         term = self.scalar(node, INT)
         if term.type != INT:
             raise self.refused(node, f"'{ast.unparse(node)}' is not an integer")
         return term
 
     def condition(self, node: ast.expr) -> Term:
-        """Translation of an expression as a condition."""
+        """Return the term of an expression used as a condition."""
         if isinstance(node, ast.BoolOp):
             return _linked(node, [self.condition(value) for value in node.values])
         term = self.scalar(node)
         return term if term.type == BOOL else Term("!=", BOOL, (term, converted(Term("number", INT, (), 0), term.type)))
 
     def part(self, node: ast.expr) -> slice:
-        """A part of a tuple, whose bounds are literal."""
+        """Return the slice of a tuple, whose bounds must be literals."""
         if not isinstance(node, ast.Slice) or node.step is not None:
             raise self.refused(node, f"'{ast.unparse(node)}' is not a part of a tuple")
         return slice(*(None if bound is None else self.literal(bound) for bound in (node.lower, node.upper)))
 
     def literal(self, node: ast.expr) -> int:
-        """A whole number that is written out."""
+        """Return the value of an integer literal."""
         number = _literal(self.whole(node))
         if number is None:
             raise self.refused(node, f"'{ast.unparse(node)}' must be a literal number")
@@ -165,7 +167,7 @@ class Expressions:
         return Term("item", owner.type.types[0], (owner, self.from_start(index, Term("number", INT, (), count))))
 
     def element(self, owner: Term, kind: Array, node: ast.Subscript) -> Term:
-        """An element of an array, which has all its places, or a part of it from one first place up to another."""
+        """Return the term of an array element with all its indices, or of a slice along the first index."""
         if owner.kind != "name":
             raise self.refused(node, f"'{ast.unparse(node)}' indexes an array that has no name")
         if isinstance(node.slice, ast.Slice):
@@ -188,14 +190,14 @@ class Expressions:
         return Term("element", FLOAT, (owner, *given))
 
     def from_start(self, index: Term, count: Term) -> Term:
-        """A place counted from the start, where Python counts a negative one from the end."""
+        """Return an index counted from the start, because Python counts negative indices from the end."""
         if self.is_from_zero(index):
             return index
         is_negative = Term("<", BOOL, (index, Term("number", INT, (), 0)))
         return Term("choice", INT, (is_negative, Term("+", INT, (index, count)), index))
 
     def is_from_zero(self, term: Term) -> bool:
-        """True for a whole number that cannot be negative."""
+        """Return whether an integer term cannot be negative."""
         if term.kind in ("number", "%", "//", ">>", "&") and term.type == INT:
             known = term if term.kind == "number" else term.parts[1]
             is_literal = (_literal(known) or 0) > 0 or (term.kind == "number" and _literal(known) == 0)
@@ -250,7 +252,7 @@ class Expressions:
         return Term(sign, kind, (converted(left, kind), converted(right, kind)))
 
     def check_sides(self, node: ast.expr, sign: str, left: Term, right: Term) -> None:
-        """Refuse a sign between a number and what is none. ProgramError says which it stands between."""
+        """Raise ProgramError for an operator between a number and a value of another kind."""
         if isinstance(left.type, Scalar) != isinstance(right.type, Scalar):
             sides = f"{kind_of(left.type)} and {kind_of(right.type)}"
             raise self.mistaken(node, f"'{sign}' cannot be compiled for {sides}, in '{{written}}'")
@@ -281,7 +283,7 @@ class Expressions:
         return made
 
     def is_exact(self, term: Term) -> bool:
-        """True for what a float holds exactly: a float, a truth value, a small literal, a counter."""
+        """Return whether a float represents the term exactly: a float, truth value, small literal or loop counter."""
         number = _literal(term)
         if term.type == FLOAT or number is not None:
             return number is None or abs(number) <= EXACT
@@ -300,7 +302,7 @@ class Expressions:
         return Term("choice", kind, (test, converted(yes, kind), converted(no, kind)))
 
     def name_called(self, node: ast.Call) -> str:
-        """The name of what is called; the function's own where it was handed over."""
+        """Return the name of the called function, with functions passed as arguments resolved."""
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
         if any(isinstance(argument, ast.Starred) for argument in node.args):
             raise self.refused(node, f"'{ast.unparse(node)}' passes a tuple as arguments")
@@ -325,7 +327,7 @@ class Expressions:
         return self.built_in(name, node)
 
     def called(self, name: str, node: ast.Call) -> tuple[Function, tuple[Term, ...]]:
-        """Another function of the module that is called, and what it is handed."""
+        """Return the called function of the module and the arguments passed to the function."""
         takes = self.definitions[name].args
         names = [argument.arg for argument in (*takes.posonlyargs, *takes.args, *takes.kwonlyargs)]
         placed = [argument.arg for argument in (*takes.posonlyargs, *takes.args)]
@@ -351,7 +353,7 @@ class Expressions:
         return self.made(name, types), tuple(stated[name] for name in names if not is_empty(stated[name].type))
 
     def built_in(self, name: str, node: ast.Call) -> Term:
-        """A call of a function that every language has."""
+        """Return the term of a call of a function available in every language."""
         own = name.removeprefix("math.")
         least = FLOAT if own in LIBRARY | {"sqrt", "float"} else INT
         known = FUNCTIONS | {"float", "int", "bool", "len"} | (self.library - {"pow"})
@@ -382,7 +384,7 @@ class Expressions:
 
 
 def _linked(node: ast.BoolOp, parts: list[Term]) -> Term:
-    """Truth values with ``and`` or ``or`` between them."""
+    """Join truth values by ``and`` or ``or``."""
     made = parts[0]
     for part in parts[1:]:
         made = Term(SIGN_OF[type(node.op)], BOOL, (made, part))
@@ -390,13 +392,13 @@ def _linked(node: ast.BoolOp, parts: list[Term]) -> Term:
 
 
 def _as_written(problem: str, written: str) -> str:
-    """A problem with the line in it, and the name that it defines, if any."""
+    """Insert the source line, and the name defined in this line, into the text of a problem."""
     name = written.removeprefix("def ").partition("(")[0]
     return problem.replace("{written}", written).replace("{name}", name)
 
 
 def kind_of(kind: Type) -> str:
-    """Return what a value of a type is called in messages."""
+    """Return the description of a type used in messages."""
     if isinstance(kind, Scalar):
         return "a number"
     if isinstance(kind, Row):
@@ -414,7 +416,7 @@ _INSTEAD = {
 
 
 def _literal(term: Term) -> int | None:
-    """The whole number that a term writes out; None for any other term."""
+    """Return the value of an integer literal; None for any other term."""
     sign, term = (-1, term.parts[0]) if term.kind == "negative" else (1, term)
     return sign * int(term.detail) if term.kind == "number" and term.type == INT else None
 
@@ -422,9 +424,9 @@ def _literal(term: Term) -> int | None:
 def walk_module(
     source: str, entries: Mapping[str, tuple[Type, ...]] | None = None, library: frozenset[str] = frozenset()
 ) -> Module:
-    """All functions of a composed module that its entries need. ProgramError for what is outside the subset.
+    """Return the typed functions that the entries of a composed module need. ProgramError for code outside the subset.
 
-    Entries are functions with types of their parameters, by name; by default the functions that state them in a
+    ``entries`` maps function names to parameter types; by default the functions that declare their types in a
     decorator. ``library`` has the functions of ``LIBRARY`` that may be called.
     """
     walk = _ModuleWalk(source.split("\n"), entries_of(source) if entries is None else entries, library)
@@ -453,7 +455,7 @@ class _ModuleWalk:
     module: Module = field(default_factory=list)
 
     def function(self, name: str, types: tuple[Type, ...]) -> Function:
-        """A function for some types of its parameters."""
+        """Return the function specialised for the given parameter types."""
         key = name, types
         if key not in self.done:
             definition = self.definitions[name]
@@ -472,7 +474,7 @@ class _ModuleWalk:
         return self.done[key]
 
     def refused(self, where: ast.AST, problem: str) -> ProgramError:
-        """The error for a place in the composed text, in terms of the file that it was written in."""
+        """Return the error for untranslatable code at a node, with file and line of the original source."""
         number = getattr(where, "lineno", 0)
         place = place_in(self.lines, number)
         problem = f"{problem}, which cannot be translated"
@@ -481,9 +483,10 @@ class _ModuleWalk:
         return UntranslatableError(str(refusal(place.file, place.line, problem)))
 
     def mistaken(self, where: ast.AST, problem: str, sought: str = "") -> ProgramError:
-        """The error for a mistake at a place in the composed text, as it was written: the line that has ``sought``.
+        """Return the error for invalid code at a node, with file and line of the source that contains ``sought``.
 
-        ``{written}`` in the problem is that line, ``{name}`` the name of the function there.
+        In the problem text, ``{written}`` is replaced by the source line and ``{name}`` by the function name in this
+        line.
         """
         number = getattr(where, "lineno", 0)
         place = place_in(self.lines, number)
@@ -496,7 +499,7 @@ class _ModuleWalk:
 
 
 class _FunctionWalk:
-    """Translation of one function for one choice of types; repeated if a name turns out to have a wider type."""
+    """Translation of one function for one combination of types; repeated if a name turns out to have a wider type."""
 
     def __init__(self, module: _ModuleWalk, definition: ast.FunctionDef) -> None:
         self.module = module
@@ -527,7 +530,7 @@ class _FunctionWalk:
         self.writes: ast.AST | None = None
 
     def walked(self, name: str, types: tuple[Type, ...]) -> Function:
-        """The function as typed statements."""
+        """Return the function as typed statements."""
         parameters = self.definition.args
         names = [argument.arg for argument in (*parameters.posonlyargs, *parameters.args, *parameters.kwonlyargs)]
         self.types.update(zip(names, types, strict=True))
@@ -554,11 +557,11 @@ class _FunctionWalk:
         return Function(name, self.definition.name, kept, self.returns, needed(body, frozenset())[0], bound, is_entry)
 
     def block(self, body: Sequence[ast.stmt]) -> tuple[Statement, ...]:
-        """Some statements."""
+        """Return the typed statements of a block."""
         return tuple(chain.from_iterable(map(self.statement, body)))
 
     def statement(self, node: ast.stmt) -> list[Statement]:
-        """Translation of a Python statement."""
+        """Return the typed statements for a Python statement."""
         match node:
             case ast.Pass():
                 return []
@@ -627,7 +630,7 @@ class _FunctionWalk:
         return [*before, *self.loop(node, lambda: typed.CountedLoop(name, start, stop, step, self.block(node.body)))]
 
     def loop_over_items(self, name: str, node: ast.For) -> list[Statement]:
-        """A loop over the items of a tuple, or of a part of it, as one that counts."""
+        """Translate a loop over a tuple or a slice of a tuple into a counted loop."""
         whole = node.iter.value if isinstance(node.iter, ast.Subscript) else node.iter
         owner = self.values.term(whole)
         if not isinstance(owner.type, Items) or not owner.type.is_uniform:
@@ -645,7 +648,7 @@ class _FunctionWalk:
         return self.loop(node, lambda: typed.CountedLoop(counter, start, stop, 1, (taken, *self.block(node.body))))
 
     def loop(self, node: ast.For | ast.While, make: Callable[[], Statement]) -> list[Statement]:
-        """A loop; what follows where it was not left is under a flag, which each ``break`` of it sets."""
+        """Translate a loop; an ``else`` block becomes conditional on a flag that each ``break`` sets."""
         around = self.flag
         if not node.orelse:
             self.flag = ""
@@ -684,7 +687,7 @@ class _FunctionWalk:
         )
 
     def put(self, target: ast.expr, value: Term, node: ast.AST) -> list[Statement]:
-        """A name or an element of an array gets a value."""
+        """Translate an assignment to a name, an array element or a field."""
         if isinstance(target, ast.Name):
             return [self.assign(target.id, value, node)]
         if isinstance(target, ast.Attribute):
@@ -698,7 +701,7 @@ class _FunctionWalk:
         return [typed.Store(element, converted(value, FLOAT))]
 
     def set_field(self, target: ast.Attribute, value: Term) -> Statement:
-        """A field of a row gets a value, in a text that is written for translation: Python's rows do not change."""
+        """Translate an assignment to a field of a row, which only texts written for translation contain."""
         element = self.values.term(ast.copy_location(ast.Attribute(target.value, target.attr, ast.Load()), target))
         owner = element
         while owner.kind in ("field", "item"):
@@ -713,19 +716,19 @@ class _FunctionWalk:
         return typed.Store(element, converted(value, element.type))
 
     def assign(self, name: str, value: Term, node: ast.AST) -> Statement:
-        """A name gets a value, as the type that holds all that it ever gets."""
+        """Translate an assignment to a name, with the value converted to the inferred type of the name."""
         self.note_type(name, value.type, node)
         return typed.Assign(name, converted(value, self.types[name]))
 
     def fresh(self, wanted: str, kind: Type) -> str:
-        """A name that the text does not have, for values of one form."""
+        """Return an unused local name for values of a given type."""
         while wanted in self.names or wanted in self.made or joined(self.types.get(wanted, kind), kind) is None:
             wanted += "_"
         self.made.add(wanted)
         return wanted
 
     def note_type(self, name: str, kind: Type, node: ast.AST) -> None:
-        """Widen the type of a name where it must be."""
+        """Widen the inferred type of a name as required by a new value."""
         before = self.types.get(name, kind)
         joint = joined(before, kind)
         if joint is None:
@@ -736,7 +739,7 @@ class _FunctionWalk:
         self.types[name] = joint
 
     def assign_items(self, target: ast.Tuple, value: Term, node: ast.Assign) -> list[Statement]:
-        """Several names or elements get the items of a tuple, which has its value before any of them changes."""
+        """Translate tuple unpacking: the right-hand side is evaluated completely before any target is assigned."""
         names = [name.id for name in target.elts if isinstance(name, ast.Name)]
         is_stored = len(names) < len(target.elts)
         kind = value.type

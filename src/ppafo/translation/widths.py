@@ -1,7 +1,7 @@
-"""Fixed-point numbers in 16 and 32 bits where interval arithmetic over declared inputs proves that they fit.
+"""Integer widths of 16 and 32 bits for fixed-point code, verified by interval arithmetic over the input ranges.
 
-Every function of a module is gone through with the ranges of what it is called with. What a name, a field or an item of
-a tuple ever holds decides its width; a value beyond 32 bits is refused, so that what is left cannot overflow.
+Every function of a module is evaluated with the ranges of its arguments. The range of all values of a name, field or
+item determines its width. Values beyond 32 bits are refused, so that the remaining code cannot overflow.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,14 +18,14 @@ MOST_TURNS = 64
 
 
 class IntegerRange(NamedTuple):
-    """The range of a whole number: its lowest and its highest value."""
+    """Range of an integer, lowest and highest value included."""
 
     low: int
     high: int
 
 
 Range: TypeAlias = "IntegerRange | tuple[Range, ...]"
-"""Interval of a number, or ranges of the fields of a struct or the items of a tuple."""
+"""Range of a number, or tuple of ranges for the fields of a row or the items of a tuple."""
 Names: TypeAlias = "dict[str, Range]"
 
 TRUTH = IntegerRange(0, 1)
@@ -33,16 +33,17 @@ _WIDTHS = ((INT16, IntegerRange(-(2**15), 2**15 - 1)), (INT32, IntegerRange(-(2*
 
 
 class Narrowed(NamedTuple):
-    """A module whose whole numbers have widths, and the range of what its entry returns."""
+    """Module with 16-bit and 32-bit integers, and the range of the return value of its entry."""
 
     module: Module
     returned: Range
 
 
 def narrowed(module: Module, given: Mapping[str, Range]) -> Narrowed:
-    """The module with widths, for ranges of the parameters of its last function, by name.
+    """Return the module with integer widths for the given ranges of the parameters of its last function, by name.
 
-    ProgramError for what may leave 32 bits, and for what is no sum, shift, choice or product with a power of two.
+    Raises ProgramError for values that may exceed 32 bits, and for operations other than sums, shifts, selections and
+    products with a power of two.
     """
     ranges = _Ranges({function.name: function for function in module})
     entry = module[-1]
@@ -52,7 +53,7 @@ def narrowed(module: Module, given: Mapping[str, Range]) -> Narrowed:
 
 
 def hull(first: Range, other: Range) -> Range:
-    """Return the smallest range in which two ranges lie."""
+    """Return the smallest range that contains both ranges."""
     if isinstance(first, IntegerRange) and isinstance(other, IntegerRange):
         return IntegerRange(min(first.low, other.low), max(first.high, other.high))
     assert not isinstance(first, IntegerRange)
@@ -73,7 +74,7 @@ _COMPARISONS = frozenset({"<", "<=", ">", ">=", "==", "!=", "and", "or", "not"})
 
 @dataclass(slots=True)
 class _Ranges:
-    """Value ranges of all names, terms, fields and results; terms are known by their identity."""
+    """Value ranges of all names, terms, row fields and return values; terms are keyed by ``id``."""
 
     functions: Mapping[str, Function]
     names: dict[tuple[str, str], Range] = field(default_factory=dict)
@@ -82,7 +83,7 @@ class _Ranges:
     returned: dict[str, Range] = field(default_factory=dict)
 
     def call(self, function: Function, arguments: tuple[Range, ...]) -> Range:
-        """Range of a function's result for given ranges of its parameters."""
+        """Return the range of a function's return value for given ranges of its parameters."""
         names: Names = {}
         for (name, kind), value in zip(function.parameters, arguments, strict=True):
             self.keep(function, names, name, kind, value)
@@ -96,13 +97,13 @@ class _Ranges:
         return result
 
     def keep(self, function: Function, names: Names, name: str, kind: Type, value: Range) -> None:
-        """A name holds a value from here on."""
+        """Record the range of a value assigned to a name."""
         names[name] = value
         self.names[function.name, name] = hull(self.names.get((function.name, name), value), value)
         self.note(kind, value)
 
     def note(self, kind: Type, value: Range) -> None:
-        """All rows of one name, and all tuples of one form, are one type in the end."""
+        """Extend the ranges of a row or tuple type, because all values of one type share the same widths."""
         if isinstance(kind, Row | Items):
             assert not isinstance(value, IntegerRange)
             self.parts[kind] = hull(self.parts.get(kind, value), value)
@@ -110,7 +111,7 @@ class _Ranges:
                 self.note(part, own)
 
     def run(self, function: Function, body: tuple[Statement, ...], names: Names, results: list[Range]) -> None:
-        """Some statements: change what names hold, and add what is returned."""
+        """Evaluate statements: update the ranges of names and append the ranges of returned values."""
         for statement in body:
             if isinstance(statement, typed.Assign):
                 self.keep(
@@ -131,7 +132,7 @@ class _Ranges:
                 raise _refused(function, f"'{type(statement).__name__.lower()}'")
 
     def count(self, function: Function, loop: typed.CountedLoop, names: Names, results: list[Range]) -> None:
-        """A loop, turn by turn: after it names hold what they may hold after any number of turns that it can take."""
+        """Evaluate a loop by iterations; afterwards, names have their ranges over all possible iteration counts."""
         start, stop = (self.value(function, part, names) for part in (loop.start, loop.stop))
         assert isinstance(start, IntegerRange)
         assert isinstance(stop, IntegerRange)
@@ -151,7 +152,7 @@ class _Ranges:
         names.update(after or {})
 
     def value(self, function: Function, term: Term, names: Names) -> Range:
-        """The range of a term; kept is the range over all times that it is worked out."""
+        """Return the range of a term, and extend the recorded range over all evaluations of the term."""
         parts = tuple(self.value(function, part, names) for part in term.parts)
         if term.kind == "name":
             value = names[term.detail]
@@ -180,7 +181,7 @@ class _Ranges:
 
 
 def _calculated(function: Function, term: Term, parts: list[IntegerRange]) -> IntegerRange:
-    """Range of a sum, a product with a power of two, a shift, a choice of the smaller or larger."""
+    """Return the range of a sum, a product with a power of two, a shift, a minimum or a maximum."""
     if term.kind == "number":
         return IntegerRange(int(term.detail), int(term.detail))
     if term.kind in _COMPARISONS:
@@ -203,7 +204,7 @@ def _calculated(function: Function, term: Term, parts: list[IntegerRange]) -> In
 
 
 def _join(names: Names, other: Names) -> None:
-    """Join what names hold where two branches meet; a name that only one branch has is not read after it."""
+    """Merge the ranges of names where two branches meet; names assigned in only one branch are not read afterwards."""
     for name, value in other.items():
         names[name] = hull(names.get(name, value), value)
 
@@ -213,26 +214,26 @@ def _refused(function: Function, what: str) -> ProgramError:
 
 
 def _width(interval: IntegerRange) -> Scalar | None:
-    """The narrowest type that holds a range; None where none does."""
+    """Return the narrowest type that contains a range; None if 32 bits do not suffice."""
     return next((kind for kind, own in _WIDTHS if own.low <= interval.low and interval.high <= own.high), None)
 
 
 @dataclass(frozen=True, slots=True)
 class _Narrowing:
-    """Writes one function with widths."""
+    """Rewriting of one function with integer widths."""
 
     ranges: _Ranges
     item: Function
 
     def function(self) -> Function:
-        """The function with its parameters, result and body in widths."""
+        """Return the function with widths in its parameters, return value and body."""
         assert self.item.returns is not None
         parameters = tuple(Parameter(name, self.of_name(name, kind)) for name, kind in self.item.parameters)
         returns = self.type_of(self.item.returns, self.ranges.returned[self.item.name])
         return replace(self.item, parameters=parameters, returns=returns, body=self.block(self.item.body, returns))
 
     def type_of(self, kind: Type, value: Range) -> Type:
-        """A type with widths for what is held."""
+        """Return a type with the widths that a range of values needs."""
         if isinstance(kind, Row | Items):
             every = self.ranges.parts[kind]
             assert not isinstance(every, IntegerRange)
@@ -250,7 +251,7 @@ class _Narrowing:
         return self.type_of(kind, self.ranges.names[self.item.name, name])
 
     def block(self, body: tuple[Statement, ...], returns: Type) -> tuple[Statement, ...]:
-        """Some statements, with widths."""
+        """Return the statements of a block with integer widths."""
         made: list[Statement] = []
         for statement in body:
             if isinstance(statement, typed.Assign):
@@ -271,7 +272,7 @@ class _Narrowing:
         return tuple(made)
 
     def term(self, term: Term) -> Term:
-        """A term with a width that holds its value and all that it is worked out from."""
+        """Return a term whose width contains its value and all intermediate results."""
         if term.kind == "call":
             callee = _Narrowing(self.ranges, self.ranges.functions[term.detail])
             wanted = [callee.of_name(*parameter) for parameter in callee.item.parameters]
@@ -293,7 +294,7 @@ class _Narrowing:
         return self.calculated(term, parts)
 
     def calculated(self, term: Term, parts: tuple[Term, ...]) -> Term:
-        """A term that works something out, in the widest type of its parts and its value."""
+        """Return an arithmetic term in the widest type of its operands and its value."""
         own = self.type_of(term.type, self.ranges.terms[id(term)]) if isinstance(term.type, Scalar) else term.type
         if term.kind == "number" or (term.kind == "convert" and parts[0].type == BOOL):
             return replace(term, type=own, parts=parts)
@@ -314,7 +315,7 @@ class _Narrowing:
 
 
 def converted(term: Term, kind: Type) -> Term:
-    """A value in another width that holds it, as is proved."""
+    """Return a term converted to another width that is proven to contain its value."""
     if term.type == kind:
         return term
     return replace(term, type=kind) if term.kind == "number" else Term("convert", kind, (term,))

@@ -1,4 +1,4 @@
-"""Is the model good enough? Replays what was recorded and compares, channel by channel, in units and in percent."""
+"""Validation of the model against recordings: replay, then comparison channel by channel, in units and in percent."""
 
 from ppafo.validation.agreement import ChannelAgreement, RecordingAgreement, ReplaySettings, compare_recording
 from ppafo.validation.compared import Thresholds, parse_thresholds

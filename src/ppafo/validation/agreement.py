@@ -1,6 +1,6 @@
-"""A model compared with one recording, on the inputs of that recording: errors channel by channel.
+"""Comparison of the model with one recording, replayed on the recorded inputs: errors channel by channel.
 
-How much later the measurement is than the model is the shift in time that leaves the smallest squares.
+The delay between measurement and model is the time shift with the least squared error.
 """
 
 import math
@@ -40,39 +40,40 @@ from ppafo.validation.replay import MOTIONS, Motion, Replay, Replayed, replay_re
 from ppafo.wording import nearest_name, one_line
 
 DEFAULT_LIMIT = 0.02
-"""Largest delay [s] that is looked for; sensors, filters and valves are late by less, and a model by more is wrong."""
+"""Default limit of the estimated delay [s]; sensors, filters and valves lag less, so a longer lag is a model error."""
 LARGEST_DELAY = 1.0
-"""Delay [s] that may be looked for at most; a recording that is later was not recorded with its command."""
+"""Largest limit of the delay that a user may set [s]; with a longer delay the command is not of this recording."""
 
 ENGINE_ERROR = 3.0e-5
-"""Error of the engine over the full range [-] (tests/convergence)."""
+"""Integration error of the engine as a fraction of the full range [-] (tests/convergence)."""
 LEAST_NOISE = 1.0e-4
-"""Noise of samples that is taken at least, over the full range [-]."""
+"""Lower bound of the estimated sample noise as a fraction of the full range [-]."""
 _UNMOVED = 1.0e-3
-"""Error over the full range that is accepted of a signal that does not move: the zero of its sensor."""
+"""Accepted error of a signal that does not move, as a fraction of the full range [-]: the zero error of its sensor."""
 _WITHIN_NOISE = 1.5
-"""Size of white noise over its estimate up to which it may be noise."""
+"""RMS error as a multiple of the estimated white noise [-] up to which the error may be noise."""
 _SHIFTS = 81
-"""Delays that are tried first, from one limit to the other."""
+"""Number of delays on the initial grid, from one limit to the other."""
 _MAXIMUM_SAMPLES = 4000
-"""Samples of a channel by which a delay is sought."""
+"""Largest number of samples of a channel used to estimate the delay."""
 _MINIMUM_GAIN = 25.0
-"""Least gain for a delay, in variances of one sample: five standard deviations of white noise."""
+"""Least reduction of the squared error by a delay, in sample variances: five standard deviations of white noise."""
 _SMALLEST_GAIN = 1.0e-12
 """Gain below which two curves are the same to the accuracy of the engine."""
 _RESOLUTION = 0.02
-"""Fraction of a sample below which a delay counts as none."""
+"""Delay as a fraction of the sample interval [-] below which it is taken as 0."""
 _ACCURACY = 1.0e-7
-"""Accuracy of a delay, as a fraction of the limit."""
+"""Accuracy of the estimated delay as a fraction of the limit [-]."""
 _AT_LIMIT = 0.99
-"""Fraction of the limit from which a delay is at it."""
+"""Fraction of the limit [-] from which a delay counts as being at the limit."""
 
 
 @dataclass(frozen=True, slots=True)
 class ComparedCurve:
-    """A channel of both: measured values at their times, the model's at its own, full range, unit of an error, limit.
+    """Measured and modelled values of one channel, each with their own times [s].
 
-    ``usual_zero`` is what sensors of any bench are off by; ``limit`` is the one that was given for it, if any.
+    ``unit`` is the SI unit of an error, ``full_range`` the full range of the channel, ``usual_zero`` the usual zero
+    error of a sensor, both in this unit. ``limit`` is the error limit set by the user, if any.
     """
 
     channel: str
@@ -86,25 +87,25 @@ class ComparedCurve:
     limit: ErrorLimit | None = None
 
     def shift(self, delay: float, times: Floats) -> Floats:
-        """Return the model, ``delay`` [s] later, at some times; before and after its values it stands still."""
+        """Return the model delayed by ``delay`` [s] at ``times``, constant outside the range of the model."""
         return np.interp(times - delay, self.model_times, self.model_values)
 
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """Time [s] by which the measurement is later than the model, 0 where none can be seen; True at its limit."""
+    """Delay [s] of the measurement with respect to the model, 0 if undetectable; ``is_at_limit`` if limited."""
 
     value: float
     is_at_limit: bool
 
     @property
     def correction(self) -> float:
-        """The delay [s] to correct for; 0 at the limit, where the best fit is no delay of a sensor any more."""
+        """Delay [s] to correct for; 0 at the limit, because a best fit there is no longer the delay of a sensor."""
         return 0.0 if self.is_at_limit else self.value
 
 
 def estimate_delay(curves: list[ComparedCurve], limit: float) -> Delay:
-    """Return the delay, at most ``limit`` [s] either way, that brings the channels together best, in full ranges."""
+    """Return the delay within +-``limit`` [s] with the least mean squared error of all channels, in full ranges."""
     if limit <= 0.0 or not curves:
         return Delay(0.0, is_at_limit=False)
     # No more measured samples than the search needs.
@@ -115,7 +116,7 @@ def estimate_delay(curves: list[ComparedCurve], limit: float) -> Delay:
     ]
 
     def cost(delay: float) -> float:
-        """Return the mean squared error over all samples and channels, in full ranges [-]."""
+        """Return the mean squared error over all samples and channels, in units of full range squared [-]."""
         errors = [(curve.shift(delay, curve.times) - curve.values) / curve.full_range for curve in thinned]
         return sum(float(np.square(error).mean()) for error in errors) / len(errors)
 
@@ -133,19 +134,20 @@ def estimate_delay(curves: list[ComparedCurve], limit: float) -> Delay:
 
 
 _LONGEST_WEIGHT = 3.0
-"""Usual intervals for which one sample may speak at most, so that a gap does not count for what nobody measured."""
+"""Largest weight of one sample, in usual sample intervals [-], so that a gap in time gets no weight."""
 _OTHER_SUPPLY = 0.05
-"""Fraction of the model's gauge pressure by which a recorded supply may differ before it is remarked on."""
+"""Relative difference between recorded and model gauge supply pressure [-] from which a remark is made."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReplaySettings:
-    """Settings of replay and verdict.
+    """Settings of the replay and of the acceptance limits.
 
-    ``motion`` ``free`` lets the vane move as the model demands, ``measured`` prescribes the recorded angle,
-    ``locked`` keeps it where it starts, ``leg`` gives it the foot of ``leg``, else the one of figure 7's fixture. With
-    a ``volume`` [m^3] there is no vane: chamber 1 is a fixed volume that the valve fills and vents. ``initial`` values
-    [SI] by channel go before the first samples; ``longest_delay`` [s] limits the delay looked for.
+    ``motion`` is ``free`` for a vane that moves as the model demands, ``measured`` for the recorded angle as prescribed
+    motion, ``locked`` for a vane fixed at its initial angle, or ``leg`` for a vane with the foot of ``leg`` (default:
+    the fixture of figure 7). With a ``volume`` [m^3] chamber 1 is a fixed volume that the valve fills and vents,
+    without a vane. ``initial`` values [SI] by channel override the first samples. ``longest_delay`` [s] limits the
+    estimated delay.
     """
 
     motion: Motion = "free"
@@ -164,7 +166,7 @@ def replay_settings(
     thresholds: Sequence[str],
     longest_delay: float,
 ) -> ReplaySettings:
-    """Return the settings of a validation from its arguments; DataError for those that contradict each other."""
+    """Return the settings of a validation from its arguments. Raises DataError if arguments contradict each other."""
     if volume is not None and not volume > 0.0:
         raise DataError(f"volume of {volume:g} m^3: must be above 0")
     if not 0.0 <= longest_delay <= LARGEST_DELAY:
@@ -183,12 +185,13 @@ def replay_settings(
 
 @dataclass(frozen=True, slots=True)
 class ChannelAgreement:
-    """Residuals (measured - model) of one channel, in its SI unit, after the common delay was taken out.
+    """Residuals (measured - model) of one channel, in its SI unit, after correction of the common delay.
 
-    ``rms``, ``bias`` and ``largest`` (with its sign, at ``largest_time`` [s]); ``rms_unaligned`` is the RMS error
-    without any shift; ``noise`` is the noise of its samples, correlated or not; ``variation`` is the standard deviation
-    of the signal without its noise. ``limit`` is the largest fraction of ``full_range`` that passes, ``usual_zero``
-    what sensors of any bench are off by.
+    ``rms`` and ``bias`` are root mean square and mean of the residual. ``largest`` is the residual of largest
+    magnitude, with its sign, at ``largest_time`` [s]. ``rms_unaligned`` is the RMS error without correction of the
+    delay. ``noise`` is the standard deviation of the measurement noise, white or correlated; ``variation`` is the
+    standard deviation of the signal without noise. ``limit`` is the largest RMS error that passes, as a fraction of
+    ``full_range`` [-]; ``usual_zero`` is the usual zero error of a sensor.
     """
 
     channel: str
@@ -206,23 +209,28 @@ class ChannelAgreement:
 
     @property
     def fraction(self) -> float:
-        """RMS error over the full range [-]."""
+        """RMS error divided by the full range [-]."""
         return self.rms / self.full_range
 
     @property
     def in_noise(self) -> float:
-        """RMS error over the noise of the samples [-]: 1 where the model explains all of the course."""
+        """RMS error divided by the noise of the samples [-]: 1 if the model explains the whole signal."""
         return self.rms / self.noise
 
     @property
     def passes(self) -> bool:
-        """True where the RMS error is within its limit."""
+        """True if the RMS error is within its limit."""
         return self.fraction <= self.limit
 
 
 @dataclass(frozen=True, slots=True)
 class RecordingAgreement:
-    """A recording, the model on its inputs, and how far they are apart."""
+    """Recording, model replayed on the recorded inputs, and residuals of each channel.
+
+    ``file`` and ``sha256`` identify the file; ``inputs`` are the recorded channels that drive the model, ``step`` is
+    the time step of the engine [s], ``delay`` the common delay of the measurement, ``remarks`` are sentences for the
+    report.
+    """
 
     file: str
     sha256: str
@@ -237,15 +245,16 @@ class RecordingAgreement:
 
     @property
     def passes(self) -> bool:
-        """True where every channel is within its limit."""
+        """True if every channel is within its limit."""
         return all(channel.passes for channel in self.channels)
 
 
 def channel_agreement(curve: ComparedCurve, delay: float) -> ChannelAgreement:
-    """Return the errors in one channel with the model shifted by ``delay`` [s].
+    """Return the errors of one channel with the model shifted by ``delay`` [s].
 
-    Without a limit of its own an RMS error passes up to 3 % of full range or half of the variance, whichever is less,
-    beside the zero that sensors of any bench have, for a signal that stands still shows nothing else, and noise.
+    Unless the user sets a limit, the RMS error may reach 3 % of full range or half of the signal variance, whichever is
+    less, combined with the noise and with the usual zero error of sensors (the only visible error of a constant
+    signal).
     """
     # Each sample speaks for its time by the trapezoidal rule, but not for a gap.
     intervals = np.diff(curve.times)
@@ -280,14 +289,14 @@ def channel_agreement(curve: ComparedCurve, delay: float) -> ChannelAgreement:
 
 
 def noise_in(values: Floats, full_range: float) -> float:
-    """Return the noise of samples [their unit], with what a converter rounds: its resolution / sqrt(8)."""
+    """Return the noise of samples [their unit], including the rounding of a converter, resolution / sqrt(8)."""
     # At rest a coarse converter repeats one value, and third differences see no noise at all. It is then off by up to
     # half a step throughout, whose square is twice this one's, and not by what rounding leaves on average.
     return max(math.hypot(noise_of(values), resolution_of(values) / math.sqrt(8.0)), LEAST_NOISE * full_range)
 
 
 def replay_of(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> Replay:
-    """Return the replay of a recording on a device, or on a fixed volume in its place."""
+    """Return the replay of a recording on a device, or on a fixed volume if the settings have one."""
     motion, initial = settings.motion, settings.initial
     if settings.volume is not None:
         device, beside = with_fixed_volume(device, settings.volume)
@@ -300,7 +309,7 @@ def replay_of(measured: MeasuredRecording, device: Device, settings: ReplaySetti
 
 
 def compare_recording(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> RecordingAgreement:
-    """Return how far the model of a device is from one recording, on the inputs of that recording."""
+    """Return the comparison of a recording with the model of a device, replayed on the recorded inputs."""
     request = replay_of(measured, device, settings)
     replayed = replay_recording(request)
     curves = _curves(measured, replayed, request.device, settings)
@@ -324,9 +333,9 @@ def compare_recording(measured: MeasuredRecording, device: Device, settings: Rep
 
 
 def measured_values(recording: Recording, name: str) -> Floats | None:
-    """Return the values of a channel to compare, None where there are none.
+    """Return the measured values of a channel, None if they were not recorded.
 
-    The pressure difference follows from both pressures where they are there.
+    The pressure difference is computed from both chamber pressures if both were recorded.
     """
     if name == PRESSURE_DIFFERENCE and PRESSURE_1 in recording and PRESSURE_2 in recording:
         return np.asarray(recording[PRESSURE_1] - recording[PRESSURE_2])
@@ -338,7 +347,7 @@ def measured_values(recording: Recording, name: str) -> Floats | None:
 def _curves(
     measured: MeasuredRecording, replayed: Replayed, device: Device, settings: ReplaySettings
 ) -> list[ComparedCurve]:
-    """Return the channels that the recording has and that the model was not given; DataError where there are none."""
+    """Return the recorded channels that are no inputs of the model. Raises DataError if there are none."""
     gauge = supply_gauge(measured.recording, device)
     # Channels that say nothing where the vane is locked, or where there is none.
     silent: tuple[str, ...] = (ANGLE,) if settings.motion == "locked" else ()
@@ -370,7 +379,7 @@ def _curves(
 
 @in_units(lambda _, device, *__: device.shown)
 def _remarks(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> tuple[str, ...]:
-    """Return what was taken otherwise than the set or the recording has it: the supply, the samples, the vane."""
+    """Return remarks on assumptions that differ from set or recording: supply pressure, sample times, vane motion."""
     remarks = []
     gauge_of_set = device.supply.pressure - device.supply.atmospheric_pressure
     followed = supply_gauge(measured.recording, device)

@@ -1,4 +1,4 @@
-"""The changes that may explain a disagreement, and the sizes that are tried first: one table a stage of the search."""
+"""Candidate causes of a disagreement, with the trial magnitudes of each: one generator per stage of the search."""
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -32,7 +32,7 @@ from ppafo.validation.replay import replayed_scenario
 
 
 def _sensed(names: Iterable[str], kind: str, about: float, size: float) -> ModelChange:
-    """Return sensors that are off by a gain about a value, a zero or a delay."""
+    """Return a change in which sensors have an error of one ``kind``: gain about a value, zero offset or delay."""
     return ModelChange(dict.fromkeys(names, replace(SensorModel(about=about), **{kind: size})))
 
 
@@ -44,16 +44,16 @@ _MISREAD_UNITS = {
     "kPa read as bar": 1.0e2,
     "bar read as kPa": 1.0e-2,
 }
-"""Factor [-] on a true pressure by the unit as which it was read."""
+"""Factor [-] on the true pressure for each pair of true unit and unit assumed when reading the file."""
 
 _CONVERTED = "", "Pa", "Pa_a", "Pa_g"
-"""Declared units of pressures that were converted before, from a unit of which a file says nothing."""
+"""Declared units of pressures that were already converted to SI, so that the original unit is unknown."""
 
 
 def _groups(names: Collection[str]) -> Iterator[tuple[tuple[str, ...], str, str]]:
-    """Yield pressure sensors that may be wrong together: by channel, in words, and the verb that goes with these.
+    """Yield groups of pressure sensors that may share an error: their channels, a description, and "seem" or "seems".
 
-    Each sensor of a recording, both chambers, both supplies, and all of them; the largest group first.
+    Groups are each recorded sensor, both chambers, both supplies, and all sensors; the largest group comes first.
     """
     chambers = tuple(name for name in (PRESSURE_1, PRESSURE_2) if name in names)
     supplies = tuple(name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in names)
@@ -68,10 +68,10 @@ def _groups(names: Collection[str]) -> Iterator[tuple[tuple[str, ...], str, str]
 def exchanges(
     device: Device, names: Collection[str], units: Mapping[str, AbstractSet[str]]
 ) -> Iterator[CandidateCause]:
-    """Yield mistakes without a size: units, gauge or absolute, swapped channels and signs.
+    """Yield mistakes without a magnitude: wrong unit, gauge read as absolute or reverse, swapped channels, wrong signs.
 
-    ``units`` are those that files declare of channels that move, empty where they declare none. A chamber that stays at
-    the atmosphere shows no factor, and what a file declares in bar was read as bar.
+    ``units`` has, for each channel that moves, the units declared in the files, empty for none. Units are not tried for
+    a chamber that stays at atmospheric pressure, which shows no factor, nor against a unit that the file declares.
     """
     atmosphere = device.supply.atmospheric_pressure
     for channels, group, verb in _groups(names):
@@ -106,28 +106,28 @@ def exchanges(
 
 
 def _both_ways(*sizes: float) -> tuple[float, ...]:
-    """Return sizes below and above 0, growing."""
+    """Return the given magnitudes with both signs, in increasing order."""
     return (*(-size for size in reversed(sizes)), *sizes)
 
 
 # Grids are so fine that two Gauss-Newton steps reach the least squares, and no likely fault lies at one of their ends.
 _ZEROS = _both_ways(0.003, 0.01, 0.03, 0.1, 0.3, 0.6)
-"""Zero offsets of sensors that are tried, in radians, full openings and gauge pressures of the supply."""
+"""Trial zero offsets of angle [rad], command [full openings] and pressures [gauge supply pressures]."""
 _GAINS = (0.3, 0.6, 0.8, 0.95, 0.98, 1.02, 1.05, 1.25, 1.6, 3.0)
-"""Gain [-] of a sensor."""
+"""Trial gains of a sensor [-]."""
 _DELAYS = _both_ways(0.001, 0.003, 0.006, 0.012, 0.025)
-"""Delay [s] of one sensor beside the others."""
+"""Trial delays [s] of one sensor with respect to the others."""
 _LONG_DELAYS = _both_ways(0.015, 0.03, 0.05, 0.08, 0.12)
-"""Delay [s] of all sensors beside the command."""
+"""Trial delays [s] of all sensors with respect to the command."""
 _RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)
-"""Rate [-] of the clock of a recording."""
+"""Trial rates [-] of the clock of a recording."""
 
 _EXACT = SensorErrors(zero=0.0, gain=0.0, delay=0.0)
-"""Usual errors of a command, which no sensor reads."""
+"""Usual sensor errors of a command: none, since no sensor reads the command."""
 
 
 def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
-    """Yield gain and zero of one sensor, of all pressures, of command and supply; delays and the rate of the clock."""
+    """Yield errors with a magnitude: gain and zero of pressures, angle and command; delays; the rate of the clock."""
     atmosphere = device.supply.atmospheric_pressure
     gauge = max(device.supply.pressure, device.supply.dorsiflexion_pressure) - atmosphere
     unit, per_pascal = _unit_of_pressure(device)
@@ -182,18 +182,18 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
 
 
 _FACTORS = (0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 1.05, 1.25, 2.0, 5.0, 20.0)
-"""A number of the set over the model's value [-]."""
+"""Trial values of a parameter divided by its value in the set [-]."""
 _ATMOSPHERES = (0.6, 0.7, 0.8, 0.9, 0.95, 1.03, 1.1)
-"""An atmosphere over the set's [-]: from a high mountain to a deep mine."""
+"""Trial atmospheric pressures divided by the pressure in the set [-]: from a high mountain to a deep mine."""
 _SECTIONS = ("valve", "actuator", "friction", "foot_plate", "supply", "gas")
-"""Sections of the set whose numbers are tried, in this order."""
+"""Sections of the parameter set whose parameters are tried, in this order."""
 _NOT_TRIED = ("actuator.angle_min", "actuator.angle_max", "actuator.restitution")
-"""Numbers that only a vane that reaches a stop tells, and a replay starts between the stops."""
+"""Parameters that are observable only in a vane that reaches a stop; a replay starts between the stops."""
 _OF_SUPPLY = {"supply.pressure": SUPPLY, "supply.dorsiflexion_pressure": DORSIFLEXION_SUPPLY}
 
 
 def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> Iterator[CandidateCause]:
-    """Yield each number of the set, and another atmosphere under sensors of gauge pressure."""
+    """Yield each parameter of the set with trial values, and a wrong atmospheric pressure for gauge sensors."""
     request = replay_of(measured, device, settings)
     scenario = replace(replayed_scenario(request), device=request.device)
     # Supply pressures that a replay follows in the recording, whatever the set has.
@@ -217,7 +217,7 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
 
 
 def _other_atmosphere(device: Device, pressures: Mapping[str, float]) -> CandidateCause:
-    """Return another atmosphere under sensors of gauge pressure and under supply ``pressures`` [Pa], by path."""
+    """Return a wrong atmospheric pressure as cause; shifts gauge readings and supply ``pressures`` [Pa] by path."""
     atmosphere = device.supply.atmospheric_pressure
 
     def change(factor: float) -> ModelChange:
@@ -232,21 +232,21 @@ def _other_atmosphere(device: Device, pressures: Mapping[str, float]) -> Candida
 
 
 def _unit_of_pressure(device: Device) -> tuple[str, float]:
-    """Return the unit in which a difference of pressures is shown, and how many of it are 1 Pa."""
+    """Return the display unit of a pressure difference, and its value for a difference of 1 Pa."""
     with shown_in(device.shown):
         return shown_unit("Pa_d").removesuffix("_d"), shown_value(1.0, "Pa_d")
 
 
 def _scaled(path: str, value: float, factor: float) -> ModelChange:
-    """Return a number of the set as a multiple of its value [SI]."""
+    """Return a change in which one parameter is ``factor`` times its ``value`` [SI]."""
     return ModelChange(numbers={path: factor * value})
 
 
 class _UnknownEffect(NamedTuple):
-    """An effect that a device may have and the model has not: its words, and the settings that grow with one size.
+    """Effect that a device may have and its model has not, with one magnitude to fit.
 
-    ``lowest`` and ``highest`` [unit of these settings] are the ends of the sizes that are tried; ``held`` are settings
-    that stay as they are.
+    ``words`` describes the effect in messages. ``scaled`` are the settings equal to the magnitude, which is tried from
+    ``lowest`` to ``highest`` [unit of these settings]; ``held`` are the constant settings.
     """
 
     name: str
@@ -298,11 +298,11 @@ _EFFECTS = (
     ),
 )
 _SIZES_OF_AN_EFFECT = 5
-"""Sizes that are tried first, at equal ratios."""
+"""Number of trial magnitudes of an effect, in geometric progression."""
 
 
 def effects(device: Device) -> Iterator[CandidateCause]:
-    """Yield the effects that the model of a device has not, each with one size."""
+    """Yield every effect that is off in the model of the device, with trial magnitudes."""
     for effect in _EFFECTS:
         if effect.name not in device.effects:
             tried = tuple(np.geomspace(effect.lowest, effect.highest, _SIZES_OF_AN_EFFECT).tolist())
@@ -310,5 +310,5 @@ def effects(device: Device) -> Iterator[CandidateCause]:
 
 
 def _affected(effect: _UnknownEffect, size: float) -> ModelChange:
-    """Return an effect of a size."""
+    """Return a change in which an effect is on with the given magnitude."""
     return ModelChange(effects={effect.name: {**effect.held, **dict.fromkeys(effect.scaled, size)}})

@@ -1,9 +1,9 @@
-"""Single cause that would explain recordings with more than noise left by the model.
+"""Search for a single cause that explains recordings whose residuals exceed noise.
 
-A cause is a model of a sensor, y = h(model; a) + e, or another number of the set. Causes are tried in stages, from what
-the samples themselves show to what a device may have and the model has not; the first stage that explains all
-recordings ends the search. ``change.py`` says what a change is, ``candidates.py`` which are tried, ``record.py`` what
-one leaves of a recording, and ``search.py`` at which size it leaves least.
+A cause is a model of a sensor, y = h(model; a) + e, or another value of a parameter. Causes are tried in stages, from
+errors that the samples themselves show to effects that the model lacks; the first stage with a cause that explains all
+recordings ends the search. ``change.py`` defines a change of the model, ``candidates.py`` lists the candidates,
+``record.py`` computes the residuals under a change, and ``search.py`` fits the magnitude of a change.
 """
 
 import math
@@ -32,29 +32,33 @@ _TIMES = {
     "milliseconds read as seconds": (1.0e3, "ms"),
     "seconds read as milliseconds": (1.0e-3, "s"),
 }
-"""Rate of a clock whose times were read in a wrong unit, and the right one."""
+"""Clock rate [-] by which misread times are corrected, and the correct unit, for each mistake."""
 
 _LESS = 0.5
-"""Largest fraction of an error beyond its limit that may remain if times in another unit explain it [-]."""
+"""Fraction of an error above its limit [-] that may remain if times in another unit explain the error."""
 
 _SHORT_INTERVAL = 2.0e-5
-"""Interval of samples [s] up to which times may be seconds read as milliseconds: from fifty samples a second on."""
+"""Sample interval [s] up to which times may be seconds read as milliseconds: truly 50 samples per second or more."""
 
 _AT_REST = 2.0
-"""Standard deviation of the angle over its noise, below which a vane may be locked."""
+"""Standard deviation of the angle divided by its noise [-] below which the vane may be locked."""
 
 _STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
-"""Start of a channel whose first samples are wrong, over its range; the ends, which are refused, lie beyond it."""
+"""Trial initial values of a channel whose first samples are wrong, as fractions of its range [-].
+
+The two outermost values lie outside the range, and a best fit there is rejected.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class ResidualCause:
-    """Cause: its name, its description in words, and its gain G [-] in explained error.
+    """Possible cause of the residuals.
 
-    ``left`` is the largest error over noise [-] of any channel with it. ``numbers`` are the numbers of the set that it
-    changes, by path, each with its SI unit. ``same`` are those that the recordings cannot tell from it, ``is_usual``
-    says that any bench has as much. ``is_of_samples`` is true where samples are wrong that no sensor made, which they
-    show whatever else is wrong.
+    ``in_words`` describes the cause in a message. ``gain`` is its gain G [-] in explained error (see ``search.py``).
+    ``left`` is the largest RMS error of any channel divided by its noise [-] under the cause. ``numbers`` has the
+    changed parameters by path, each a value with its SI unit. ``is_usual`` is true if the error is within the usual
+    error of sensors. ``is_of_samples`` is true for faulty samples, which are visible without a model. ``same`` are
+    other causes that the recordings cannot distinguish from this one.
     """
 
     name: str
@@ -69,9 +73,10 @@ class ResidualCause:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """The cause of a disagreement, if one is found; else the ``nearest``; ``tried`` is how many were compared.
+    """Result of the search for a cause of a disagreement.
 
-    ``is_noise`` says that nothing but noise is left without any.
+    ``found`` is the cause, if any; ``nearest`` is the best candidate if none explains the recordings. ``tried`` is the
+    number of candidates compared. ``is_noise`` is true if the residuals are noise, so that no cause is needed.
     """
 
     found: ResidualCause | None = None
@@ -88,9 +93,9 @@ def causes_of(
     settings: ReplaySettings,
     report: Report = report_nothing,
 ) -> Diagnosis:
-    """Return what single cause explains all recordings together; none where nothing but noise is left of them.
+    """Return the single cause that explains all recordings together, or a diagnosis without one if residuals are noise.
 
-    ``agreements`` are those of the recordings that were ``read``, one each.
+    ``agreements`` are the comparisons of the recordings ``read``, in the same order.
     """
     other_unit = _in_other_unit(read, agreements, device, settings)
     if other_unit is not None:
@@ -144,9 +149,9 @@ def causes_of(
 def _units_of_moving(
     read: Sequence[MeasuredRecording], agreements: Sequence[RecordingAgreement], device: Device
 ) -> dict[str, set[str]]:
-    """Return the units that files declare of channels, empty for none, by channel.
+    """Return the units that files declare for each moving channel (an empty text if undeclared).
 
-    Only of those that part from the atmosphere, measured or in the model, by more than a usual zero.
+    A channel moves if it departs, measured or modelled, from atmospheric pressure by more than the usual zero error.
     """
     atmosphere = device.supply.atmospheric_pressure
     moving = {
@@ -161,7 +166,7 @@ def _units_of_moving(
 
 
 def _tried_in_turn(stages: Iterable[Sequence[SizedCause]]) -> tuple[list[SizedCause], list[SizedCause]]:
-    """Return the candidates that were tried, stage by stage until one explains the recordings, and those that do."""
+    """Return the candidates tried, stage by stage until one explains the recordings, and the candidates that do."""
     tried: list[SizedCause] = []
     for stage in stages:
         tried += stage
@@ -172,9 +177,9 @@ def _tried_in_turn(stages: Iterable[Sequence[SizedCause]]) -> tuple[list[SizedCa
 
 
 def _usual_errors(search: CauseSearch, none: Left, of_bench: Sequence[SizedCause]) -> ResidualCause | None:
-    """Return the error of sensors, as any bench has it, that explains the recordings: one, or else several together.
+    """Return a usual sensor error that explains the recordings, or several together; None if there is none.
 
-    ``of_bench`` are the errors that a bench may have, one by one.
+    ``of_bench`` are the candidate errors of single sensors and sensor groups.
     """
     # Beside pressures that are nearly equal a flow bends: what is small together may fail on straight lines, and not
     # alone.
@@ -196,9 +201,9 @@ def _explained(
     explaining: Sequence[SizedCause],
     sized: Sequence[CandidateCause],
 ) -> Diagnosis:
-    """Return the best of those that explain the recordings, with what could replace it; none where a second is needed.
+    """Return the best cause with its alternatives, or a diagnosis without a cause if a second one is needed.
 
-    ``sized`` are the changes with a size that may do so.
+    ``explaining`` are the candidates that explain the recordings, ``sized`` the candidates with a magnitude to combine.
     """
     first = max(explaining, key=lambda each: each.gain)
     # What has no size of its own to fit, a swap or a sign, cannot pass for two other changes.
@@ -218,11 +223,11 @@ def _in_other_unit(
     device: Device,
     settings: ReplaySettings,
 ) -> ResidualCause | None:
-    """Return that times are milliseconds read as seconds or the reverse, where the model agrees with these only.
+    """Return milliseconds read as seconds (or the reverse) as cause if the model agrees only with the corrected times.
 
-    It must then explain half of the variance of every signal, which one that stands still does not, with less than half
-    of each error that was beyond its limit. It comes first, for other causes would be sought in runs of a thousand
-    times the length of the recording, or a thousandth.
+    With corrected times the model must explain half of the variance of every signal that moves, and every error above
+    its limit must fall to less than half. This cause is tried first: with wrong times, all other trials would simulate
+    a thousand times, or a thousandth of, the true duration.
     """
     if all(agreement.passes for agreement in agreements):
         return None
@@ -253,7 +258,7 @@ def _in_other_unit(
 
 
 def _samples(records: Sequence[Record]) -> list[CandidateCause]:
-    """Return the samples that no sensor made, in all channels that have some: the others must agree with the model."""
+    """Return faulty samples of all channels as one candidate cause; an empty list if there are none."""
     faulty = [record for record in records if record.words]
     if not faulty:
         return []
@@ -280,7 +285,7 @@ def _samples(records: Sequence[Record]) -> list[CandidateCause]:
 
 
 def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[CandidateCause]:
-    """Return a vane that is locked, where the model moves it and the recorded angle rests; nothing elsewhere."""
+    """Return a locked vane as candidate cause if the recorded angle is constant in a model that moves; else nothing."""
     if settings.motion not in ("free", "leg"):
         return []
     angles = [record.values[record.channels.index(ANGLE)] for record in records if ANGLE in record.channels]
@@ -291,9 +296,9 @@ def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[Candid
 
 
 def _cause_of(named: Sequence[SizedCause], penalty: float, others: Sequence[SizedCause] = ()) -> ResidualCause:
-    """Return the best of those that explain recordings, with all that the recordings cannot tell from it.
+    """Return the best of the ``named`` causes, with all others that the recordings cannot distinguish from it.
 
-    ``others`` explain them beside what any bench has, and come after those that do alone.
+    ``others`` explain the recordings only together with usual sensor errors, and are listed last.
     """
     best, alone = max(tried.gain for tried in named), {tried.candidate.name for tried in named}
     # Of those that the recordings cannot tell apart, numbers of the set come first.

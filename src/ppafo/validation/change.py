@@ -1,4 +1,4 @@
-"""Changes of the model as values: a sensor, a change, and a candidate for a cause."""
+"""Changes of the model as values: sensor model, change of the model, and candidate cause."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -9,14 +9,14 @@ from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
 from ppafo.validation.replay import Motion
 
 SENSORS = (ANGLE, PRESSURE_1, PRESSURE_2)
-"""Channels that a sensor of the device measures; torque and pressure difference follow from these."""
+"""Channels measured by a sensor of the device; torque and pressure difference are computed from them."""
 SWAPPED = {PRESSURE_1: PRESSURE_2, PRESSURE_2: PRESSURE_1}
-"""Channel by the one in whose place it stands, where both are swapped."""
+"""Channel recorded under each name when the two chamber pressures are swapped."""
 
 
 @dataclass(frozen=True, slots=True)
 class SensorModel:
-    """Sensor model: gain [-] about a value, zero offset in the channel's unit, delay [s]."""
+    """Sensor model: gain [-] about the value ``about``, zero offset (both in the channel's unit), delay [s]."""
 
     gain: float = 1.0
     zero: float = 0.0
@@ -34,13 +34,13 @@ class SensorModel:
 
 @dataclass(frozen=True, slots=True)
 class ModelChange:
-    """Difference between a recording with its device and the set; none by default.
+    """Difference between the device as recorded and its parameter set; none by default.
 
-    ``sensors`` are by channel, ``numbers`` of the set by path [SI], ``effects`` are settings by the name of an effect.
-    Pressures 1 and 2 may be swapped, all sensors may be later than the command by a ``delay`` [s], the clock may
-    run ``clock`` times as fast as its times say, and the vane may do another ``motion``. With a ``start``, samples
-    that no sensor made are left out. It is where a channel begins whose first samples are among them, as a fraction
-    [-] of its range.
+    ``sensors``: sensor models by channel. ``numbers``: changed parameters by path [SI]. ``effects``: settings of
+    effects by the name of the effect. ``is_swapped``: pressures 1 and 2 are exchanged. ``delay``: delay [s] of all
+    sensors with respect to the command. ``clock``: true rate of the recording's clock [-]. ``motion``: motion of the
+    vane, if another. ``start``: if not None, faulty samples are ignored, and a channel whose first samples are faulty
+    starts at this fraction [-] of its range.
     """
 
     sensors: Mapping[str, SensorModel] = field(default_factory=dict)
@@ -54,12 +54,12 @@ class ModelChange:
 
     @property
     def has_delay(self) -> bool:
-        """True where all sensors are later than the command, by themselves or behind a valve that is."""
+        """True if all sensors lag the command, through a sensor delay or the delay of the valve."""
         return self.delay != 0.0 or any(path.endswith("delay") for path in self.numbers)
 
 
 def joined(first: ModelChange, second: ModelChange) -> ModelChange:
-    """Return two changes at once; of numbers and settings that both have, the first's."""
+    """Return both changes combined; ``first`` takes precedence for parameters and settings that both change."""
     sensors = dict(first.sensors)
     for name, other in second.sensors.items():
         sensor = sensors.get(name, SensorModel())
@@ -77,12 +77,14 @@ def joined(first: ModelChange, second: ModelChange) -> ModelChange:
 
 @dataclass(frozen=True, slots=True)
 class CandidateCause:
-    """A cause before its size is known: what a size changes, its words with the place of ``shown`` times the size.
+    """Candidate cause whose magnitude is still to be fitted.
 
-    ``sizes`` are tried first; a cause with one has nothing to fit. A size that ``is_ratio`` is sought as a logarithm.
-    ``usual`` is the largest size, or logarithm, that any bench has, ``is_usual`` says so of one without a size.
-    ``is_of_samples`` is true of samples that no sensor made, which they show themselves; ``is_of_unit`` of a misread
-    unit, which is no hint where it leaves more than noise. ``unit`` is the unit of the number of the set.
+    ``words``: message with a placeholder for ``shown`` times the magnitude. ``change``: function from magnitude to
+    change. ``sizes``: trial magnitudes; a single one means that there is nothing to fit. ``is_ratio``: the magnitude is
+    a ratio, fitted as its logarithm. ``usual``: largest usual sensor error (of a ratio, its logarithm). ``is_usual``:
+    the cause has no magnitude and is usual on any bench. ``is_of_samples``: faulty samples, which are visible without a
+    model. ``is_of_unit``: misread unit, reported only if it explains the recordings. ``unit``: unit of the changed
+    parameter.
     """
 
     name: str
@@ -99,23 +101,23 @@ class CandidateCause:
 
     @property
     def has_size(self) -> bool:
-        """True of a cause whose size is fitted; a swap or a sign has none."""
+        """True if the magnitude is fitted; a swap or a wrong sign has none."""
         return len(self.sizes) > 1
 
     @property
     def is_of_bench(self) -> bool:
-        """True of an error that any bench has, of one sensor: those of groups are sums of these."""
+        """True for a usual error of a single sensor; errors of sensor groups are sums of these."""
         return self.usual > 0.0 and len(self.at(self.usual).sensors) <= 1
 
     @property
     def grid(self) -> list[float]:
-        """Sizes that are tried first, as they are sought: logarithms of a ratio."""
+        """Trial magnitudes, as logarithms if they are ratios."""
         return [math.log(size) if self.is_ratio else size for size in self.sizes]
 
     def at(self, size: float) -> ModelChange:
-        """Return the change of a size that was sought."""
+        """Return the change of the model for a fitted magnitude (for ratios, its logarithm)."""
         return self.change(math.exp(size) if self.is_ratio else size)
 
     def in_words(self, size: float) -> str:
-        """Return what a size that was sought seems to be."""
+        """Return the message for a fitted magnitude (for ratios, its logarithm)."""
         return self.words.format(self.shown * (math.exp(size) if self.is_ratio else size))

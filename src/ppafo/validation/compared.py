@@ -1,4 +1,4 @@
-"""The channels in which a recording is compared with a model, their full ranges, and how large an error may be."""
+"""Channels in which recording and model are compared, their full ranges, and the limits of the error."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -15,10 +15,11 @@ PRESSURE_DIFFERENCE, TORQUE = "pressure_difference", "torque"
 
 @dataclass(frozen=True, slots=True)
 class ComparedChannel:
-    """A channel that is compared: the SI unit and the kind of quantity of an error in it, its title, its full range.
+    """Channel compared between recording and model.
 
-    ``Pa_d`` is a difference of pressures. ``full_range(device, gauge)`` is in the SI unit, of a device whose supply
-    stands at a gauge pressure [Pa].
+    ``unit`` is the SI unit of an error (``Pa_d`` for a pressure difference), ``quantity`` the kind of quantity,
+    ``title`` the label. ``full_range(device, gauge)`` is the full range [SI] of a device with a gauge supply pressure
+    [Pa].
     """
 
     unit: str
@@ -27,7 +28,7 @@ class ComparedChannel:
     full_range: Callable[[Device, float], float]
 
     def usual_zero(self, device: Device) -> float:
-        """Return by how much the zeros of sensors of any bench move it [its SI unit]."""
+        """Return the usual zero error of a sensor, or its effect on a computed channel [SI unit of the channel]."""
         # Pressure difference and torque have the zeros of both sensors, as their full ranges have both pressures.
         return ANGLE_ERRORS.zero if self.quantity == "angle" else self.full_range(device, PRESSURE_ERRORS.zero)
 
@@ -45,19 +46,20 @@ COMPARED: dict[str, ComparedChannel] = {
         "N m", "torque", "Actuator torque", lambda device, gauge: 2.0 * gauge * device.actuator.torque_constant
     ),
 }
-"""Full ranges as the paper has them: 110 deg, 55 psi, 55 psi and 110 psi; the torque follows by equation (2).
+"""Compared channels by name, with the full ranges of the paper: 110 deg, 55 psi, 55 psi and 110 psi.
 
-A difference goes from full supply on one side to full supply on the other.
+The full range of the torque follows from equation (2). A pressure difference ranges from full supply on one side to
+full supply on the other.
 """
 
 ACCEPTABLE_FRACTION = 0.03
-"""RMS error over full range up to which a model agrees, for no model has all that a device has.
+"""Largest RMS error of an acceptable model as a fraction of the full range [-].
 
 The paper calls 10 % acceptable (page with figure 7); a lag of 10 ms of both pressures would pass there.
 """
 
 EXPLAINED_FRACTION = 0.5
-"""Fraction of the variance of a signal that a model explains at least (R^2); its mean would explain none."""
+"""Least fraction of the variance of a signal that an acceptable model explains (R^2) [-]; the mean explains none."""
 
 _FRACTION_UNITS = ("%", "percent")
 _EXAMPLES = "a threshold is written 'angle=10%', 'pressure_1=3.7 psi_d' or '5%' for all channels"
@@ -77,20 +79,20 @@ class ErrorLimit:
 
 @dataclass(frozen=True, slots=True)
 class Thresholds:
-    """The limit of every channel that has one of its own, and the others' limit; None where none was given."""
+    """Error limits by channel (``channels``), and limit of all other channels (``others``, None for the default)."""
 
     others: ErrorLimit | None
     channels: Mapping[str, ErrorLimit]
 
     def limit(self, channel: str) -> ErrorLimit | None:
-        """The limit that was given for a channel; None for one that is judged by what its signal goes through."""
+        """Return the limit that the user set for a channel, None for the default limit."""
         return self.channels.get(channel, self.others)
 
 
 def parse_thresholds(texts: Iterable[str] = ()) -> Thresholds:
-    """Return the thresholds of texts such as ``angle=10%``, ``pressure_1=3.7 psi_d`` or ``5%``; later ones win.
+    """Return the thresholds of texts such as ``angle=10%``, ``pressure_1=3.7 psi_d`` or ``5%``; later texts override.
 
-    DataError where a text names no channel that is compared, or no limit above 0.
+    Raises DataError for a channel that is not compared, or a limit that is not above 0.
     """
     others = None
     channels: dict[str, ErrorLimit] = {}
@@ -110,7 +112,7 @@ def parse_thresholds(texts: Iterable[str] = ()) -> Thresholds:
 
 
 def _limit(value: str, text: str, unit: str) -> ErrorLimit:
-    """The limit that a value states, in an SI unit or in percent; messages show the whole ``text`` of the threshold."""
+    """Return the limit in ``value``, as a fraction for percent, else in SI; messages show the whole ``text``."""
     try:
         is_fraction = split_quantity(value)[1] in _FRACTION_UNITS
         number = parse_quantity(value, "" if is_fraction else unit)

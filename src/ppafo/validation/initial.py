@@ -1,4 +1,4 @@
-"""Initial values of a replay that were not recorded: which channels may have one, and the texts that give them."""
+"""Initial values of a replay that were not recorded: allowed channels, and parsing of their texts."""
 
 from collections.abc import Sequence
 
@@ -13,14 +13,14 @@ _EXAMPLES = {ANGLE: "angle=75 deg", PRESSURE_1: "pressure_1=0 psi_g", PRESSURE_2
 
 
 def initial_remedies() -> dict[str, str]:
-    """Return the remedy for each initial channel of a replay that was not recorded."""
+    """Return, by channel, the remedy to show if the initial value of a replay was not recorded."""
     return {name: f"give its initial value, {argument_text('initial', example)}" for name, example in _EXAMPLES.items()}
 
 
 def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
-    """Return initial values in SI by channel from texts such as ``pressure_1=0 psi_g``.
+    """Return initial values [SI] by channel from texts such as ``pressure_1=0 psi_g``.
 
-    Gauge pressure counts from ``atmosphere`` [Pa absolute]. DataError for another channel, unit or form.
+    Gauge pressures are relative to ``atmosphere`` [Pa absolute]. Raises DataError for an unknown channel, unit or form.
     """
     values = {}
     for text in texts:

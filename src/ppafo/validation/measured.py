@@ -1,4 +1,4 @@
-"""A recording as evidence: read from its file, and refused or remarked on where it cannot carry a comparison."""
+"""Recordings for validation: reading from file, and checks that a recording can be compared with the model."""
 
 import hashlib
 from collections.abc import Sequence
@@ -34,22 +34,22 @@ from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2
 from ppafo.wording import nearest_name
 
 MINIMUM_SAMPLES = 10
-"""Fewer are a few readings and no course in time."""
+"""Least number of samples of a recording; fewer do not show a signal over time."""
 
 _REMARKED_GAP = 3.0
-"""Usual intervals between samples [-] from which a gap in time is remarked on."""
+"""Gap in time, in usual sample intervals [-], from which a remark is made."""
 _ABOVE_SUPPLY = 0.05
-"""Part of the gauge pressure of the supply [-] by which two sensors may disagree on it."""
+"""Fraction of the gauge supply pressure [-] by which two pressure sensors may disagree."""
 _ROUNDING = 1.0e-9
-"""Fraction of a pressure [-] that is no difference: a chamber that has settled stands at its supply but for this."""
+"""Relative pressure difference [-] that is rounding: a settled chamber may exceed its supply by this much."""
 _KILOPASCALS_AS_PSI = 1.0e3 / PASCALS_PER_PSI
-"""Factor on a pressure [-] that undoes kPa read as psi."""
+"""Factor [-] that corrects a pressure in kPa read as psi."""
 _LEAST_OF_SUPPLY = 0.5
-"""Fraction of the supply [-] that a chamber reaches at least, where a factor shall explain its pressure."""
+"""Least peak pressure of a chamber as a fraction of the supply [-] after correction of a unit, to suggest that unit."""
 _MAXIMUM_RANGES = 20.0
-"""Full ranges [-] beyond which a reading is a damaged line or a wrong unit, and no reading."""
+"""Largest reading in full ranges [-]; more means a damaged line or a wrong unit."""
 _MINIMUM_CHANGE = 0.01
-"""Part of a full range [-] by which some channel has to change."""
+"""Fraction of the full range [-] by which at least one channel must change."""
 
 if TYPE_CHECKING:
     from pandas import DataFrame  # type: ignore[import-untyped]
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredRecording:
-    """A recording with the name and the checksum of its file, and what is to be said of it."""
+    """Recording with the name and SHA-256 checksum of its file, and remarks on its quality."""
 
     file: str
     sha256: str
@@ -66,7 +66,7 @@ class MeasuredRecording:
     remarks: tuple[str, ...]
 
     def has(self, name: str) -> bool:
-        """True where the recording has this channel."""
+        """True if the recording has this channel."""
         return name in self.recording
 
 
@@ -76,9 +76,10 @@ def read_measured(
     columns: ColumnMap | None = None,
     map_name: str = "",
 ) -> MeasuredRecording:
-    """Return a recording, or the one of a file or result folder; DataError where it cannot be compared with a model.
+    """Return a recording, read from a file or result folder unless given as an object.
 
-    A file with columns of its own is read through a column map, which messages call ``map_name``.
+    With ``columns``, a file is read through this column map, which messages call ``map_name``. Raises DataError if the
+    recording cannot be compared with a model.
     """
     if not isinstance(source, Recording | str | Path):
         source = read_recording(source, atmosphere=device.supply.atmospheric_pressure)
@@ -103,7 +104,7 @@ def read_all(
     device: Device,
     columns: "ColumnMap | str | Path | None",
 ) -> list[MeasuredRecording]:
-    """Return all recordings of a validation; DataError for none, and for one that is given twice."""
+    """Return all recordings of a validation. Raises DataError if there are none or if a recording is given twice."""
     if not sources:
         raise DataError("no recording was given; name at least one .csv or .nc file or result folder")
     column_map, map_name = (None, "") if columns is None else column_map_of(columns)
@@ -120,7 +121,7 @@ def read_all(
 
 @in_units(lambda _recording, device, *_: device.shown)
 def check_recording(recording: Recording, device: Device, file: str, sha256: str = "") -> MeasuredRecording:
-    """Return a recording as evidence with its remarks, or refuse it in one line that begins with ``file``."""
+    """Return a checked recording with remarks. Raises DataError, starting with ``file``, if it cannot be compared."""
     count = len(recording)
     if count < MINIMUM_SAMPLES:
         noun = "sample" if count == 1 else "samples"
@@ -139,7 +140,7 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
 
 
 def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
-    """Refuse a name that looks like a misspelt one of the channels in use; remark on any other unknown one."""
+    """Raise DataError for a misspelt or missing channel name; return remarks on other unknown channels."""
     used = (COMMAND, SUPPLY, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, *COMPARED)
     missing = [name for name in used if name not in recording]
     unknown = [name for name in recording.names if name not in CHANNELS]
@@ -159,7 +160,7 @@ def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
 
 
 def _check_size(recording: Recording, device: Device, file: str) -> None:
-    """Refuse values that no such device can have: a damaged line, or a unit that is off by powers of ten."""
+    """Raise DataError for values out of reach of the device: a damaged line, or a unit wrong by powers of ten."""
     highest = max(device.supply.pressure, device.supply.dorsiflexion_pressure)
     supplies = (SUPPLY, DORSIFLEXION_SUPPLY)
     for name in (name for name in (*supplies, *COMPARED) if name in recording):
@@ -174,7 +175,7 @@ def _check_size(recording: Recording, device: Device, file: str) -> None:
 
 
 def _check_pressures(recording: Recording, device: Device, file: str) -> None:
-    """Refuse pressures that cannot be absolute, and chambers that stand above the supply they are fed from."""
+    """Raise DataError for pressures that cannot be absolute, and for chamber pressures above their supply."""
     supply = device.supply
     check_absolute(recording, supply.atmospheric_pressure, file)
     recorded = {name: float(recording[name].max()) for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in recording}
@@ -197,7 +198,7 @@ def _check_pressures(recording: Recording, device: Device, file: str) -> None:
 
 
 def supply_gauge(recording: Recording, device: Device) -> float:
-    """Gauge pressure of the supply [Pa]: the median of the recorded one, else the higher one of the set."""
+    """Return the gauge supply pressure [Pa]: the median of the recording, or the higher supply pressure of the set."""
     supply = device.supply
     if SUPPLY in recording:
         return float(np.median(recording[SUPPLY])) - supply.atmospheric_pressure
@@ -205,7 +206,7 @@ def supply_gauge(recording: Recording, device: Device) -> float:
 
 
 def _check_change(recording: Recording, device: Device, file: str) -> None:
-    """Refuse a recording in which nothing happens, since every model would agree with it."""
+    """Raise DataError for a recording in which no channel changes, because every model would agree with it."""
     gauge = supply_gauge(recording, device)
     if gauge <= 0.0:
         owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"

@@ -1,7 +1,7 @@
-"""A recording as its causes are sought: what its sensors made of it, and what a change of the model leaves of it.
+"""Recordings prepared for the search for causes, and their residuals under a change of the model.
 
-The recorded samples stay as they are, so that changes are compared by what they leave of the same samples. A common
-delay, and a start that was read from noisy samples, are taken out with every change.
+All changes are compared on the same recorded samples. A common delay, and the error of initial values read from noisy
+samples, are fitted anew for every change.
 """
 
 import math
@@ -33,22 +33,22 @@ from ppafo.validation.replay import Replay, Replayed, replay_together
 Flags = NDArray[np.bool_]
 
 ONLY_NOISE = 2.0
-"""Mean square left over the noise's up to which nothing but noise is left: noise that is not white has more."""
+"""Mean squared residual divided by noise variance [-] up to which residuals are noise; correlated noise exceeds 1."""
 STEPS = 2
-"""Gauss-Newton steps, from sizes that are near the best."""
+"""Number of Gauss-Newton steps from the best trial magnitude."""
 _BY_CHANCE = 1.0e-3
-"""Chance below which a run of equal samples is a limit."""
+"""Probability [-] below which a run of equal extreme samples is taken as clipping."""
 _FEW_OUTLIERS = 0.01
-"""Share of the samples of a channel up to which isolated outliers are what any logger has."""
+"""Fraction of the samples of a channel [-] up to which isolated outliers are usual for a logger."""
 
 
 class Record(NamedTuple):
-    """A recording that is compared: channels and values (channels, samples) over their noise.
+    """Recording prepared for the search: its compared channels and their values divided by noise (channels, samples).
 
-    ``engine`` is the error of the engine over the noise, ``good`` is 1 for a sample that a sensor made and 0 for
-    others, which ``words`` describe; ``has_few`` where these are isolated and so few that any bench has them.
-    ``delay`` [s] was found with the model of the set; ``starts`` are how readings change with the standard error of
-    each start that was read.
+    ``noise`` [SI] and ``engine``, the integration error divided by the noise [-], are by channel. ``good`` is 1 for
+    valid samples and 0 for faulty ones, which ``words`` describes; ``has_few`` is true if the faulty samples are
+    isolated and no more than usual. ``delay`` [s] was estimated with the unchanged model. ``starts`` are the changes of
+    the readings for one standard error of each initial value.
     """
 
     measured: MeasuredRecording
@@ -64,21 +64,21 @@ class Record(NamedTuple):
 
 
 class Left(NamedTuple):
-    """Residuals under a change, over the noise: mean square in each channel of each recording, and all errors."""
+    """Residuals under a change, divided by noise: mean square of each channel of each recording, and all errors."""
 
     squares: Floats
     errors: Floats
 
     @property
     def is_noise(self) -> bool:
-        """True where nothing but noise is left in any channel."""
+        """True if the residuals of every channel are noise."""
         return float(self.squares.max()) < ONLY_NOISE
 
 
 def record_of(
     measured: MeasuredRecording, agreement: RecordingAgreement, device: Device, settings: ReplaySettings
 ) -> Record:
-    """Return a recording with its samples that no sensor made, and how readings change with each start."""
+    """Return the recording with faulty samples marked and the sensitivity of its readings to each initial value."""
     of_sensors = [channel for channel in agreement.channels if channel.channel in SENSORS]
     compared = of_sensors or agreement.channels[:1]
     values, noises, faults = zip(*(_samples_of(channel, agreement) for channel in compared), strict=True)
@@ -116,7 +116,7 @@ def record_of(
 
 
 def _samples_of(channel: ChannelAgreement, agreement: RecordingAgreement) -> "tuple[Floats, float, _Wrong | None]":
-    """Return values and noise [SI] of a channel, and the fault of its samples; others give the noise."""
+    """Return values [SI], noise [SI] and faulty samples (or None) of a channel; the noise excludes faulty samples."""
     recording, model = agreement.measured, agreement.model
     values = measured_values(recording, channel.channel)
     assert values is not None
@@ -134,7 +134,7 @@ def _samples_of(channel: ChannelAgreement, agreement: RecordingAgreement) -> "tu
 
 
 class _Wrong(NamedTuple):
-    """Wrong samples of a channel: description, samples, and whether each is isolated."""
+    """Faulty samples of a channel: description, flag of each sample, and whether the faults are isolated outliers."""
 
     words: str
     samples: Flags
@@ -142,7 +142,7 @@ class _Wrong(NamedTuple):
 
 
 def _wrong_samples(values: Floats, residuals: Floats, channel: ChannelAgreement, time: Floats) -> _Wrong | None:
-    """Return samples of a channel that no sensor made: constant, clipped, or isolated among samples or residuals."""
+    """Return the faulty samples of a channel: constant signal, clipping, or outliers in the samples or residuals."""
     if np.ptp(values) == 0.0:
         locked = argument_text("motion", "locked")
         held = f"the vane was locked ({locked}), or " if channel.channel == ANGLE else ""
@@ -163,9 +163,9 @@ def _wrong_samples(values: Floats, residuals: Floats, channel: ChannelAgreement,
 
 
 def _clipped_samples(values: Floats) -> _Wrong | None:
-    """Return the samples at the least or the largest value, where one of these is repeated beyond chance.
+    """Return the samples at the least or largest value if this value is repeated more often than chance allows.
 
-    A coarse converter repeats other values too. That all else agrees tells a stop of the vane from a sensor's.
+    A coarse converter repeats inner values too. Agreement of the other channels tells a stop of the vane from clipping.
     """
     run_ends = np.append(np.flatnonzero(np.diff(values)), len(values) - 1)
     lengths, levels = np.diff(run_ends, prepend=-1), values[run_ends]
@@ -187,7 +187,10 @@ def _clipped_samples(values: Floats) -> _Wrong | None:
 
 
 def starts_without_wrong(record: Record, device: Device, share: float) -> dict[str, float]:
-    """Return the start [SI] of channels with wrong samples there: of the good ones, else a ``share`` of the range."""
+    """Return initial values [SI] of channels whose first samples are faulty.
+
+    The value is the mean of the valid first samples, or else a fraction ``share`` [-] of the range of the channel.
+    """
     actuator, supply, count = device.actuator, device.supply, samples_at_rest(record.measured.recording)
     starts = {}
     for name, values, good in zip(record.channels, record.values * record.noise[:, None], record.good, strict=True):
@@ -201,13 +204,13 @@ def starts_without_wrong(record: Record, device: Device, share: float) -> dict[s
 
 
 def at_rate(recording: Recording, rate: float) -> Recording:
-    """Return a recording whose clock ran so many times as fast as its times say, in true time."""
+    """Return a recording in true time, given the rate [-] of its clock with respect to true time."""
     first = recording.time[0]
     return replace(recording, time=first + (recording.time - first) / rate)
 
 
 def readings_of(record: Record, replayed: Replayed, change: ModelChange, offset: float) -> Floats:
-    """Return what sensors with a change make of the model (channels, samples), over the noise, ``offset`` [s] later."""
+    """Return modelled readings divided by noise (channels, samples) under a change, delayed by ``offset`` [s]."""
     time, model = record.measured.recording.time, replayed.recording
     true_time = time[0] + (time - time[0]) / change.clock
     rows = []
@@ -220,9 +223,9 @@ def readings_of(record: Record, replayed: Replayed, change: ModelChange, offset:
 
 
 def left_of(record: Record, replayed: Replayed, change: ModelChange, longest_delay: float) -> Left:
-    """Return what is left of a recording without a common delay, at most ``longest_delay`` [s], and error of the start.
+    """Return the residuals after fitting the common delay, at most ``longest_delay`` [s], and the initial values.
 
-    The delay that was found may be what a wrong model makes: it is sought from there and from none.
+    The fit of the delay starts both from 0 and from the delay of the unchanged model, which a wrong model may distort.
     """
     good = np.ones_like(record.good) if change.start is None else record.good
     # No quantity stands twice in one fit: beside a delay of its own a change gets no free one, which would take a part.
@@ -237,9 +240,9 @@ def left_of(record: Record, replayed: Replayed, change: ModelChange, longest_del
 def _errors_from(
     record: Record, replayed: Replayed, change: ModelChange, good: Floats, first_delay: float, longest_delay: float
 ) -> Floats:
-    """Return the errors over the noise (channels * samples,) that are left after Gauss-Newton steps from a delay [s].
+    """Return the errors divided by noise (channels * samples,) after Gauss-Newton steps from an initial delay [s].
 
-    Each step takes out what a delay and other starts explain; a start is known with a standard error of 1.
+    Each step fits the delay and the initial values; these have a prior with a standard deviation of one standard error.
     """
     interval = float(np.median(np.diff(record.measured.recording.time)))
     delay = first_delay

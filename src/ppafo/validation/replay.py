@@ -1,4 +1,4 @@
-"""The model on the inputs of a recording, from its first state: command, supply, external torque or recorded angle."""
+"""Replay: the model driven by recorded inputs (command, supply, external torque or angle) from the first state."""
 
 import math
 from collections.abc import Hashable, Mapping, Sequence
@@ -26,20 +26,20 @@ from ppafo.validation.compared import ANGLE
 from ppafo.validation.measured import MeasuredRecording
 
 Motion = Literal["free", "measured", "locked", "leg"]
-"""Motion of the vane in a replay: free by the model, as recorded, locked, or with a foot."""
+"""Motion of the vane in a replay: free, prescribed as recorded, locked, or with a foot."""
 MOTIONS: tuple[Motion, ...] = ("free", "measured", "locked", "leg")
 
 MAXIMUM_STEPS = 20_000_000
-"""Steps of one replay; what takes more has its times in another unit, or is to be split."""
+"""Largest number of steps of one replay; longer recordings have times in a wrong unit, or must be split."""
 _RECORD_INTERVAL = 2.5e-4
-"""Seconds between two records of the model, or less: fine enough to be shifted in time and read between."""
+"""Largest interval [s] between two records of the model: fine enough for interpolation and time shifts."""
 _ROUNDING = 1.0e-9
-"""Fraction of a step [-] by which a whole number of steps may miss an interval."""
+"""Rounding tolerance [-] when an interval is divided into steps."""
 
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """Result of a replay at every step, on the clock of the recording; step of the engine [s] and its inputs."""
+    """Result of a replay on the clock of the recording, time step of the engine [s], and names of the inputs."""
 
     recording: Recording
     step: float
@@ -48,9 +48,9 @@ class Replayed:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """Replay to be run: a recording on a device, ``extra`` [s] longer with the last inputs.
+    """Request to replay a recording on a device, continued for ``extra`` [s] with the last inputs.
 
-    The motion ``leg`` is that with ``leg``, or on the fixture of figure 7.
+    The motion ``leg`` uses ``leg``, or the fixture of figure 7 if ``leg`` is None.
     """
 
     measured: MeasuredRecording
@@ -62,7 +62,7 @@ class Replay:
 
 
 def replay_recording(request: Replay) -> Replayed:
-    """Return the model on the inputs of a recording; SimulationError where it diverges, DataError for bad inputs."""
+    """Return the model replayed on a recording. Raises SimulationError if it diverges, DataError for invalid inputs."""
     replayed = replay_together([request])[0]
     if isinstance(replayed, PpafoError):
         raise replayed
@@ -70,9 +70,9 @@ def replay_recording(request: Replay) -> Replayed:
 
 
 def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
-    """Return many replays in their order, or the error of one that cannot be made or diverges.
+    """Return the results of many replays in order; a replay that is invalid or diverges gives its error.
 
-    All of one program, clock and inputs are run side by side.
+    Replays with the same program, clock and inputs are run in one batch.
     """
     ended: dict[int, Replayed | PpafoError] = {}
     planned: dict[int, _Planned] = {}
@@ -103,7 +103,7 @@ def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
 
 @dataclass(frozen=True, slots=True)
 class _Planned:
-    """A replay that can be run: what was requested, the run, the inputs of its steps, and it as a batch of one."""
+    """Replay ready to run: its request, the planned run, the inputs of each step, and a batch of this single run."""
 
     request: Replay
     run: Run
@@ -111,14 +111,14 @@ class _Planned:
     batch: Batch
 
     def kind(self) -> Hashable:
-        """Return what is equal for replays that run side by side: the program, the clock, and all inputs."""
+        """Return the key shared by replays that can run in one batch: program, clock and all inputs."""
         command = None if self.inputs.command is None else self.inputs.command.tobytes()
         parameters = tuple((path, series.tobytes()) for path, series in self.inputs.parameters.items())
         return self.batch.program, self.batch.clock, command, parameters
 
 
 def _replayed(planned: _Planned, rows: Mapping[str, int], record: Floats, ends: Floats) -> Replayed | SimulationError:
-    """Return one replay from its record (records, rows) and its last state (rows,); the error where it diverged."""
+    """Return one replay from its record (records, rows) and final state (rows,), or SimulationError if it diverged."""
     request, run = planned.request, planned.run
     failure_time = float(ends[rows["result.failure_time"]])
     if failure_time < NEVER_FAILED or not np.isfinite(record).all():
@@ -134,16 +134,16 @@ def _replayed(planned: _Planned, rows: Mapping[str, int], record: Floats, ends: 
 
 
 def followed_channels(measured: MeasuredRecording, motion: Motion) -> tuple[str, ...]:
-    """Return the channels that a replay follows; the torque on a prescribed vane is what moves it, not an input."""
+    """Return the channels used as inputs; external torque is an input only of a free vane."""
     followed = [name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if measured.has(name)]
     followed += [EXTERNAL_TORQUE] if measured.has(EXTERNAL_TORQUE) and motion == "free" else []
     return (COMMAND, *followed, *([ANGLE] if motion == "measured" else []))
 
 
 def replayed_scenario(request: Replay) -> Scenario:
-    """Return the run of a recording: of a vane that is unconstrained, locked or on a leg.
+    """Return the scenario that replays a recording with a free or locked vane, or a vane on a leg.
 
-    A recorded angle is prescribed only once the run is planned.
+    A measured angle is prescribed later, when the run is planned.
     """
     recording, start = request.measured.recording, request.start
     motion: FreeMotion | PrescribedMotion | None = None
@@ -159,7 +159,7 @@ def replayed_scenario(request: Replay) -> Scenario:
 
 
 def _plan(request: Replay) -> Run:
-    """Return the run of a replay: whole samples long, in steps fine enough for a prescribed angle too."""
+    """Return the run of a replay: a whole number of samples long, with the measured angle prescribed if requested."""
     scenario = replayed_scenario(request)
     run = plan_run(scenario)
     if run.step_count > MAXIMUM_STEPS:
@@ -179,7 +179,7 @@ def _plan(request: Replay) -> Run:
 
 
 def _recording(measured: MeasuredRecording, run: Run, rows: Mapping[str, int], record: Floats) -> Recording:
-    """Return a record of states as channels, on the clock of the recording that was replayed."""
+    """Return the recorded states as channels, with times on the clock of the replayed recording."""
     angle = record[:, rows["state.angle"]]
     mass_1, mass_2 = record[:, rows["state.mass_1"]], record[:, rows["state.mass_2"]]
     pressure_1, pressure_2 = pressures_of(run.program.actuator, run.plant, angle, mass_1, mass_2)

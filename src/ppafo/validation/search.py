@@ -1,7 +1,8 @@
-"""The search for a cause: what changes leave of recordings, the size that leaves least, and what one leaves to others.
+"""Search for a cause: residuals under changes of the model, best magnitude of each change, and combined changes.
 
-G = sum over channels of n [ln max(MS0/s^2, 1) - ln max(MSc/s^2, 1)] - k ln N, with MS the mean square left without and
-with a change, s the noise of the n samples, N the number of all and k = 1 for a change with a size.
+G = sum over channels of n [ln max(MS0/s^2, 1) - ln max(MSc/s^2, 1)] - k ln N, with MS0 and MSc the mean squared
+residuals without and with a change, s the noise of the n samples of a channel, N the number of all samples, and k = 1
+for a change with a fitted magnitude, else 0.
 """
 
 import math
@@ -27,21 +28,21 @@ from ppafo.validation.record import ONLY_NOISE, STEPS, Left, Record, at_rate, le
 from ppafo.validation.replay import Replay, Replayed, replay_together, replayed_scenario
 
 _TOGETHER = 32
-"""Changes that are replayed at once, so that progress can be shown and memory stays small."""
+"""Number of changes replayed in one batch; limits memory and lets progress be shown."""
 _DIFFERENCE = 0.02
-"""Fraction of the distance between two sizes of a grid over which a derivative is taken."""
+"""Step of a finite difference as a fraction of the distance between two trial magnitudes [-]."""
 _SMALL = 0.1
-"""Size over the smallest of its grid by which a second change is tried beside a first."""
+"""Trial magnitude of a second change as a fraction of the smallest magnitude on its grid [-]."""
 _PARTING = 1.0e-4
-"""Fraction of a squared slope that must lie across the first's, for a second change to be another one."""
+"""Least fraction of a squared slope that is orthogonal to the first change, for a second change to be distinct [-]."""
 _UNUSUAL = 0.01
-"""Chance [-] below which errors of sensors are together more than any bench has."""
+"""Probability [-] below which several usual sensor errors together are unusual."""
 _SMALLEST = 1.0e-300
 """Lower bound of a sum of squares used as a divisor."""
 
 
 class SizedCause(NamedTuple):
-    """A candidate at the size that leaves least, as it was sought, and by how much G [-] it explains more than none."""
+    """Candidate cause at its best magnitude (for ratios, its logarithm), with its residuals and gain G [-]."""
 
     candidate: CandidateCause
     size: float
@@ -50,34 +51,34 @@ class SizedCause(NamedTuple):
 
     @property
     def change(self) -> ModelChange:
-        """The change of this size."""
+        """Change of the model at this magnitude."""
         return self.candidate.at(self.size)
 
     @property
     def is_inside(self) -> bool:
-        """True for a size that is not at an end of its grid, beyond which a better one may lie."""
+        """True if the magnitude is not at an end of its grid, beyond which a better one may lie."""
         return min(self.candidate.grid) < self.size < max(self.candidate.grid)
 
     @property
     def is_usual(self) -> bool:
-        """True for an error that sensors of any bench have."""
+        """True if the magnitude is within the usual error of sensors."""
         return self.candidate.is_usual or 0.0 < abs(self.size) <= self.candidate.usual
 
     @property
     def explains(self) -> bool:
-        """True where nothing but noise is left in any channel."""
+        """True if the residuals of every channel are noise and G is positive."""
         return self.left.is_noise and self.gain > 0.0
 
 
 class Slope(NamedTuple):
-    """Derivative of the errors over noise (all samples,) by the size of a candidate."""
+    """Derivative of all errors divided by noise (all samples,) with respect to the magnitude of a candidate."""
 
     candidate: CandidateCause
     errors: Floats
 
 
 class _Sized(NamedTuple):
-    """A candidate with a size, as it is sought, and the errors (all samples,) that this size adds for each of 1."""
+    """Candidate cause at a magnitude, with the derivative of all errors (all samples,) by this magnitude."""
 
     candidate: CandidateCause
     size: float
@@ -85,13 +86,13 @@ class _Sized(NamedTuple):
 
     @property
     def change(self) -> ModelChange:
-        """The change of this size."""
+        """Change of the model at this magnitude."""
         return self.candidate.at(self.size)
 
 
 @dataclass(frozen=True, slots=True)
 class CauseSearch:
-    """Recordings of one device on which changes are tried; ``report`` hears how far a long trial is."""
+    """Recordings of one device on which changes are tried; ``report`` receives the progress of long searches."""
 
     device: Device
     settings: ReplaySettings
@@ -100,11 +101,11 @@ class CauseSearch:
 
     @property
     def penalty(self) -> float:
-        """The logarithm of the number of samples: what a size must explain more, and what two causes may differ by."""
+        """Logarithm of the number of samples: cost of a fitted magnitude, and least G that separates two causes."""
         return math.log(sum(record.values.size for record in self.records))
 
     def evaluated(self, changes: Sequence[ModelChange]) -> list[Left | None]:
-        """Return what each change leaves; None for one of a device that cannot have made such a recording."""
+        """Return the residuals under each change; None if the changed device could not have produced the recordings."""
         left: list[Left | None] = []
         for first in range(0, len(changes), _TOGETHER):
             self.report(Progress("searching for causes", first, len(changes), noun="changes"))
@@ -126,7 +127,7 @@ class CauseSearch:
         return left
 
     def _request(self, record: Record, change: ModelChange) -> Replay | None:
-        """Return the replay of what the sensors saw, on the device with the numbers of a change; None for no device."""
+        """Return the replay of the corrected recording on the changed device; None if the device is invalid."""
         recording, settings = record.measured.recording, self.settings
         for name, sensor in change.sensors.items():
             if name in recording:
@@ -154,9 +155,10 @@ class CauseSearch:
         return replace(request, device=device)
 
     def compared(self, candidates: Sequence[CandidateCause], none: Left) -> list[SizedCause]:
-        """Return the candidates at the sizes that leave least: the best of a grid, then two Gauss-Newton steps.
+        """Return each candidate at its best magnitude: the best of a grid, refined by two Gauss-Newton steps.
 
-        ``none`` is what is left without any. A size at an end of its grid is refused.
+        ``none`` are the residuals without a change. Candidates whose best magnitude is at an end of the grid are
+        rejected.
         """
         best: dict[str, SizedCause] = {}
         trials = [(candidate, size) for candidate in candidates for size in candidate.grid]
@@ -175,12 +177,12 @@ class CauseSearch:
         return [tried for tried in best.values() if tried.is_inside or not tried.candidate.has_size]
 
     def _gain(self, left: Left, none: Left) -> float:
-        """Return by how much more than none a change explains, before its size is paid for."""
+        """Return the gain G [-] of a change without the penalty for its fitted magnitude."""
         counts = np.concatenate([np.full(len(record.channels), record.values.shape[1]) for record in self.records])
         return float(counts @ (np.log(np.maximum(none.squares, 1.0)) - np.log(np.maximum(left.squares, 1.0))))
 
     def _improved(self, tried: Sequence[SizedCause]) -> list[tuple[CandidateCause, float]]:
-        """Return the size of each candidate after a Gauss-Newton step, no further than its neighbours in the grid."""
+        """Return the magnitude of each candidate after a Gauss-Newton step, limited to the neighbouring grid points."""
         ends = []
         for each in tried:
             grid = sorted(each.candidate.grid)
@@ -197,7 +199,7 @@ class CauseSearch:
         return improved
 
     def slopes(self, change: ModelChange, left: Left, candidates: Sequence[CandidateCause]) -> list[Slope]:
-        """Return how the errors that a change leaves grow with the size of each of some candidates beside it."""
+        """Return the derivatives of the errors under a change by the magnitude of each further candidate."""
         # A delay of all sensors is free already, unless the change has one itself.
         is_free = self.settings.longest_delay > 0.0 and not change.has_delay
         candidates = [each for each in candidates if not (is_free and each.at(each.grid[0]).has_delay)]
@@ -210,11 +212,11 @@ class CauseSearch:
         ]
 
     def together(self, usual: Sequence[CandidateCause], none: Left) -> list[CandidateCause]:
-        """Return the likeliest usual errors of all sensors as one change; none where together they are unusual.
+        """Return the likeliest usual errors of all sensors as one change; an empty list if together they are unusual.
 
-        Each error is one of one sensor, for what groups have together would add to it beyond its limit. In each channel
-        the sum of what they explain is one number, whose square over its variance is chi-square: as many errors at
-        their limits at once, all one way, are one that is beyond its own.
+        Only errors of single sensors are used; errors of groups would add to them beyond their limits. In each channel
+        the sum of the explained errors, squared and divided by its variance, is chi-square distributed; many errors at
+        their limits with the same sign are as unlikely as one error beyond its limit.
         """
         slopes = self.slopes(ModelChange(), none, [candidate for candidate in usual if candidate.is_of_bench])
         if not slopes:
@@ -232,9 +234,10 @@ class CauseSearch:
         return [CandidateCause("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
 
     def beside_usual(self, slopes: Sequence[Slope], none: Left, known: Collection[str]) -> list[SizedCause]:
-        """Return the changes larger than on any bench that explain recordings beside what any bench has, at no cost.
+        """Return unusually large changes that explain the recordings in combination with usual sensor errors.
 
-        Their sizes are those of straight lines; a run says whether they explain. Names in ``known`` are left out.
+        Magnitudes come from a linear fit, and a replay verifies each. Usual errors cost no penalty. Names in ``known``
+        are left out.
         """
         usual = [slope for slope in slopes if slope.candidate.is_of_bench]
         sized, changes = list[_Sized](), list[ModelChange]()
@@ -261,11 +264,12 @@ class CauseSearch:
         return [each for each in tried if each.explains and each.is_inside]
 
     def needs_another(self, first: SizedCause, slopes: Sequence[Slope]) -> bool:
-        """Return whether a second change, larger than on any bench, explains what a first leaves.
+        """Return whether a second, unusually large change is needed to explain the residuals left by the first.
 
-        To first order in both sizes. As two causes are told apart, its G must be larger by ln N; its size costs as much
-        and the choice among p candidates 2 ln p (extended BIC, Chen and Chen 2008). What both leave over the noise is
-        correlation, for which a square counts less. What the engine may be off needs no cause.
+        The test is linear in both magnitudes. The squared error explained by the second change must exceed 2 (ln N + ln
+        p) m^2 + e^2, with N samples, p candidates (extended BIC, Chen and Chen 2008), m >= 1 the mean square of the
+        errors that remain [-], above 1 for correlated noise, and e^2 the squared integration error of the engine. The
+        penalty has ln N for the fitted magnitude and ln N to separate two causes.
         """
         if not slopes:
             return False
@@ -293,10 +297,10 @@ class CauseSearch:
 
 
 def _bounded(slopes: Sequence[Slope], errors: Floats) -> list[_Sized]:
-    """Return candidates with the likeliest sizes, no larger than usual, beside errors on straight lines.
+    """Return each candidate with its most likely magnitude within its usual limit, from a linear fit of the errors.
 
-    Usual sizes are known as limits are, so that one of which the errors say nothing stays small. One whose usual size
-    is infinite has no bound.
+    Each usual limit acts as a prior, so that a magnitude on which the errors carry no information stays small. A
+    candidate with an infinite usual magnitude is not bounded.
     """
     # In units of its limit, or of its slope, each has one size, whatever its own unit is.
     scales = np.array(

@@ -1,6 +1,6 @@
-"""Settings of a walk that contradict each other: refused before the run, in one line that names both.
+"""Contradictory settings of a walk, reported before the run in a single line that names both settings.
 
-Any number may be an array (runs,), one for each run of an ensemble.
+Any number may be an array (runs,), with a value for each run of an ensemble.
 """
 
 import math
@@ -33,9 +33,10 @@ _IN_FILES = {"m": "m"}
 
 @dataclass(frozen=True, slots=True)
 class _Pair:
-    """Two numbers of a walk: the one at ``path`` must be below, above, at most or at least the ``other``.
+    """Required relation between two numbers of a walk: number at ``path`` below, above, at most or at least ``other``.
 
-    ``unit`` is the SI unit of both, ``words`` what is wrong where the bare relation would not say it.
+    ``unit`` is the SI unit of both, ``words`` the explanation in the message, empty if the relation is explanation
+    enough.
     """
 
     path: str
@@ -75,7 +76,10 @@ _BEYOND_STOP = math.radians(5.0)
 
 
 class _Contradiction(NamedTuple):
-    """Path of a number, whether it contradicts another one, in all runs or in each (runs,), and the reason in a run."""
+    """Check of one number of a walk: path, result (True if it contradicts another number), and message by run.
+
+    The result is one value for all runs, or an array (runs,).
+    """
 
     path: str
     is_bad: Any
@@ -83,7 +87,7 @@ class _Contradiction(NamedTuple):
 
 
 def check_walk(scenario: Scenario, reading: DocumentReader) -> None:
-    """Raise ScenarioError with the first contradiction; ``reading`` says how a value was given."""
+    """Raise ScenarioError for the first contradiction; ``reading`` provides each value as the user wrote it."""
     for path, is_bad, reason in _contradictions(scenario):
         if is_bad:
             if path in _OF_DEVICE:
@@ -107,7 +111,10 @@ def check_walk(scenario: Scenario, reading: DocumentReader) -> None:
 
 
 def contradictory_numbers(scenario: Scenario) -> tuple[Problem, ...]:
-    """Contradictions in the runs of an ensemble. ScenarioError for a walk on a bottle, which cannot vary."""
+    """Return the contradictions in the runs of an ensemble.
+
+    Raises ScenarioError for a walk on a bottle, which cannot be part of an ensemble.
+    """
     check_no_bottle(scenario)
     return tuple(
         (np.atleast_1d(is_bad), lambda run, path=path, reason=reason: f"{path}: {reason(run)}")
@@ -116,7 +123,7 @@ def contradictory_numbers(scenario: Scenario) -> tuple[Problem, ...]:
 
 
 def check_no_bottle(scenario: Scenario) -> None:
-    """Raise ScenarioError for a walk on a bottle, which only ``walk`` takes."""
+    """Raise ScenarioError if the walk is on a bottle, which is supported by ``ppafo walk`` alone."""
     if walk_of(scenario).bottle is not None:
         raise ScenarioError(
             f"{scenario.name}: a walk on a bottle goes by 'ppafo walk' alone, as bottle and device are advanced in "
@@ -125,7 +132,7 @@ def check_no_bottle(scenario: Scenario) -> None:
 
 
 def _contradictions(scenario: Scenario) -> Iterator[_Contradiction]:
-    """Yield every pair of numbers that could contradict each other, with whether they do."""
+    """Yield the check of every pair of numbers that could contradict each other, with its result."""
     yield from _of_stops(scenario)
     wearer = walk_of(scenario).wearer
     numbers = {f"controller.{name}": number for name, number in scenario.controller.settings.items()}
@@ -169,7 +176,7 @@ def _contradictions(scenario: Scenario) -> Iterator[_Contradiction]:
 
 
 def _of_stops(scenario: Scenario) -> Iterator[_Contradiction]:
-    """Yield the ankle angles of the gait against the stops of the device."""
+    """Yield the checks of the gait's ankle angles against the end stops of the device."""
     gait, actuator = walk_of(scenario).gait, scenario.device.actuator
     angles = gait.ankle_angle.values_at(_PHASES)
     low, high = float(np.min(angles)), float(np.max(angles))
@@ -188,7 +195,7 @@ def _of_stops(scenario: Scenario) -> Iterator[_Contradiction]:
 
 
 def _of_times(scenario: Scenario) -> Iterator[_Contradiction]:
-    """Yield the times of a controller against those of the gait, the valve and its own samples."""
+    """Yield the checks of a controller's times against gait, valve dead time and sample period."""
     settings, period = scenario.controller.settings, scenario.controller.period
     stride, first_stride = walk_of(scenario).gait.stride_time, settings["first_stride_time"]
     yield _Contradiction(
@@ -214,7 +221,7 @@ def _of_times(scenario: Scenario) -> Iterator[_Contradiction]:
 
 
 def _of_swing(scenario: Scenario) -> Iterator[_Contradiction]:
-    """Yield the angle of the swing against what sensor and device reach, and a gait without a force to see."""
+    """Yield the checks of the swing angle against sensor and device range, and of the presence of a vertical force."""
     settings, actuator = scenario.controller.settings, scenario.device.actuator
     lowest = larger(settings["lowest_angle"], actuator.angle_min)
     highest = smaller(settings["highest_angle"], actuator.angle_max)
@@ -237,7 +244,7 @@ def _of_swing(scenario: Scenario) -> Iterator[_Contradiction]:
 
 
 def _of_pressures(scenario: Scenario) -> Iterator[_Contradiction]:
-    """Yield the pressures of a controller against the atmosphere, the supply and what a moving foot makes of it."""
+    """Yield the checks of a controller's pressures against atmosphere, supply and compression by a moving foot."""
     settings, supply = scenario.controller.settings, scenario.device.supply
     atmosphere, filled = supply.atmospheric_pressure, settings["filled_pressure"]
     lower_supply = smaller(supply.pressure, supply.dorsiflexion_pressure)
@@ -263,5 +270,5 @@ def _of_pressures(scenario: Scenario) -> Iterator[_Contradiction]:
 
 
 def _text(number: Any, run: int, unit: str) -> str:
-    """Return the number of a run, one for all or (runs,), with its SI unit as a message shows it."""
+    """Return a number with its SI unit as text for a message; ``number`` is a scalar or an array (runs,)."""
     return shown_text(at(number, run), unit, unit=_IN_FILES.get(unit, "")) if unit else f"{at(number, run):g}"

@@ -1,4 +1,4 @@
-"""Every value that the file of a walk can hold beside its device, and the layout of that file."""
+"""Declarations of all values that a walk file may contain besides those of the device, and the layout of the file."""
 
 import functools
 from collections.abc import Iterable, Mapping
@@ -79,7 +79,7 @@ FAULTY = tuple(_FAULTY)
 
 @dataclass(frozen=True, slots=True)
 class _SensorFault:
-    """Description of a sensor fault, and its numbers; a fault of the plant has both too."""
+    """Kind of sensor fault: summary and parameters; faults of the plant use the same class."""
 
     summary: str
     quantities: tuple[Quantity, ...]
@@ -117,12 +117,12 @@ FAULTS |= PLANT_FAULTS
 
 
 def fault_numbers(part: str, kind: str) -> tuple[Quantity, ...]:
-    """Return the numbers of a fault of a sensor or a part of the plant, none without a kind."""
+    """Return the parameters of a fault of a sensor or of a part of the plant; empty without a fault kind."""
     return FAULTS[part][kind].quantities if kind else ()
 
 
 def sections(controller: str, timing: str, gas: str) -> dict[str, tuple[Quantity, ...]]:
-    """Return the declarations of the numbers of any walk with these kinds, by section; an unknown kind has none."""
+    """Return the declarations of the numbers of a walk with these kinds, by section; empty for an unknown kind."""
     laws = walking_controllers()
     return {
         "wearer": (*WEARER, PERSON),
@@ -135,17 +135,20 @@ def sections(controller: str, timing: str, gas: str) -> dict[str, tuple[Quantity
 
 
 def by_path(declared: Mapping[str, Iterable[Quantity]]) -> dict[str, Quantity]:
-    """Return the declarations of numbers by section as declarations by path."""
+    """Return declarations grouped by section as a flat mapping, keyed by dotted path."""
     return {f"{section}.{quantity.name}": quantity for section, items in declared.items() for quantity in items}
 
 
 def timing_of(document: Mapping[str, Any]) -> str:
-    """Name of the estimator of the gait phase in a document."""
+    """Return the name of the gait phase estimator in a document."""
     return kind_at(document, "timing") or THRESHOLDS
 
 
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
-    """Load the controller that a document names, where another package has it; ScenarioError where that fails."""
+    """Load the plugin that defines the controller named in a document.
+
+    Raises ScenarioError if loading fails.
+    """
     motion = kind_at(document, "motion")
     _check_motion(motion, f"{file}: motion.kind = {quote(motion)}")
     with refused_as(ScenarioError, f"{file}: controller.kind", KindError):
@@ -153,7 +156,7 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
 
 
 def _check_motion(kind: object, place: str) -> None:
-    """Raise ScenarioError for a motion that is not known, or of a vane alone; ``place`` begins the message."""
+    """Raise ScenarioError for an unknown motion, or a motion without a leg; the message starts with ``place``."""
     if kind in VANE_MOTIONS:
         raise ScenarioError(
             f"{place}: a walk file needs the motion '{WALK}'; 'ppafo new scenario' writes a scenario file of the "
@@ -168,7 +171,7 @@ def _check_motion(kind: object, place: str) -> None:
 
 
 def _texts(_document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the paths of every text that a document can hold."""
+    """Return the paths of all text values that a document may contain."""
     kinds = (
         "controller.kind",
         "timing.kind",
@@ -179,7 +182,7 @@ def _texts(_document: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
-    """Return the declaration of every number that a document with its kinds can hold, by path."""
+    """Return the declaration of every number that a document with its kinds may contain, by path."""
     find_kinds(document, "the file of a walk")
     controller, gas = kind_at(document, "controller"), kind_at(document, "gas_model")
     declared = by_path(sections(controller, timing_of(document), gas) | {BOTTLE: BOTTLE_NUMBERS})
@@ -200,13 +203,13 @@ OF_A_WALK = DeclaredContent(
 
 
 def walk_file(document: Mapping[str, Any]) -> type[BaseModel]:
-    """Return the model of the file of a walk, for the controllers that are loaded."""
+    """Return the Pydantic model of a walk file, for the controllers that are loaded."""
     return _walk_file(tuple(walking_controllers().items()), (kind_at(document, "motion") or WALK,))
 
 
 @functools.lru_cache(maxsize=8)
 def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
-    """Return the layout of the file of a walk, of which ``motions`` are the kinds of motion."""
+    """Return the Pydantic model of a walk file; ``motions`` are the available kinds of motion."""
     sensors = quantity_fields(WALK_SENSORS)
     sensors["seed"] = (Annotated[int, Field(ge=0, le=LARGEST_SEED)], Field(1, description=SEED.summary))
     run = {"duration": optional(number_type(DURATION), DURATION.summary)} | quantity_fields((STEP,))
@@ -255,12 +258,12 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
 
 
 def _optional_numbers(quantities: Iterable[Quantity]) -> dict[str, Any]:
-    """Return fields of numbers that may be left out."""
+    """Return optional number fields for these quantities."""
     return {quantity.name: optional(number_type(quantity), quantity.summary) for quantity in quantities}
 
 
 def _faults_table() -> type[BaseModel]:
-    """Return the table of what fails: sensors, and parts of the plant."""
+    """Return the model of the section for faults of sensors and of parts of the plant."""
     faults = {}
     for part, kinds in FAULTS.items():
         tables = [

@@ -1,8 +1,8 @@
-"""A gait on a leg: harmonics and events for the engine, how the heel rolls, and where shank and foot are.
+"""Kinematics of a gait on a leg: harmonics and events for the engine, heel rocker, and positions of shank and foot.
 
-A gait file has angles only. The ankle's path follows from them: in stance the healthy foot rolls over heel and toes
-without sliding, in the swing the ankle goes over to the next foothold with the healthy toes above the ground. The same
-path carries the foot with and without the device; toes that come out below the ground would drag.
+A gait file contains angles only, and the path of the ankle is derived from them. In stance the healthy foot rolls over
+heel and toes without sliding; in swing the ankle moves to the next foothold with the healthy toes above the ground. The
+foot follows the same path with and without the device; toes computed below the ground would drag.
 """
 
 import math
@@ -68,19 +68,20 @@ SERIES = {
 
 
 def gait_series(gait: Gait) -> GaitSeries:
-    """The curves of a gait for the engine; a moment, force or knee motion that was not measured is 0."""
+    """Return the curves of a gait for the engine; a moment, force or knee motion that was not measured is 0."""
     return GaitSeries(**{field: series_of(gait, name) for field, name in SERIES.items()})
 
 
 def truncate(curve: GaitCurve) -> GaitCurve:
-    """The curve with its first eight harmonics, as the engine has it."""
+    """Return the curve with its first eight harmonics, as used by the engine."""
     return replace(curve, cosines=curve.cosines[:HARMONICS], sines=curve.sines[:HARMONICS])
 
 
 def landing_phase(gait: Gait) -> float:
-    """Phase [strides] at which the measured foot has come down: the first time within ``NEARLY_FLAT`` of flat.
+    """Return the phase [strides] at which the measured foot first comes within ``NEARLY_FLAT`` of the flat foot.
 
-    The last degrees come from heel pad and shoe, which the foot of the engine has not: it is flat at once.
+    The last degrees come from the compression of heel pad and shoe, which the engine does not model: its foot is flat
+    at once.
     """
     phases = np.linspace(0.0, FLAT_FROM, 151)
     down = foot_angles(gait, phases) < gait_timing(gait).ground_angle + NEARLY_FLAT
@@ -88,18 +89,21 @@ def landing_phase(gait: Gait) -> float:
 
 
 def foot_angles(gait: Gait, phases: Floats) -> Floats:
-    """Angles [rad] of the measured foot over the horizontal."""
+    """Return the angles [rad] of the measured foot from the horizontal at these phases [strides]."""
     shank, ankle = truncate(gait.shank_angle), truncate(gait.ankle_angle)
     return shank.values_at(phases) - ankle.values_at(phases) + 0.5 * math.pi
 
 
 def strike_angle(gait: Gait) -> float:
-    """Angle [rad] of the measured foot over the flat one at the heel strike."""
+    """Return the angle [rad] of the measured foot at heel strike, relative to the flat foot."""
     return float(foot_angles(gait, np.zeros(1))[0]) - gait_timing(gait).ground_angle
 
 
 def gait_timing(gait: Gait) -> GaitTiming:
-    """Frequency [Hz], events [strides] and the flat foot's angle [rad]; heel rise and angle come from the curves."""
+    """Return stride frequency [Hz], events [strides] and angle of the flat foot [rad].
+
+    Heel rise and angle of the flat foot are determined from the curves.
+    """
     foot = foot_angles(gait, EVENT_PHASES)
     events = gait_events(foot[None, :], np.array([gait.stance_share]))
     return GaitTiming(
@@ -108,9 +112,10 @@ def gait_timing(gait: Gait) -> GaitTiming:
 
 
 def gait_events(foot: Floats, stance_share: Floats) -> dict[str, Floats]:
-    """The fields (people,) of ``GaitTiming`` after ``start``, for feet that stand at angles [rad] (people, phases).
+    """Return the fields of ``GaitTiming`` that follow ``start``, each an array (people,).
 
-    ``foot`` is over the horizontal, at ``EVENT_PHASES``; ``stance_share`` is (people,).
+    ``foot`` (people, phases) holds the foot angles [rad] from the horizontal at ``EVENT_PHASES``, ``stance_share``
+    (people,) the fraction of the stride in stance [-].
     """
     flat = (EVENT_PHASES >= FLAT_FROM) & (EVENT_PHASES <= FLAT_TO)
     ground_angle = np.median(foot[:, flat], axis=1)
@@ -129,7 +134,7 @@ def gait_events(foot: Floats, stance_share: Floats) -> dict[str, Floats]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Posture:
-    """Joints in the plane [m], each (samples, 2), x forward and y up from the ground."""
+    """Positions of the joints in the sagittal plane [m], each (samples, 2): x forward, y up from the ground."""
 
     knee: Floats
     ankle: Floats
@@ -139,7 +144,11 @@ class Posture:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AnklePath:
-    """Path of the ankle [m] over the phases of one stride, and what it takes to place shank and foot on it."""
+    """Path of the ankle [m] over the phases of one stride, and the dimensions of shank and foot.
+
+    ``forward`` and ``up`` [m] are the path, ``stride_length`` is in [m], and ``ground_angle`` [rad] is the angle of the
+    flat foot. ``shank_length``, ``heel_lever``, ``toe_lever`` and ``height`` (of the ankle above the sole) are in [m].
+    """
 
     forward: Floats
     up: Floats
@@ -151,7 +160,7 @@ class AnklePath:
     height: float
 
     def posture(self, turns: Floats, shank: Floats, ankle: Floats) -> Posture:
-        """Joints at a running phase [strides], for shank and ankle angles [rad]."""
+        """Return the positions of the joints at a running phase [strides], for shank and ankle angles [rad]."""
         phase = turns % 1.0
         x = np.interp(phase, _GRID, self.forward) + self.stride_length * np.floor(turns)
         joint = np.stack([x, np.interp(phase, _GRID, self.up)], axis=1)
@@ -162,11 +171,11 @@ class AnklePath:
         )
 
     def toe_height(self, phase: Floats, shank: Floats, ankle: Floats) -> Floats:
-        """Toes over the ground [m] at phases from 0 to 1; below 0 they would drag."""
+        """Return the toe clearance above the ground [m] at phases from 0 to 1; negative if the toes would drag."""
         return np.asarray(np.interp(phase % 1.0, _GRID, self.up) + self.toes_over_ankle(shank, ankle))
 
     def toes_over_ankle(self, shank: Floats, ankle: Floats) -> Floats:
-        """Height of the toes over the ankle [m], below 0 with a flat foot."""
+        """Return the height of the toes relative to the ankle [m], negative for a flat foot."""
         tilt = shank - ankle + 0.5 * np.pi - self.ground_angle
         return np.asarray(self.toe_lever * np.sin(tilt) - self.height * np.cos(tilt))
 
@@ -176,7 +185,7 @@ class AnklePath:
 
 
 def ankle_path(gait: Gait, timing: GaitTiming, wearer: Wearer) -> AnklePath:
-    """The path of the ankle [m] over one stride of a gait, for the segments of a wearer."""
+    """Return the path of the ankle over one stride of a gait, for the segment lengths of a wearer."""
     height = ANKLE_HEIGHT_FRACTION * wearer.shank_length
     foot = foot_angles(gait, _GRID) - timing.ground_angle
     toes_down = height * np.cos(foot) - wearer.toe_lever * np.sin(foot)
@@ -203,7 +212,7 @@ def ankle_path(gait: Gait, timing: GaitTiming, wearer: Wearer) -> AnklePath:
 
 
 def heel_rocker(gait: Gait, wearer: Wearer) -> HeelRocker:
-    """The lever over the tilt of the foot, as fitted to the gait and bounded by the heel of a wearer."""
+    """Return the heel rocker fitted to a gait, bounded by the heel lever of the wearer."""
     return over_runs(rocker_on_heel, *fit_rocker(gait), wearer.heel_lever)
 
 

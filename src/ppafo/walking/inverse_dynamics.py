@@ -1,4 +1,4 @@
-"""Inverse dynamics of a recorded walk: knee torque in the swing, moment of the wearer's dorsiflexors."""
+"""Inverse dynamics of a recorded walk: knee torque in swing, and moment of the wearer's dorsiflexors."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,10 +11,10 @@ from ppafo.model.leg import LegParameters, centrifugal_torques, gravity_torques,
 
 
 def dorsiflexor_moment(leg: LegParameters, record: Mapping[str, Any]) -> Floats:
-    """Moment [N m] of the wearer's dorsiflexors, 0 or more, that keeps the measured ankle angle.
+    """Return the dorsiflexor moment [N m], at least 0, with which the wearer follows the measured ankle angle.
 
-    Ankle moment of the gait (on the ground measured, in the swing by equation (11)) less passive tissue and T_ex. The
-    literature reports the activity of the tibialis anterior instead.
+    The moment is the ankle moment of the gait (measured in stance, from equation (11) in swing) minus the moment of
+    passive tissue and T_ex. The literature reports the activity of the tibialis anterior instead.
     """
     in_swing = record["walk.contact"] == SWING
     needed = np.where(in_swing, record["walk.now.healthy_torque"], record["walk.now.moment"])
@@ -23,9 +23,9 @@ def dorsiflexor_moment(leg: LegParameters, record: Mapping[str, Any]) -> Floats:
 
 
 def swing_knee_torque(leg: LegParameters, time: Floats, record: Mapping[str, Any]) -> Floats:
-    """Knee torque T_1 of equation (11) [N m] that moves shank and foot as prescribed in the swing; 0 on the ground.
+    """Return the knee torque T_1 [N m] of equation (11) for the prescribed swing of shank and foot; 0 in stance.
 
-    On the ground it depends on the horizontal ground reaction, which a gait file does not have.
+    In stance the torque depends on the horizontal ground reaction, which a gait file does not contain.
     """
     theta, phi = record["state.angle"], record["walk.now.shank"]
     alpha = phi - theta + 0.5 * np.pi

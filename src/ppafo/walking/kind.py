@@ -1,4 +1,4 @@
-"""The walk along a prescribed gait as a kind of motion: shank and loaded foot are led, whatever the device does."""
+"""Motion kind of a walk along a prescribed gait: shank and loaded foot follow the gait, whatever the device does."""
 
 import shlex
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from ppafo.walking import contradictions, motion, planning, result
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkKind:
-    """Motion along a gait: each of its functions is the one of ``walking`` with the same meaning."""
+    """Motion along a prescribed gait; each method delegates to the function of ``walking`` for the same purpose."""
 
     name: str
     section: ClassVar[None] = None
@@ -35,23 +35,23 @@ class WalkKind:
     measured = staticmethod(result.measured)
 
     def sees(self, _scenario: Scenario) -> LawSignals:
-        """Signals of the torque that the controller sees."""
+        """Return the torque signals that the controller receives."""
         return IN_WALK
 
     def follows_reference(self, _scenario: Scenario) -> bool:
-        """False: the controller makes its own reference in each phase of the gait."""
+        """Return False: the controller generates its own reference in each phase of the gait."""
         return False
 
     def asks_gradually(self, law: ControllerKind) -> bool:
-        """True where a law asks for openings between shut and open to follow the torque that it requests."""
+        """Return True if a control law requests partial valve openings to track its torque request."""
         return planning.requests_torque(law) and not law.only_switches
 
     def python_call(self, name: str, overrides: str) -> str:
-        """Return the call of Python that shows a walk of a name with overrides, which are quoted texts."""
+        """Return the Python call that simulates the named walk with overrides, given as quoted texts."""
         return f"ppafo.walk({name!r}, overrides=[{overrides}])"
 
     def further_command(self, file: str) -> str:
-        """Return the command that compares the walk of a file with others, in one line."""
+        """Return the one-line command that compares the walk in a file with others."""
         return f"'ppafo walk {shlex.quote(file)}' compares it with no device and with a healthy ankle"
 
 

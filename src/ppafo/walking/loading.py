@@ -1,4 +1,4 @@
-"""Loading of a walk's scenario by name or file; every mistake is one clear line."""
+"""Loading of a walk scenario by name or file; every mistake is reported in a single line."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -91,7 +91,7 @@ _TURN = 2.0 * math.pi
 
 
 def list_walks() -> tuple[str, ...]:
-    """Return the names of the walk configurations that come with the package.
+    """Return the names of the walk configurations included in the package.
 
     >>> import ppafo
     >>> ppafo.list_walks()[:3]
@@ -101,7 +101,7 @@ def list_walks() -> tuple[str, ...]:
 
 
 def check_duration_once(overrides: Iterable[str], minutes: float | None) -> None:
-    """Raise ScenarioError for a duration that an override sets beside ``minutes``."""
+    """Raise ScenarioError if an override sets the duration in addition to the argument ``minutes``."""
     if minutes is not None and any(
         override.typed == "run.duration" for override in read_overrides(overrides, ScenarioError)
     ):
@@ -167,10 +167,11 @@ def load_walk(
 
 
 def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable[str] = ()) -> Scenario:
-    """Return the same walk on a bottle, by name or file, or on its own where None is given.
+    """Return the walk on another bottle, given by name or file; None keeps the walk's own bottle.
 
-    ``overrides`` are values of the bottle, ``room.temperature=5 degC``. ScenarioError or ParameterError for what does
-    not go with a bottle, and where the walk is no longer what its file and overrides say.
+    ``overrides`` are values of the bottle, such as ``room.temperature=5 degC``. Raises ScenarioError or ParameterError
+    if the walk cannot be combined with the bottle, and ScenarioError if the walk no longer matches its file and
+    overrides.
     """
     as_given = replace(request_again(scenario.origin), file=scenario.name)
     if _without_bottle(scenario_of(as_given, WALKING)) != _without_bottle(scenario):
@@ -192,15 +193,15 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
 
 
 def _without_bottle(scenario: Scenario) -> tuple[Any, ...]:
-    """Parts of a walk that are the same on another bottle: all but its length and the bottle."""
+    """Return all parts of a walk that do not depend on its bottle; the duration is left out too."""
     hardware = scenario.device, scenario.supply_lines, scenario.gas_model, scenario.sensors, scenario.controller
     return *hardware, scenario.run.step, replace(walk_of(scenario), bottle=None)
 
 
 def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
-    """Return the walk of a document that has the right keys.
+    """Return the walk described by a document whose keys have been validated.
 
-    ScenarioError, ParameterError or DataError for the first value that cannot be used.
+    Raises ScenarioError, ParameterError or DataError for the first value that cannot be used.
     """
     document = changed.document
     if BOTTLE_NAME in request.instead:
@@ -257,7 +258,7 @@ def _motion(
     bottle: BottleSupply | None,
     sensors: Mapping[str, float],
 ) -> WalkMotion:
-    """Return the wearer, the gait or task sequence, and what fails; ``sensors`` are the settings [SI] of sensors."""
+    """Return the motion of a walk: wearer, gait, tasks, faults, bottle; ``sensors`` are the sensor settings [SI]."""
     sequence_file = _named_file("task_sequence", request, reading.document)
     with _named_by("task_sequence", reading, request, ScenarioError):
         sequence = None if sequence_file is None else load_task_sequence(sequence_file)
@@ -294,7 +295,7 @@ def _motion(
 
 
 def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]) -> str | None:
-    """Return the name or file of a gait or a task sequence; a path in the document begins in its folder."""
+    """Return the name or file of a gait or task sequence; a relative path is resolved in the folder of the document."""
     if path in request.instead:
         return request.instead[path]
     name = document.get(path)
@@ -306,9 +307,9 @@ def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]
 def _named_by(
     path: str, reading: DocumentReader, request: ScenarioRequest, kind: type[PpafoError]
 ) -> AbstractContextManager[None]:
-    """Context in which errors about a file that a walk names begin with its key at ``path``.
+    """Context manager that prefixes errors about a referenced file with the key at ``path``.
 
-    A file that an option names is in the error already.
+    For a file given as an option, the message is left unchanged, because it names the file already.
     """
     is_of_walk = path not in request.instead and path in reading.document
     return refused_as(kind, reading.quote(path), kind) if is_of_walk else nullcontext()
@@ -317,9 +318,9 @@ def _named_by(
 def _control(
     reading: DocumentReader, device: Device, lines: SupplyLines | None, sensors: Mapping[str, float]
 ) -> tuple[Control, Graph]:
-    """Return the controller with its settings and its estimator's [SI], and which of them follow other numbers.
+    """Return the controller with its settings and those of the phase estimator [SI], and the links between the numbers.
 
-    What the file does not give may follow valve, device, lines and sensors.
+    Defaults may depend on valve, device, supply lines and sensors; each such dependence is a link.
     """
     kind = kind_at(reading.document, "controller")
     law = walking_controllers()[kind]
@@ -352,13 +353,13 @@ def _control(
 
 
 def _fault(reading: DocumentReader, part: str) -> FaultSettings:
-    """Return the fault of a sensor or a part of the plant; without a kind where it is sound."""
+    """Return the fault of a sensor or of a part of the plant; its kind is empty if the part is sound."""
     kind = kind_at(reading.document, f"faults.{part}")
     return FaultSettings(kind, reading.section(f"faults.{part}", fault_numbers(part, kind)))
 
 
 def _assumed(reading: DocumentReader, bottle: BottleSupply | None) -> tuple[Assumption, ...]:
-    """Assumptions of a walk: of its file, its lines and its bottle."""
+    """Return the assumptions of a walk: from its file, its supply lines and its bottle."""
     own = reading.document.get("assumed", {}) | ({} if bottle is None else bottle.assumed)
     values = ((path, value_at(reading.document, path), note) for path, note in own.items())
     assumed = {path: Assumption(path, "" if value is None else str(value), note) for path, value, note in values}
@@ -370,7 +371,7 @@ def _assumed(reading: DocumentReader, bottle: BottleSupply | None) -> tuple[Assu
 
 
 def _duration(reading: DocumentReader, scenario: Scenario) -> float:
-    """Return the length of a walk [s]: its file's, else its task sequence's, else a minute, or ten on a bottle."""
+    """Return the duration of a walk [s] from its file, else of its task sequence, else 60 s, or 600 s on a bottle."""
     motion = walk_of(scenario)
     if value_at(reading.document, "run.duration") is not None:
         duration = reading.number("run.duration", DURATION)
@@ -389,5 +390,5 @@ WALKING = Layout(FILE, OF_A_WALK, walk_file, walk_file, build_walk)
 
 
 def lag_of_bandwidth(bandwidth: float) -> float:
-    """Time constant [s] of a sensor of a bandwidth [Hz]; 0 for one that follows at once, whose bandwidth is 0."""
+    """Return the time constant [s] of a sensor with a bandwidth [Hz]; a bandwidth of 0 means no lag and returns 0."""
     return 1.0 / (_TURN * bandwidth) if bandwidth > 0.0 else 0.0

@@ -1,6 +1,6 @@
-"""The motion of a walk: who walks how, with which sensors, as frozen values in SI units. It makes a scenario a walk.
+"""Motion of a walk: wearer, gait, sensors and faults as frozen values in SI units; it makes a scenario a walk.
 
-What may vary in it stands below: its numbers by path, and its times, one by one or as columns of an ensemble.
+The functions below declare the values that may vary: numbers by path, and times as scalars or as arrays of an ensemble.
 """
 
 from collections.abc import Mapping
@@ -35,15 +35,14 @@ from ppafo.walking.wearer import WEARER, Wearer, who_walks
 
 @dataclass(frozen=True, slots=True)
 class WalkMotion:
-    """The device on a leg whose shank and loaded foot a gait leads, while it moves the free foot.
+    """Walk of a wearer with the device; the gait prescribes shank and loaded foot, the device moves the free foot.
 
-    ``timing`` is how the controller estimates the gait phase, ``forces`` are the settings [SI] of sensors that no
-    vane has, by name, and ``faults`` those that fail, by sensor; ``broken`` are parts of the plant that fail, and
-    ``shut_off`` is the valve of the safe state, {} where none is fitted. ``task_sequence`` is what the wearer does
-    one after the other, None where stride follows equal stride; ``bottle`` the one that the device hangs on, None where
-    its supply does not end. ``wearer_origin`` says in words whose body mass it is. ``person`` is the number of the
-    person of the population who walks, 0 for the wearer with the gait as it is, or a ``Person`` who is drawn already.
-    It, and numbers of wearer, ``forces`` and ``faults``, may be arrays (runs,).
+    ``timing`` is the name of the gait phase estimator. ``forces`` holds the settings [SI] of the force sensors by name,
+    ``faults`` the sensor faults by sensor, ``broken`` the faults of the plant by part, and ``shut_off`` the settings of
+    the shut-off valve, {} without one. ``task_sequence`` is None for equal strides, ``bottle`` is None for an unlimited
+    supply. ``wearer_origin`` describes the origin of the body mass. ``person`` is the number of the person of the
+    population, 0 for the wearer with the unchanged gait, or a ``Person`` drawn before. ``person`` and the numbers of
+    wearer, ``forces`` and ``faults`` may be arrays (runs,).
     """
 
     motion_kind: MotionKind[Scenario] = field(compare=False)
@@ -62,25 +61,25 @@ class WalkMotion:
 
     @property
     def stride_time(self) -> float:
-        """Time of a stride of the gait [s]."""
+        """Stride time of the gait [s]."""
         return float(self.gait.stride_time)
 
     @property
     def label(self) -> str:
-        """The motion in a few words."""
+        """Short description of the motion."""
         along = "" if self.task_sequence is None else f", task sequence {self.task_sequence.name}"
         return f"a walk, gait {self.gait.name}{along}"
 
 
 def walk_of(scenario: Scenario) -> WalkMotion:
-    """Return the motion of a scenario that walks, which has gait, wearer and phases."""
+    """Return the motion of a walk scenario, with gait, wearer and phase estimator."""
     motion = scenario.motion
     assert isinstance(motion, WalkMotion), "only walks come here"
     return motion
 
 
 def person_remarks(scenario: Scenario) -> list[str]:
-    """Remarks on the wearer, and on an odd zero of the gait's ankle angle."""
+    """Return remarks on the wearer, and on an unusual zero of the gait's ankle angle."""
     motion = walk_of(scenario)
     remarks = [f"remark: {text}" for text in gait_file_remarks(motion.gait)]
     return [who_walks(motion.wearer, motion.gait, motion.wearer_origin), *remarks]
@@ -120,7 +119,7 @@ PLACES: Mapping[str, tuple[str, ...]] = {
 
 
 def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
-    """Return the declaration of every number of a walk beside its device's, by path."""
+    """Return the declarations of all numbers of a walk except those of the device, by path."""
     motion, control = walk_of(scenario), scenario.controller
     declared = sections(control.kind, motion.timing, "" if scenario.gas_model is None else THERMAL)
     # An object in charge has no settings, and a timing is one of a controller that has some.
@@ -132,18 +131,18 @@ def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
 
 
 def record_interval(seconds: float) -> float:
-    """Time [s] between two samples of the record of a walk of this length [s]; an hour of milliseconds does not fit."""
+    """Return the sample interval of the recording [s] for a walk of this duration [s]; it is longer for a long walk."""
     return 1.0e-3 if seconds <= 61.0 else (5.0e-3 if seconds <= 601.0 else 2.0e-2)
 
 
 def with_duration(scenario: Scenario, seconds: float) -> Scenario:
-    """A walk of another length [s], recorded as often as that allows."""
+    """Return the walk with another duration [s] and the matching sample interval of the recording."""
     run = replace(scenario.run, duration=seconds, output_interval=record_interval(seconds))
     return replace(scenario, run=run)
 
 
 def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
-    """Faults of the duration of a walk [s], which may be an array (runs,)."""
+    """Return the problems of a walk's duration [s], which may be an array (runs,)."""
     # The controller learns over the first strides, and means leave them out: a walk needs more than these.
     has_task_sequence = walk_of(scenario).task_sequence is not None
     shortest = SHORTEST_TASK_SEQUENCE if has_task_sequence else SHORTEST_STRIDES * walk_of(scenario).gait.stride_time
@@ -161,7 +160,10 @@ def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
 
 
 def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[RunTimes, tuple[Problem, ...]]:
-    """The clock of a walk with other times [s] by path, which may be arrays (runs,), and what is wrong with it."""
+    """Return the clock of a walk with other times [s], given by path, and the problems of these times.
+
+    The times may be arrays (runs,).
+    """
     duration = times.get("run.duration", scenario.run.duration)
     period = times.get("controller.period", scenario.controller.period)
     # A rate is another word for the period, and stands in its place.

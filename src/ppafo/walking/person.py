@@ -1,8 +1,9 @@
 """Person of the population, by number: build, strides, and individual fitting of the controller.
 
-Number 0 is the wearer of the file with the gait as it is. Every other whole number draws a person as the wearers of
-``ppafo walk --wearers`` are drawn, so that a study may vary who walks as it varies any number. Gaits differ from one as
-much as its strides do: series coefficients, stride times and events.
+Number 0 is the wearer of the file with the gait unchanged. Any other whole number is the seed with which a person is
+drawn, by the same distributions as the wearers of ``ppafo walk --wearers``; a study can therefore vary the person like
+any other number. Gaits of persons vary as much as strides do between each other: in series coefficients, stride times
+and events.
 """
 
 from dataclasses import dataclass, replace
@@ -40,7 +41,7 @@ START_VARIATION = 0.03
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeriesOfMany:
-    """Coefficients of many curves: mean (people,), cosines and sines (people, 8)."""
+    """Fourier coefficients of a curve for many people: mean (people,), cosines and sines (people, 8)."""
 
     mean: Floats
     cosines: Floats
@@ -49,7 +50,7 @@ class SeriesOfMany:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VariedGaits:
-    """Series by field of ``GaitSeries``, and the timing (people,) by field of ``GaitTiming``."""
+    """Series and timing (people,) of many gaits, by field of ``GaitSeries`` and ``GaitTiming``; stride time [s]."""
 
     series: dict[str, SeriesOfMany]
     timing: dict[str, Floats]
@@ -57,10 +58,10 @@ class VariedGaits:
 
 
 def draw_gaits(gait: Gait, stature: Floats, generator: np.random.Generator) -> VariedGaits:
-    """Draw gaits for people whose stature is a multiple [-] (people,) of the first one's, who has the gait itself.
+    """Draw the gaits of many people; the first person has the given gait unchanged.
 
-    A curve that was not measured stays 0. The motion of the knee scales with stature and takes the person's stride
-    time, so its acceleration goes with stature over stride time squared.
+    ``stature`` (people,) is relative to the first person [-]. A curve that was not measured stays 0. The acceleration
+    of the knee scales with stature divided by stride time squared.
     """
     count = stature.size
     series = {field: _draw_series(gait.curves.get(name), count, generator) for field, name in SERIES.items()}
@@ -92,7 +93,7 @@ def _draw_series(curve: GaitCurve | None, count: int, generator: np.random.Gener
 
 
 def _events(shank: SeriesOfMany, ankle: SeriesOfMany, stance_share: Floats) -> dict[str, Floats]:
-    """Results of ``gait_events``, by field of ``GaitTiming``; in batches of people, to limit memory."""
+    """Return ``gait_events`` for many people, by field of ``GaitTiming``; computed in batches to limit memory."""
     sine, cosine = sine_and_cosine(np.outer(np.arange(1, HARMONICS + 1), EVENT_PHASES))
     events = []
     for first in range(0, stance_share.size, _AT_ONCE):
@@ -107,9 +108,11 @@ def _events(shank: SeriesOfMany, ankle: SeriesOfMany, stance_share: Floats) -> d
 
 
 class Person(NamedTuple):
-    """Who walks: body mass and stature over the wearer's, strides, and angle [rad] of the foot over flat at its strike.
+    """Person drawn from the population: build, strides, and adjustment of the controller.
 
-    ``thresholds`` is a factor on the thresholds of the force sensors, ``start`` is added to the start of the push-off.
+    ``mass`` and ``stature`` are relative to the wearer [-]. ``strike_angle`` is the foot angle at heel strike relative
+    to the flat foot [rad]. ``thresholds`` is a factor on the thresholds of the force sensors [-], ``start`` is added to
+    the start of the push-off [strides].
     """
 
     mass: float
@@ -122,7 +125,7 @@ class Person(NamedTuple):
 
 
 def person_of(gait: Gait, who: Any) -> Person:
-    """Person of the population by number, which may be an array (runs,); a person drawn before stays."""
+    """Return a person of the population by number, a scalar or array (runs,); a ``Person`` is returned as is."""
     if isinstance(who, Person):
         return who
 
@@ -145,14 +148,14 @@ def person_of(gait: Gait, who: Any) -> Person:
 
 
 def _drawn(gait: Gait, number: float) -> tuple[BodyScale, VariedGaits, np.random.Generator]:
-    """Build and gait of two, the second of whom is the person, and what draws on."""
+    """Return build and gait of the wearer and of the person drawn, and the random generator for further draws."""
     generator = np.random.default_rng(int(number))
     build = draw_builds(2, generator)
     return build, draw_gaits(gait, build.stature, generator), generator
 
 
 def drawn_people(build: BodyScale, gaits: VariedGaits, generator: np.random.Generator) -> Person:
-    """People of some builds and gaits, each number an array (people,); the first is fitted as the settings say."""
+    """Return people with these builds and gaits, as arrays (people,); the first keeps the controller settings."""
     count = build.mass.size
     scale, shift = (draw_bounded_normal(generator, (count,)) for _ in range(2))
     scale[0], shift[0] = 0.0, 0.0
@@ -181,7 +184,7 @@ def drawn_people(build: BodyScale, gaits: VariedGaits, generator: np.random.Gene
 
 
 def crowd_of(scenario: Scenario, build: BodyScale, gaits: VariedGaits, generator: np.random.Generator) -> Scenario:
-    """Many wearers as one walk whose numbers are arrays (people,); everybody has noise of his or her own."""
+    """Return a walk of many wearers whose numbers are arrays (people,); each wearer has independent sensor noise."""
     people = drawn_people(build, gaits, generator)
     # A seed of everybody: one noise for all would make their outcomes alike.
     seeds: Any = (scenario.sensors.seed + np.arange(build.mass.size, dtype=np.float64)) % LARGEST_SEED
@@ -190,14 +193,14 @@ def crowd_of(scenario: Scenario, build: BodyScale, gaits: VariedGaits, generator
 
 
 def leg_of_person(leg: LegParameters, person: Person) -> LegParameters:
-    """The leg of the wearer at a person's mass and stature; the heel has the same shape."""
+    """Return the leg scaled to a person's mass and stature; the shape of the heel is unchanged."""
     # The heel of a gait has two levers, of which a wearer's file gives one.
     flat = leg.flat_heel_lever * person.stature
     return leg._replace(**scaled(leg, person.mass, person.stature), flat_heel_lever=flat)
 
 
 def settings_of_person(settings: dict[str, Any], person: Person) -> dict[str, Any]:
-    """Settings of a controller as they were fitted to a person: its thresholds and the start of the push-off."""
+    """Return the controller settings fitted to a person: force thresholds and start of the push-off."""
     fitted: dict[str, Any] = {
         name: settings[name] * person.thresholds for name in ("load_threshold", "unload_threshold") if name in settings
     }
@@ -207,7 +210,7 @@ def settings_of_person(settings: dict[str, Any], person: Person) -> dict[str, An
 
 
 def as_drawn(gait: Gait, wearer: Wearer, number: float) -> tuple[Gait, Wearer]:
-    """Gait and wearer of the person with a number, for results: healthy curves belong to this person."""
+    """Return gait and wearer for the person with this number; results compare the person with these healthy curves."""
     if number == 0.0:
         return gait, wearer
     build, gaits, _ = _drawn(gait, number)

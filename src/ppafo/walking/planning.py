@@ -1,4 +1,4 @@
-"""Plan of a walk as a run of the engine. Any number of it may be an array (runs,), one for each run."""
+"""Plan of a walk as a run of the engine; any number may be an array (runs,), one value for each run."""
 
 import math
 from dataclasses import replace
@@ -65,9 +65,9 @@ TINY = 1.0e-30
 
 
 def plan_walk(scenario: Scenario) -> Run:
-    """The run of a walk with vented chambers, which begins at a heel strike, or in a task sequence standing.
+    """Return the run of a walk that starts with vented chambers, at a heel strike or, for a task sequence, standing.
 
-    ScenarioError where it cannot be.
+    Raises ScenarioError if the walk cannot be simulated.
     """
     run, problems = walk_of(scenario).motion_kind.plan(scenario)
     for is_bad, line in problems:
@@ -77,9 +77,9 @@ def plan_walk(scenario: Scenario) -> Run:
 
 
 def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
-    """The run of a walk, and what may be wrong with it; any number in both may be an array (runs,).
+    """Return the run of a walk and the possible problems of the run; numbers of both may be arrays (runs,).
 
-    All runs of an ensemble must ask for one program: the settings of ``switches`` are 0 for all of them or for none.
+    All runs of an ensemble must need the same program: each setting of ``switches`` is 0 for all runs or for none.
     """
     motion, device = walk_of(scenario), fed_device(scenario)
     person = person_of(motion.gait, motion.person)
@@ -132,19 +132,19 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
 
 def batch_of_many(scenario: Scenario, build: BodyScale, gaits: VariedGaits, generator: np.random.Generator) -> Batch:
-    """The walks of many wearers, the first of whom is the scenario's; nothing is recorded on the way."""
+    """Return the walks of many wearers as a batch without recording; the first wearer is the one of the scenario."""
     run, _ = plan_walks(crowd_of(scenario, build, gaits, generator))
     return unrecorded(run, build.mass.size)
 
 
 def unrecorded(run: Run, runs: int) -> Batch:
-    """The batch of so many walks of one length, of which nothing is recorded on the way."""
+    """Return a batch of equally long walks without recording."""
     ((_, batch),) = batches_of(run, runs)
     return replace(batch, clock=replace(batch.clock, record_every=0))
 
 
 def walk_steps(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
-    """The steps of a walk: whole ones that follow the gas, as many to a sample of the controller as that asks for."""
+    """Return the time grid of a walk: steps that resolve the gas, a whole number per sample of the controller."""
     lowest, highest = (vented_chambers(scenario.device, plant, angle) for angle in (LOWEST_ANGLE, HIGHEST_ANGLE))
     lines, volume = scenario.supply_lines, smallest_chamber(lowest, highest)
     # Lines may be smaller than any chamber, and then fill first.
@@ -161,10 +161,10 @@ def walk_steps(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
 
 
 def stiff_loads(run: Run) -> tuple[Problem, ...]:
-    """Loads at the joint that change too much in a step of a walk, whose steps have one length.
+    """Return the problems of loads at the joint that change too much within the fixed step of a walk.
 
-    A step predicts what a load takes at its end: that converges where the drag would slow the foot by less than twice
-    its speed, and a spring turn it by less than a radian of its swing.
+    A step uses the load predicted at its end. The prediction converges if within a step the drag reduces the speed of
+    the foot by less than twice this speed, and if a spring advances its oscillation by less than 1 rad.
     """
     program, inertia = run.program, run.plant.inertia
     if all(load_torque not in effect.laws for effect in program.effects):
@@ -198,13 +198,13 @@ def stiff_loads(run: Run) -> tuple[Problem, ...]:
 
 
 def vented_chambers(device: Device, plant: PlantParameters, angle: Any) -> Chambers:
-    """Both chambers of a device at an angle [rad] and the pressure of the atmosphere."""
+    """Return both chambers of a device at an angle [rad] and at atmospheric pressure."""
     room = plant.atmospheric_pressure
     return filled_chambers(ACTUATORS[device.actuator.kind].model, plant, angle, room, room)
 
 
 def gait_sensors_of(scenario: Scenario) -> GaitSensors:
-    """The sensors of a walk with their faults, at the sample period of its controller."""
+    """Return the sensors of a walk with their faults, at the sample period of the controller."""
     numbers, faults = sensor_numbers(scenario), walk_of(scenario).faults
     values = [*numbers.values(), *(value for fault in faults.values() for value in fault.numbers.values())]
 
@@ -221,7 +221,7 @@ def gait_sensors_of(scenario: Scenario) -> GaitSensors:
 
 
 def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
-    """Faults of the plant of a walk, and its shut-off valve; None without both."""
+    """Return the plant faults of a walk and its shut-off valve, or None without either."""
     motion, gas = walk_of(scenario), scenario.device.gas
     if not motion.broken and not motion.shut_off:
         return None
@@ -240,34 +240,34 @@ def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
 
 
 def sensor_numbers(scenario: Scenario) -> dict[str, Any]:
-    """The settings of the sensors of a walk in SI units, by name; any may be an array (runs,)."""
+    """Return the sensor settings of a walk in SI units, by name; each may be an array (runs,)."""
     shared = (quantity.name for quantity in WALK_SENSORS if quantity.name not in FORCES)
     return {**{name: getattr(scenario.sensors, name) for name in shared}, **walk_of(scenario).forces}
 
 
 def flaws(scenario: Scenario) -> tuple[Any, ...]:
-    """Imperfections of the sensors of a walk beside faults, 0 for an ideal one.
+    """Return the imperfections of the sensors of a walk, without faults; 0 for an ideal sensor.
 
-    The bandwidth of the force sensors is no such flaw: every walk has it.
+    The bandwidth of the force sensors is not included, because every walk has it.
     """
     return tuple(number for name, number in sensor_numbers(scenario).items() if name != "force_bandwidth")
 
 
 def has_ideal_sensors(scenario: Scenario) -> bool:
-    """True where nothing but the bandwidth of the force sensors stands between foot and controller."""
+    """Return True if the sensors are ideal except for the bandwidth of the force sensors."""
     fails = any(fault.kind for fault in walk_of(scenario).faults.values())
     return not (fails or any(first(flaw) for flaw in flaws(scenario)))
 
 
 def switches(scenario: Scenario) -> tuple[Any, ...]:
-    """Settings that are 0 for all runs of a program or for none: flaws of sensors, samples by which one is late."""
+    """Return the settings that must be 0 for all runs of a program or for none: imperfections, delays [samples]."""
     # Samples and not seconds: the engine keeps whole ones, and a delay below half of one keeps none.
     delays = (fault.numbers.get("delay", 0.0) for fault in walk_of(scenario).faults.values())
     return *flaws(scenario), *(truncated(delay / scenario.controller.period + 0.5) for delay in delays)
 
 
 def noise(scenario: Scenario) -> Any:
-    """The sum of what is random in the sensors of a walk: noise, and shares of samples that are lost."""
+    """Return the sum of all random effects in the sensors of a walk: noise levels, and fractions of lost samples."""
     sensors, motion = scenario.sensors, walk_of(scenario)
     lost = [fault.numbers.get("lost_share", 0.0) for fault in motion.faults.values()]
     lost += [fault.numbers["share"] for fault in motion.broken.values() if fault.kind == "jittering"]
@@ -276,9 +276,9 @@ def noise(scenario: Scenario) -> Any:
 
 
 def law_of(scenario: Scenario) -> ControllerKind:
-    """The controller of a walk with its estimator of the gait phase, computing with floats.
+    """Return the controller of a walk with its gait phase estimator, for scalar arithmetic.
 
-    A constant command, and an ordered one, are no controllers of a walk in a file: an exported plant has them.
+    The controllers with a constant and with an ordered command occur only in an exported plant, not in a walk file.
     """
     # The catalogue of walking has neither, whose command is handed in.
     for law in (switching.CONSTANT, switching.ORDERED):
@@ -288,12 +288,12 @@ def law_of(scenario: Scenario) -> ControllerKind:
 
 
 def requests_torque(law: ControllerKind) -> bool:
-    """True where a controller of walking wants a torque, false where it only opens and shuts valves."""
+    """Return True if a walking controller requests a torque, False if it only switches valves."""
     return hasattr(law.initial, "request")
 
 
 def fed_device(scenario: Scenario) -> Device:
-    """The device with the gas that its supply has at the start: cold gas where it hangs on a bottle."""
+    """Return the device with the gas temperature of its supply at the start, which is low for a bottle."""
     bottle, device = walk_of(scenario).bottle, scenario.device
     if bottle is None:
         return device
@@ -301,13 +301,19 @@ def fed_device(scenario: Scenario) -> Device:
 
 
 def task_sequence_of_walk(scenario: Scenario) -> PlannedSequence | None:
-    """The task sequence of a walk in time, None where it has none; ScenarioError for what its gait does not allow."""
+    """Return the planned task sequence of a walk, or None without one.
+
+    Raises ScenarioError if the gait does not allow the sequence.
+    """
     motion = walk_of(scenario)
     sequence = motion.task_sequence
     return None if sequence is None else planned_task_sequence(sequence, motion.gait, motion.person)
 
 
 def planned_task_sequence(sequence: TaskSequence, gait: Gait, number: Any = 0.0) -> PlannedSequence:
-    """A task sequence in time, walked by the person with a number; ScenarioError for what the gait does not allow."""
+    """Return a task sequence planned for the person with this number.
+
+    Raises ScenarioError if the gait does not allow the sequence.
+    """
     person = person_of(gait, number)
     return plan_task_sequence(sequence, gait, person.timing.frequency, person.timing, person.strike_angle)

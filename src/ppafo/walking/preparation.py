@@ -1,7 +1,7 @@
-"""Initial numbers of a walk, computed from its settings in SI units.
+"""Initial values and parameters of a walk, computed from its settings in SI units.
 
-Pure functions of one run, as in ``simulation/plan.py``: Python plans with them, and an exported library has them
-in C. What a gait comes to (series, events, the fit of the heel) is data.
+Pure functions of one run, as in ``simulation/plan.py``: Python uses them for planning, and an exported library contains
+them in C. Results derived from the gait (series, events, heel rocker) are data for these functions.
 """
 
 import math
@@ -37,9 +37,10 @@ DISTORTING = ("time", "period", "gain", "offset", "drift", "crosstalk", "lag", "
 
 
 def rocker_on_heel(flat: float, rise: float, half: float, heel_lever: float) -> HeelRocker:
-    """Heel rocker fitted to a gait, bounded by the lever [m] of the heel.
+    """Return the heel rocker fitted to a gait, bounded by the heel lever [m] of the wearer.
 
-    ``flat`` and ``rise`` [m] are the lever nearly flat and how much longer it is far up, ``half`` [rad] as there.
+    ``flat`` [m] is the lever with the foot nearly flat, ``rise`` [m] the increase for a raised foot, ``half`` [rad] the
+    tilt at half of the increase.
     """
     # A gait fitted on another foot may ask for a lever behind this heel.
     bounded = min(max(flat, 0.0), heel_lever)
@@ -47,7 +48,7 @@ def rocker_on_heel(flat: float, rise: float, half: float, heel_lever: float) -> 
 
 
 def device_share(plant: PlantParameters, gravity: float) -> DeviceShare:
-    """Contribution of a device to a leg; ``plant`` is the bare device under ``gravity`` [m/s^2]."""
+    """Return the contribution of a device to the leg; ``plant`` is the bare device under ``gravity`` [m/s^2]."""
     return DeviceShare(
         inertia=plant.inertia,
         viscous_damping=plant.viscous_damping,
@@ -56,7 +57,7 @@ def device_share(plant: PlantParameters, gravity: float) -> DeviceShare:
 
 
 def with_leg(plant: PlantParameters, leg: LegParameters) -> PlantParameters:
-    """The plant with the foot's inertia and the ankle's damping; its own gravity is accounted for in the leg."""
+    """Return the plant with the foot's inertia and the ankle's damping added; gravity is accounted for in the leg."""
     return plant._replace(
         viscous_damping=plant.viscous_damping + leg.ankle_damping,
         inertia=plant.inertia + foot_inertia_about_ankle(leg),
@@ -66,7 +67,7 @@ def with_leg(plant: PlantParameters, leg: LegParameters) -> PlantParameters:
 
 
 def smallest_chamber(lowest: Chambers, highest: Chambers) -> Any:
-    """Smallest volume [m^3] of either chamber, from those at the lowest and at the highest angle of walking, vented."""
+    """Return the smallest volume [m^3] of either chamber, given the chambers at the extreme angles of a walk."""
     # Chamber 1 is smallest in dorsiflexion, chamber 2 in plantarflexion.
     return smaller(lowest.volume_1, highest.volume_2)
 
@@ -80,10 +81,10 @@ def walk_step_counts(
     volume: float,
     stiffness: float,
 ) -> StepCounts:
-    """Whole steps that follow the gas, as many to a sample of the controller as that asks for; times in [s].
+    """Return the step counts of a walk: steps that resolve the gas, a whole number per sample; times in [s].
 
-    ``volume`` [m^3] is the smallest behind the valve. ``stiffness`` [-] is the ratio of heat capacities for gas with an
-    energy balance, whose chambers fill faster by it, else 1.
+    ``volume`` [m^3] is the smallest volume downstream of the valve. ``stiffness`` [-] is the ratio of heat capacities
+    for gas with an energy balance, whose chambers fill faster by this factor, and otherwise 1.
     """
     # A quotient that is whole but for rounding asks for no step more.
     coarse = larger(1.0, rounded_up(period / time_step - WHOLE))
@@ -102,23 +103,23 @@ def walk_step_counts(
 
 
 def vented_state(plant: PlantParameters, filled: Chambers, angle: float, angular_velocity: float) -> PlantState:
-    """State at an angle [rad] and its rate [rad/s] with both chambers there at atmospheric pressure."""
+    """Return the state at an angle [rad] and an angular velocity [rad/s], both chambers at atmospheric pressure."""
     room = plant.atmospheric_pressure
     return state_with_volumes(plant, angle, angular_velocity, filled.volume_1, filled.volume_2, room, room)
 
 
 def walk_from_strike(now: GaitNow) -> WalkState:
-    """State of a leg that begins to walk at a heel strike."""
+    """Return the state of a leg that starts to walk at a heel strike."""
     return walk_from(now, HEEL, 0.0)
 
 
 def walk_from_standing(now: GaitNow) -> WalkState:
-    """A leg that begins standing, its weight on heel and toes alike."""
+    """Return the state of a leg that starts standing, with the weight evenly on heel and toes."""
     return walk_from(now, FLAT, 0.5 * now.force)
 
 
 def walk_from(now: GaitNow, contact: float, shown_force: float) -> WalkState:
-    """A leg at its start, with the force [N] that the sensors under heel and toes show."""
+    """Return the initial state of a leg; ``shown_force`` [N] is the reading of the sensors under heel and toes."""
     return WalkState(
         contact=contact,
         offset=0.0,
@@ -140,9 +141,10 @@ def walk_from(now: GaitNow, contact: float, shown_force: float) -> WalkState:
 def standing_on(
     leg: LegParameters, ground_angle: float, sine_foot: float, cosine_foot: float, phase: float, load: float
 ) -> GaitNow:
-    """Shank vertical, foot flat, both at rest: how a task sequence begins, at a phase [turns] and load [body weights].
+    """Return the gait at the start of a task sequence: shank vertical, foot flat, both at rest.
 
-    Sine and cosine belong to the flat foot's angle [rad]. Numbers may be arrays (wearers,).
+    ``phase`` is in [turns], ``load`` in [body weights]. ``sine_foot`` and ``cosine_foot`` belong to the angle of the
+    flat foot, ``ground_angle`` [rad]. Numbers may be arrays (wearers,).
     """
     upright = 0.0 * ground_angle
     return GaitNow(
@@ -165,7 +167,7 @@ def standing_on(
 
 
 def memory_of(bandwidth: float, period: float) -> float:
-    """Remaining weight of a sensor's last value after a sample [s]; 0 at a ``bandwidth`` [Hz] of 0."""
+    """Return the weight of a sensor's previous value after one sample period [s]; 0 for a ``bandwidth`` of 0 [Hz]."""
     return exponential(-_TURN * bandwidth * period) if bandwidth > 0.0 else 0.0
 
 
@@ -178,7 +180,7 @@ def gait_sensors(
     pressure_1_fault: Fault,
     pressure_2_fault: Fault,
 ) -> GaitSensors:
-    """Sensors by their settings [SI], at a sample period [s]."""
+    """Return the sensors with these settings [SI] and faults, at a sample period [s]."""
     return GaitSensors(
         follow_rate=_TURN * settings["force_bandwidth"],
         force_noise=settings["force_noise"],
@@ -197,7 +199,7 @@ def gait_sensors(
 
 
 def fixed_fault(time: float, holds: float, reading: float, fault_period: float) -> Fault:
-    """A sensor that keeps its last value from ``time`` [s] on (``holds`` 1), or gives a fixed reading."""
+    """Return a fault from ``time`` [s] on: the sensor keeps its last value (``holds`` = 1) or gives a fixed reading."""
     return Fault(
         time=time,
         holds=holds,
@@ -226,9 +228,10 @@ def distorting_fault(
     delay: float,
     period: float,
 ) -> Fault:
-    """A sensor that gives a wrong reading from ``time`` [s] on, at a sample period [s] of the controller.
+    """Return a fault that distorts the reading of a sensor from ``time`` [s] on, at a controller sample period [s].
 
-    ``lag`` and ``delay`` in [s], the latter taken to the nearest whole sample; the others as in ``Fault``.
+    ``lag`` and ``delay`` are in [s], the delay is rounded to whole samples; the other arguments are fields of
+    ``Fault``.
     """
     return Fault(
         time=time,
@@ -249,7 +252,7 @@ def distorting_fault(
 
 
 def longest_delay(sensors: GaitSensors) -> float:
-    """Most samples by which a fault makes a sensor late."""
+    """Return the largest delay of a sensor by a fault [samples]."""
     forces = max(sensors.heel_fault.late_samples, sensors.toe_fault.late_samples)
     pressures = max(sensors.pressure_1_fault.late_samples, sensors.pressure_2_fault.late_samples)
     return max(forces, pressures, sensors.angle_fault.late_samples)
@@ -257,14 +260,14 @@ def longest_delay(sensors: GaitSensors) -> float:
 
 @dataclass(frozen=True, slots=True)
 class FaultSettings:
-    """A kind of ``declaration.FAULTS`` and its numbers [SI]; no kind is a sensor without a fault."""
+    """Fault of a sensor or part: kind of ``declaration.FAULTS`` and parameters [SI]; no fault if the kind is empty."""
 
     kind: str = ""
     numbers: Mapping[str, float] = field(default_factory=dict)
 
 
 def fault_of(fault: FaultSettings, period: float) -> Fault:
-    """Return the fault of a sensor with its numbers [SI], at a sample period [s] of the controller."""
+    """Return the fault of a sensor with its parameters [SI], at a controller sample period [s]."""
     settings = fault.numbers
     if not fault.kind:
         # A sound sensor has a fault that never begins, so that one program serves both.

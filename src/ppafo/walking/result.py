@@ -1,4 +1,4 @@
-"""The results of a walk: its recording, rows of the engine as channels with units, stride by stride and on average."""
+"""Results of a walk: recording with units from the rows of the engine, numbers of each stride, and averages."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -73,7 +73,7 @@ def recording_of_walk(
     record: Mapping[str, Floats],
     supply: SupplyCourse | None = None,
 ) -> Recording:
-    """The recording of a walk [SI] from its rows (samples,) by path, at these times [s]; with its bottle's course."""
+    """Return the recording of a walk [SI] from its rows (samples,) by path at these times [s] and its supply."""
     led, plant, actuator = led_leg(run), run.plant, run.program.actuator
     if supply is not None:
         # The gas of each time, as it was in force between two meetings of bottle and device.
@@ -131,9 +131,9 @@ def recording_of_walk(
 def _task_sequence_channels(
     configuration: Scenario, run: Run, path: AnklePath, time: Floats, record: Mapping[str, Any]
 ) -> dict[str, tuple[Any, str]]:
-    """Additional channels of a task sequence, and the toes over ground that may rise: stairs lift the ankle.
+    """Return the additional channels of a task sequence, and toe heights above ground that may rise, as stairs do.
 
-    The healthy toes are as high as the gait's, times the stride over the recorded one.
+    The healthy toe height is the gait's, scaled with the stride relative to the recorded one.
     """
     sequence = led_leg(run).task_sequence
     assert sequence is not None, "of a task sequence"
@@ -163,14 +163,15 @@ def _units_of(walked: "WalkResult | Scenario", *_: Any) -> Mapping[str, str]:
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
 class WalkResult:
-    """A finished walk: recording, numbers of each stride (strides,), curves over the stride, and numbers of the whole.
+    """Result of a walk.
 
-    ``averages`` and ``metrics`` are over the strides with help, without the first ones, in which the controller
-    learns; ``vented_metrics`` over the strides with less help (lifted only, paused or stopped), {} without such.
-    ``starts`` are the samples of the recording right after each heel strike, ``helped`` is True for each stride with
-    help throughout, and ``events`` are the pauses, the stop and the returns of help. ``segments`` are the segments of a
-    task sequence, none without one; means are then over its strides at an even speed on level ground.
-    ``supply`` is the bottle over the walk, None where the device hangs on none.
+    ``recording`` has the channels over time, ``strides`` the numbers of each stride (strides,), ``averages`` the mean
+    curves and ``metrics`` the numbers of the whole walk. Averages and metrics use assisted strides only, without the
+    first strides, in which the controller adapts; for a task sequence they use steady strides on level ground.
+    ``vented_metrics`` use the strides with reduced assistance (lifted only, paused or stopped) and are {} without any.
+    ``starts`` are the samples directly after each heel strike, and ``helped`` is True for each stride with full
+    assistance. ``events`` are pauses, the stop and returns of assistance. ``segments`` are the segments of a task
+    sequence, () without one. ``supply`` is the bottle over the walk, None without a bottle.
     """
 
     scenario: Scenario
@@ -188,25 +189,25 @@ class WalkResult:
 
     @property
     def is_helped(self) -> bool:
-        """True where at least half of the whole strides had help."""
+        """True if at least half of the whole strides were assisted."""
         return 2 * int(self.helped.sum()) >= self.helped.size
 
     @property
     def peak_torques(self) -> Floats:
-        """The largest torque [N m] of each whole stride (strides,)."""
+        """Peak torque [N m] of each whole stride (strides,)."""
         if self.starts.size < 2:
             return np.zeros(0)
         return np.maximum.reduceat(self.recording["torque"], self.starts)[:-1]
 
     @property
     def tracking(self) -> Tracking | None:
-        """The verdict where the torque does not follow what the controller requests, None where it does."""
+        """Verdict on a torque that does not follow the controller's request; None if it follows."""
         strides = self.metrics.get("strides")
         return None if strides is None or strides.value == 0.0 else tracking_in(self)
 
     @in_units(_units_of)
     def __repr__(self) -> str:
-        """Return name, status, duration and one line a metric, in the units that people are shown."""
+        """Return name, status, duration and a line for each metric, in display units."""
         from ppafo.report.display_units import name_lines
 
         head = f"Walk '{self.scenario.name}', {self.recording.time[-1] / 60.0:.3g} min: {self.status.message}"
@@ -214,7 +215,7 @@ class WalkResult:
 
     @in_units(_units_of)
     def __str__(self) -> str:
-        """Status and metrics in the units that people are shown, as ``ppafo simulate`` prints them."""
+        """Return status and metrics in display units, as printed by ``ppafo simulate``."""
         from ppafo.report.display_units import metrics_lines
 
         head = f"{self.scenario.name}: {self.status.kind}"
@@ -222,7 +223,7 @@ class WalkResult:
 
     @in_units(_units_of)
     def plot(self) -> "Figure":
-        """Return a figure of the mean stride with the healthy gait beside it; ``.savefig(...)`` writes it."""
+        """Return a figure of the mean stride and of the healthy gait; ``.savefig(...)`` writes the figure to a file."""
         from ppafo.report.notebook import shown
         from ppafo.walking.figures.mean_stride import walk_figure
 
@@ -235,13 +236,13 @@ class WalkResult:
     to_dataframe = at_hand.dataframe
 
     def save_opensim(self, path: str | Path) -> Path:
-        """Write the recording as a ``.sto`` file in OpenSim's names, zero and signs, right leg; returns the path."""
+        """Write the recording as a ``.sto`` file with OpenSim's names, zeros and signs (right leg); return the path."""
         named, _ = opensim_recording(self.recording, body_mass=walk_of(self.scenario).wearer.body_mass)
         return write_opensim(path, named)
 
 
 def result_of_walk(scenario: Scenario, run: Run, outcome: BatchResult, supply: SupplyCourse | None) -> WalkResult:
-    """The result of what a run of a walk came to, up to where it diverged; ``supply`` is its bottle's course."""
+    """Return the result of a walk from the outcome of its run, up to a divergence; ``supply`` is the bottle."""
     rows = state_row_numbers(run)
     record = {name: outcome.record[:, row, 0] for name, row in rows.items()}
     failed, too_many_parts = (float(outcome.states[rows[f"result.{name}"], 0]) for name in LaneResult._fields[1:])
@@ -264,7 +265,7 @@ def _result(
     status: Status,
     supply: SupplyCourse | None,
 ) -> WalkResult:
-    """The result of a walk from its rows (samples,) by path, up to where the run failed."""
+    """Return the result of a walk from its rows (samples,) by path, up to the time at which the run failed."""
     walked, motion = scenario, walk_of(scenario)
     # Whom it is healthy for is the person who walked; what was planned stays in the result.
     gait, wearer = as_drawn(motion.gait, motion.wearer, motion.person)
@@ -302,7 +303,7 @@ def _result(
 
 
 def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:
-    """Status of a walk from its time of failure [s], if any, and its last states."""
+    """Return the status of a walk from its time of failure [s], if any, and its last states."""
     if failed >= NEVER_FAILED and bool(np.isfinite(states).all()):
         return Status("completed", None, "completed")
     # A number that is none at the end, which the run did not see itself, has no time: it counts from the start.
@@ -312,7 +313,7 @@ def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:
 
 
 def measured(scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]) -> Measured:
-    """Recording and metrics of a walk from its rows (samples,) by path, at these times [s]; and how it ended."""
+    """Return recording, metrics and status message of a walk from its rows (samples,) by path, at these times [s]."""
     check_no_bottle(scenario)
     completed = Status("completed", None, "completed")
     result = _result(scenario, run, time, record, completed, None)
@@ -324,7 +325,7 @@ def measured(scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Fl
 
 
 def lacks(scenario: Scenario, kind: MetricKind) -> str:
-    """Why a walk has not what a metric needs, an empty text where it has."""
+    """Return the reason that a metric is not available for a walk; empty if it is available."""
     motion, control, law = walk_of(scenario), scenario.controller.kind, scenario.law
     needs = kind.needs
     reasons = (
@@ -347,7 +348,10 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
 
 
 def integral_of_a_stride(result: WalkResult, values: Floats) -> float:
-    """Return the integral of a channel over the ankle angle, in its unit times rad, mean over the counted strides."""
+    """Return the integral of a channel over the ankle angle in one stride [channel unit times rad], mean over strides.
+
+    The mean uses the assisted strides that count for averages.
+    """
     turned = np.diff(result.recording["angle"])
     done = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * turned)])
     planned = task_sequence_of_walk(result.scenario)
@@ -356,7 +360,10 @@ def integral_of_a_stride(result: WalkResult, values: Floats) -> float:
 
 
 def _counted(planned: PlannedSequence | None, recording: Recording, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """True for each whole stride that counts for means: not the first ones; of a task sequence the even ones."""
+    """Return True for each whole stride that counts for averages.
+
+    The first strides of a walk do not count. In a task sequence, only steady strides on level ground count.
+    """
     if planned is not None:
         return steady_strides(planned, recording.time[starts])
     return settled(np.ones(max(starts.size - 1, 0), dtype=np.bool_))

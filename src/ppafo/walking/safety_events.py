@@ -1,4 +1,4 @@
-"""Safety events of a walk: less help, a pause, a stop or a return of help, with fault flag, readings and settings."""
+"""Safety events of a walk: reduced assistance, pause, stop or return of assistance, with fault flag and readings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -42,7 +42,7 @@ SHOWN = 5
 
 
 def failure_times(configuration: Scenario) -> dict[str, float]:
-    """Return the times [s] at which sensors and parts of the plant fail, by name, in order; {} if all are sound."""
+    """Return the failure times [s] of sensors and parts of the plant, by name in order of time; {} if all are sound."""
     motion = walk_of(configuration)
     faults = {**motion.faults, **motion.broken}
     times = {part: float(fault.numbers["time"]) for part, fault in faults.items() if fault.kind}
@@ -50,10 +50,11 @@ def failure_times(configuration: Scenario) -> dict[str, float]:
 
 
 def acting_phase(recording: Recording) -> Floats:
-    """Return the phase of each sample in which the device acts (samples,), as the numbers of ``model.helping``.
+    """Return the phase in which the device acts, for each sample (samples,), in the numbers of ``model.helping``.
 
-    It is the one that the controller sees, but it never pushes while it only lifts, and acts as in mid-stance, without
-    a torque, while it pauses or has stopped. The recording has a ``controller_phase``.
+    It is the controller's phase, with two exceptions: with lifting only, push-off counts as mid-stance, and during a
+    pause or after a stop every phase counts as mid-stance, without torque. The recording must contain
+    ``controller_phase``.
     """
     seen = recording["controller_phase"]
     level = recording["safe_state"] if "safe_state" in recording else np.zeros(seen.size)
@@ -63,11 +64,11 @@ def acting_phase(recording: Recording) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class SafetyEvent:
-    """Less help, a pause, a stop or a return of help at a time [s] of the recording.
+    """Reduced assistance, pause, stop or return of assistance at a time [s] of the recording.
 
-    ``readings`` are what the sensors showed then and ``settings`` what they were compared with, by name, in SI units;
-    empty where help came back. ``units`` are the units of the settings. Gauge pressures count from ``atmosphere`` [Pa
-    absolute].
+    ``level`` is the new assistance level, ``fault_flag`` the reason. ``readings`` are the sensor readings at this time
+    and ``settings`` the limits with which they were compared, by name, in SI units; both are empty for a return of
+    assistance. ``units`` are the units of the settings. Gauge pressures are relative to ``atmosphere`` [Pa absolute].
     """
 
     time: float
@@ -80,7 +81,7 @@ class SafetyEvent:
 
     @property
     def message(self) -> str:
-        """The event in one line."""
+        """Description of the event in one line."""
         if self.fault_flag is None:
             return f"{_RETURNS[self.level]} at {self.time:.2f} s"
         head = f"{_WORDS[self.level]} {self.time:.2f} s"
@@ -105,7 +106,7 @@ class SafetyEvent:
 
 
 def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Floats]) -> tuple[SafetyEvent, ...]:
-    """Return the events of a walk in their order, from its rows (samples,) by path at these times [s]."""
+    """Return the events of a walk in order of time, from its rows (samples,) by path at these times [s]."""
     watchdog: tuple[SafetyEvent, ...] = ()
     shut_off = walk_of(configuration).shut_off
     if SILENT_ROW in record and shut_off:
@@ -137,7 +138,7 @@ def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Fl
 
 
 def event_lines(events: Sequence[SafetyEvent]) -> list[str]:
-    """Return the events as lines: each one, or the first ones and the last and how many lie between."""
+    """Return each event as a line of text; of many events only the first and last, with the number between."""
     lines = [event.message for event in events]
     if len(lines) <= SHOWN:
         return lines

@@ -1,4 +1,4 @@
-"""Events of the stride, true and as the controller detects or predicts them, and the errors of their times."""
+"""Stride events, true and as detected or predicted by the controller, and the errors of their times."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,9 +28,10 @@ EVENT_ROW, FRACTION_ROW = "clock.event", "clock.fraction"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EventErrors:
-    """Errors [s] of one kind of event, above 0 where it is known late, one for each that is known at all.
+    """Timing errors of one kind of event [s], positive for a late detection; one for each matched event.
 
-    ``missed`` are true events that the controller did not know of, ``false`` those that it thought of for nothing.
+    ``missed`` is the number of true events without a detection, ``false`` the number of detections without a true
+    event.
     """
 
     errors: Floats
@@ -39,24 +40,25 @@ class EventErrors:
 
     @property
     def rms(self) -> float:
-        """Root mean square of the errors [s]; nan without any."""
+        """Root mean square of the errors [s]; nan without errors."""
         return float(np.sqrt(np.mean(self.errors**2))) if self.errors.size else float("nan")
 
 
 def clock_row(record: Mapping[str, Floats], ending: str) -> Floats | None:
-    """The row of a controller that predicts the gait phase, by the end of its path; None where it does not."""
+    """Return the row of a phase-predicting controller by the end of its path, or None for another controller."""
     return next((row for name, row in record.items() if name.startswith(_STATE) and name.endswith(ending)), None)
 
 
 def true_events(contact: Floats) -> dict[str, Samples]:
-    """Samples at which each event happens, from the contact of the foot, as numbers of ``model.contact``."""
+    """Return the samples of each event, from the contact state of the foot (numbers of ``model.contact``)."""
     return _starts(np.select([contact == state for state in _AFTER], list(_AFTER.values())))
 
 
 def known_events(record: Mapping[str, Floats]) -> dict[str, Samples]:
-    """Samples at which the controller knows of each event, from its rows (samples,) by path; {} where it has no phases.
+    """Return the samples at which the controller detects each event, from its rows (samples,) by path.
 
-    A controller that predicts knows when its clock passes the event; else it is detected by force.
+    A predicting controller registers an event when its clock passes the event, any other controller when a force
+    crosses its threshold. Returns {} for a controller without phases.
     """
     predicted = clock_row(record, EVENT_ROW)
     if predicted is not None:
@@ -78,9 +80,9 @@ def _rises(is_so: NDArray[np.bool_]) -> Samples:
 
 
 def event_errors(true: Samples, known: Samples, interval: float, stride_time: float) -> EventErrors:
-    """Errors of the known events against the true ones of one kind; ``interval`` [s] of samples, stride time [s].
+    """Return the timing errors of one kind of event; ``interval`` [s] is the sample interval, stride time in [s].
 
-    Each true event goes with the nearest known one within a quarter of a stride.
+    Each true event is matched with the nearest known event within a quarter of a stride.
     """
     if not (true.size and known.size):
         return EventErrors(np.empty(0), int(true.size), int(known.size))
@@ -93,5 +95,5 @@ def event_errors(true: Samples, known: Samples, interval: float, stride_time: fl
 
 
 def within(events: Mapping[str, Samples], part: slice) -> dict[str, Samples]:
-    """Return the events that lie in a part of the samples, by name."""
+    """Return the events within a range of samples, by name."""
     return {name: times[(times >= part.start) & (times < part.stop)] for name, times in events.items()}

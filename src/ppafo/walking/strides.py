@@ -1,4 +1,4 @@
-"""A walk stride by stride: numbers of strides, mean curves, metrics of a walk and of segments of a task sequence."""
+"""Stride-by-stride evaluation of a walk: numbers of each stride, mean curves, metrics of walks and task segments."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ LOADED_HEEL = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Curves:
-    """Mean and standard deviation over strides of one channel at ``PHASES``."""
+    """Mean and standard deviation over strides of one channel at ``PHASES``, and its unit."""
 
     mean: Floats
     deviation: Floats
@@ -37,26 +37,26 @@ class Curves:
 
 
 def stride_starts(strides: Floats) -> NDArray[np.intp]:
-    """Samples right after each heel strike, from the running number of strikes."""
+    """Return the samples directly after each heel strike, from the cumulative number of strikes."""
     return np.flatnonzero(np.diff(strides) > 0.5) + 1
 
 
 def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[str, Floats]:
-    """Numbers of each whole stride [SI], shape (strides,), from running totals at the heel strikes."""
+    """Return the numbers of each whole stride [SI], shape (strides,), from cumulative totals at the heel strikes."""
     # A landing on the toes is counted in the step of the strike, of which ``starts`` has the sample after it.
     firsts = {name: starts - 1 if name == "toe_landing" else starts for name in PER_STRIDE}
     return {name: np.diff(totals[quantity.total][firsts[name]]) for name, quantity in PER_STRIDE.items()}
 
 
 def helped_strides(level: Floats, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """True for each whole stride that had help from strike to strike, from the assistance level."""
+    """Return True for each whole stride that was assisted from strike to strike, from the assistance level."""
     # A running count of samples without help is the same at both strikes where there were none between.
     vented = np.concatenate([[0], np.cumsum(level > HELPS)])
     return np.asarray(vented[starts[1:]] == vented[starts[:-1]])
 
 
 def samples_of(chosen: NDArray[np.bool_], starts: NDArray[np.intp], samples: int) -> NDArray[np.bool_]:
-    """True for each sample in one of the chosen strides."""
+    """Return True for each sample within a chosen stride."""
     # One more where a chosen stride begins and one less where it ends: the running sum is 1 inside.
     edges = np.zeros(samples + 1)
     np.add.at(edges, starts[:-1][chosen], 1.0)
@@ -67,10 +67,10 @@ def samples_of(chosen: NDArray[np.bool_], starts: NDArray[np.intp], samples: int
 def mean_curves(
     recording: Recording, starts: NDArray[np.intp], chosen: NDArray[np.bool_] | None = None
 ) -> dict[str, Curves]:
-    """Mean and deviation of every channel over strides brought to the same phases, in its SI unit; {} without strides.
+    """Return mean and deviation of every channel over time-normalised strides, in SI units; {} without strides.
 
-    ``chosen`` are the strides (strides,) to take, all unless given. Channels that hold their value between samples,
-    such as the command, have no mean.
+    ``chosen`` (strides,) selects strides, all by default. Channels that are constant between samples, such as the
+    command, have no mean.
     """
     if starts.size < 2 or (chosen is not None and not chosen.any()):
         return {}
@@ -85,7 +85,7 @@ def mean_curves(
 
 
 def times_of_phases(time: Floats, starts: NDArray[np.intp]) -> Floats:
-    """Times [s] of ``PHASES`` in each stride, shape (strides, phases)."""
+    """Return the times [s] of ``PHASES`` in each stride, shape (strides, phases)."""
     first, last = time[starts[:-1]], time[starts[1:]]
     return np.asarray(first[:, None] + PHASES * (last - first)[:, None])
 
@@ -99,10 +99,10 @@ def walk_metrics(
     helped: NDArray[np.bool_],
     counted: NDArray[np.bool_],
 ) -> dict[str, Metric]:
-    """Metrics of a walk by name, in SI, of its strides with help.
+    """Return the metrics of a walk by name, in SI units, over its assisted strides.
 
-    ``starts`` are the samples after each heel strike, ``helped`` tells which strides had help and ``counted`` which of
-    all are for means. ``averages`` are over the counted strides with help.
+    ``starts`` are the samples after each heel strike, ``helped`` (strides,) marks the assisted strides, and ``counted``
+    (strides,) the strides that count for means. ``averages`` are over the strides that are both assisted and counted.
     """
     chosen = helped & counted
     gas = float(np.ptp(recording["supplied_mass"][[0, -1]]))
@@ -138,7 +138,7 @@ def walk_metrics(
 
 
 def settled(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The chosen strides without the first ones of the walk."""
+    """Return the chosen strides without the first strides of the walk."""
     return chosen & (np.arange(chosen.size) >= SETTLING)
 
 
@@ -148,7 +148,10 @@ def stride_metrics(
     averages: Mapping[str, Curves],
     chosen: NDArray[np.bool_],
 ) -> dict[str, Metric]:
-    """Means over the chosen strides (strides,), and what they are of a healthy ankle; ``averages`` are theirs too."""
+    """Return means over the chosen strides (strides,) and their ratios to a healthy ankle.
+
+    ``averages`` are the mean curves of the same strides.
+    """
     metrics = {}
     over = "" if walk_of(configuration).task_sequence is None else " over the strides at an even speed on level ground"
     for name, quantity in PER_STRIDE.items():
@@ -179,7 +182,7 @@ def stride_metrics(
 
 
 def lowest_toes(configuration: Scenario, height: Floats) -> Metric:
-    """Lowest toes in mid-swing, where they must clear the ground, from their height [m] at ``PHASES``."""
+    """Return the lowest toe height in mid-swing, where toes must clear the ground, from heights [m] at ``PHASES``."""
     timing = gait_timing(walk_of(configuration).gait)
     first, last = np.searchsorted(PHASES, [timing.clearance_from, timing.clearance_to])
     summary = "lowest toe height above ground in mid-swing of the mean stride; below 0 they would drag"
@@ -187,7 +190,7 @@ def lowest_toes(configuration: Scenario, height: Floats) -> Metric:
 
 
 def healthy_positive_work(configuration: Scenario) -> float:
-    """Positive work [J] of the measured ankle moment in one stride of the wearer; 0 where no moment was measured."""
+    """Return the positive work [J] of the measured ankle moment in one stride; 0 without a measured moment."""
     gait = walk_of(configuration).gait
     if "ankle_moment" not in gait.curves:
         return 0.0
@@ -199,7 +202,7 @@ def healthy_positive_work(configuration: Scenario) -> float:
 
 
 def healthy_toe_height(configuration: Scenario) -> Floats:
-    """Toes of the healthy gait over the ground [m] at ``PHASES``."""
+    """Return the toe height of the healthy gait above the ground [m] at ``PHASES``."""
     gait = walk_of(configuration).gait
     path = ankle_path(gait, gait_timing(gait), walk_of(configuration).wearer)
     return path.toe_height(PHASES % 1.0, gait.shank_angle.values_at(PHASES), gait.ankle_angle.values_at(PHASES))
@@ -209,11 +212,11 @@ def healthy_toe_height(configuration: Scenario) -> Floats:
 class SegmentResult:
     """Result of one segment of a task sequence, from ``start`` to ``end`` [s], SI units.
 
-    ``strides`` begin in it with a strike, ``helped`` are the ones in which the controller was not in its safe
-    state up to the next strike, or to the end. ``gas`` [kg], ``net_push_off_work`` [J] of the strides that begin in it,
-    ``lowest_toes`` [m] over the ground in the middle of its swings, None without one. ``flat_push`` [N m] is the
-    largest torque in plantarflexion with a loaded heel, ``safe_time`` [s] when the controller first helped less (lifted
-    only, paused or stopped), None where it did not.
+    ``strides`` is the number of strides that start in the segment, and ``helped`` how many of these were fully assisted
+    up to the next strike or the end. ``gas`` is the consumed gas [kg] and ``net_push_off_work`` [J] the work of the
+    strides that start in the segment. ``lowest_toes`` [m] is the lowest toe clearance in mid-swing, None without a
+    swing. ``flat_push`` [N m] is the largest plantarflexion torque with a loaded heel. ``safe_time`` [s] is the first
+    time with reduced assistance (lifted only, paused or stopped), None without any.
     """
 
     kind: str
@@ -230,7 +233,7 @@ class SegmentResult:
 
 
 def steady_strides(planned: PlannedSequence, strikes: Floats) -> NDArray[np.bool_]:
-    """True for each whole stride, between strikes at times [s], at an even speed on level ground."""
+    """Return True for each whole stride, between strikes at times [s], at constant speed on level ground."""
     first, last = strikes[:-1], strikes[1:]
     steady = np.zeros(first.size, dtype=np.bool_)
     for start, end in planned.steady:
@@ -245,7 +248,7 @@ def segment_results(
     works: Floats,
     starts: NDArray[np.intp],
 ) -> tuple[SegmentResult, ...]:
-    """The segments that a recording reached; ``works`` [J] of its whole strides, between strikes at ``starts``."""
+    """Return the results of the recorded segments; ``works`` [J] are of the strides between strikes at ``starts``."""
     time, contact = recording.time, recording["contact"]
     strikes, end = time[starts], float(time[-1])
     heel = recording["heel_force"] > LOADED_HEEL * walk_of(configuration).wearer.body_mass * STANDARD_GRAVITY
@@ -286,7 +289,7 @@ def segment_results(
 
 
 def _lowest_toes(configuration: Scenario, recording: Recording, own: NDArray[np.bool_]) -> float | None:
-    """Lowest toes [m] where they must clear the ground: as far into each swing as for the mean stride of a walk."""
+    """Return the lowest toes [m] in the same part of each swing as in the mean stride, or None without a swing."""
     timing = gait_timing(walk_of(configuration).gait)
     swing = recording["contact"] == SWING
     edges = np.flatnonzero(np.diff(swing.astype(np.int8))) + 1
@@ -303,7 +306,7 @@ def _lowest_toes(configuration: Scenario, recording: Recording, own: NDArray[np.
 def task_sequence_metrics(
     planned: PlannedSequence, segments: Sequence[SegmentResult], recording: Recording, steady: int
 ) -> dict[str, Metric]:
-    """Numbers of a whole task sequence by name, SI units, or of what was walked of it."""
+    """Return the metrics of a whole task sequence by name, SI units, or of the walked part of an incomplete one."""
     toes = [segment.lowest_toes for segment in segments if segment.lowest_toes is not None]
     # A walk may go on after its task sequence.
     end = min(float(recording.time[-1]), float(planned.duration))

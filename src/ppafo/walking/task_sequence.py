@@ -1,4 +1,4 @@
-"""A task sequence: from a name or a file to its segments, and from these to its parts in time, in SI units."""
+"""Task sequence: loading by name or file, its segments, and their conversion to timed parts in SI units."""
 
 import functools
 import math
@@ -84,7 +84,7 @@ the forefoot is on the stair all the same."""
 
 @dataclass(frozen=True, slots=True)
 class TaskSegment:
-    """Segment of a task sequence; ``values`` in SI units by name, without those that were not given."""
+    """Segment of a task sequence; ``values`` are the given numbers in SI units, by name."""
 
     kind: str
     values: dict[str, float]
@@ -92,7 +92,7 @@ class TaskSegment:
 
 @dataclass(frozen=True, slots=True)
 class TaskSequence:
-    """Consecutive tasks of a wearer, who stands at the beginning; ``file`` is the name in messages."""
+    """Consecutive tasks of a wearer, who initially stands; ``file`` is the file name for messages."""
 
     name: str
     description: str
@@ -100,12 +100,12 @@ class TaskSequence:
     file: str
 
     def refusal(self, number: int, reason: str) -> ScenarioError:
-        """Return the error that says why a segment, counted from 0, is not usable."""
+        """Return the error for an unusable segment, counted from 0, with the reason."""
         return ScenarioError(f"{self.file}: segment {number + 1} ({self.segments[number].kind}): {reason}")
 
 
 def load_task_sequence(name_or_path: str | Path) -> TaskSequence:
-    """Return a task sequence by its name in the package or the path of its file; ScenarioError for a mistake in it."""
+    """Return a task sequence by name or path; raises ScenarioError for a mistake in the file."""
     file = label(str(name_or_path))
     document = FILE.parse(FILE.read(name_or_path), file)
     # What is in the segments is checked segment by segment.
@@ -135,7 +135,7 @@ def load_task_sequence(name_or_path: str | Path) -> TaskSequence:
 
 
 def _contradictions(segments: Iterable[TaskSegment]) -> Iterator[tuple[int, str]]:
-    """Segments, counted from 0, that cannot be as they are where they are, with the reason."""
+    """Yield each contradictory segment by its index from 0, with the reason."""
     walks = False
     for index, segment in enumerate(segments):
         values = segment.values
@@ -189,7 +189,7 @@ def json_schema() -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class TimedSegment:
-    """A segment in time: its kind, a title for tables, start and end [s], floats or arrays (wearers,)."""
+    """Segment in time: kind, title for tables, start and end [s] as floats or arrays (wearers,)."""
 
     kind: str
     title: str
@@ -199,7 +199,11 @@ class TimedSegment:
 
 @dataclass(frozen=True, slots=True)
 class PlannedSequence:
-    """Parts of a task sequence for the engine, its segments in time, and times [s] of equal strides on level ground."""
+    """Task sequence in time.
+
+    ``timed`` holds the parts for the engine, ``spans`` the segments with start and end, ``steady`` the intervals [s] of
+    equal strides on level ground, and ``duration`` is in [s].
+    """
 
     timed: TimedSequence
     spans: tuple[TimedSegment, ...]
@@ -208,7 +212,10 @@ class PlannedSequence:
 
 
 class _Planner:
-    """Puts part after part; ``ratio`` is of strides per second over the recorded ones, 0 in standing."""
+    """Builder of consecutive parts of a task sequence.
+
+    ``ratio`` is the stride frequency relative to the recorded one [-], 0 for standing.
+    """
 
     def __init__(self, frequency: Numbers, standing: Numbers, load: float) -> None:
         self.frequency = frequency
@@ -222,7 +229,7 @@ class _Planner:
         self.parts: list[SequencePart] = []
 
     def stay(self, length: Numbers, load: float) -> None:
-        """Stand for a time [s]; the load changes over it."""
+        """Stand for a time [s], while the load changes to its new value."""
         self.go(0.0, 0.0, 0.0, load, length=length)
 
     def go(
@@ -236,9 +243,10 @@ class _Planner:
         slope: float = 0.0,
         length: Numbers = None,
     ) -> None:
-        """Walk some strides, over which strides per second and stride go to these values over the recorded ones.
+        """Walk a number of strides; stride frequency and stride change to new values relative to the recorded ones.
 
-        The slope of the ground [rad] goes to another one too. ``length`` [s] follows from the strides unless given.
+        The slope of the ground [rad] changes to its new value too. ``length`` [s] is computed from the strides by
+        default.
         """
         if length is None:
             # The frequency changes evenly over the part, so its mean is that of both ends.
@@ -268,10 +276,11 @@ class _Planner:
 def plan_task_sequence(
     sequence: TaskSequence, gait: Gait, frequency: Numbers, timing: GaitTiming, strike_angle: Numbers
 ) -> PlannedSequence:
-    """The task sequence of a wearer with these strides per second [Hz], or of many; ``strike_angle`` [rad] over flat.
+    """Return the task sequence in time for a wearer, or for many, with this stride frequency [Hz].
 
-    A speed or cadence is relative to the gait's: people of a population walk each at their own. ScenarioError for
-    a segment that the gait does not allow, or more parts than there are.
+    ``strike_angle`` [rad] is the foot angle at heel strike relative to the flat foot. A speed or cadence is relative to
+    the gait's, so each person of a population has an individual pace. Raises ScenarioError for a segment that the gait
+    does not allow, or for too many parts.
     """
     resting = sequence.segments[0].kind == "rest"
     planner = _Planner(frequency, STANDS_AT * timing.heel_off, RESTING_LOAD if resting else STANDING_LOAD)
@@ -302,7 +311,7 @@ def plan_task_sequence(
 def _strides(
     planner: _Planner, segment: TaskSegment, ratio: float, strike_angle: Numbers
 ) -> Iterator[tuple[Numbers, Numbers]]:
-    """Plan a segment; where it walks on evenly and on level ground, that time [s] is given."""
+    """Plan a segment; yield the interval [s] of steady strides on level ground, if any."""
     kind, values = segment.kind, segment.values
     if kind in ("stand", "rest"):
         left, load = values["duration"], RESTING_LOAD if kind == "rest" else STANDING_LOAD
@@ -346,14 +355,17 @@ def _strides(
 
 
 def _count(planner: _Planner, values: dict[str, float], ratio: float, used: Numbers) -> Numbers:
-    """Whole strides, one or more, in the time [s] of a segment of which some is used, at a mean ratio."""
+    """Return the number of whole strides, at least 1, in the rest of a segment after ``used`` [s].
+
+    ``ratio`` is the mean stride frequency relative to the recorded one [-].
+    """
     if "strides" in values:
         return values["strides"]
     return np.maximum(np.rint((values["duration"] - used) * ratio * planner.frequency), 1.0)
 
 
 def _ratio(sequence: TaskSequence, index: int, gait: Gait) -> float:
-    """Strides per second over the recorded ones: the square root of the speed over the recorded one."""
+    """Return the stride frequency relative to the recorded one: the square root of the ratio of the speeds."""
     values, recorded = sequence.segments[index].values, gait.walking_speed
     if "speed" in values:
         if recorded is None:
@@ -375,7 +387,7 @@ def _ratio(sequence: TaskSequence, index: int, gait: Gait) -> float:
 
 
 def _title(segment: TaskSegment) -> str:
-    """Name of a segment with its speed or cadence, for tables."""
+    """Return the name of a segment with its speed or cadence, for tables."""
     values = segment.values
     if "speed" in values:
         return f"{segment.kind}, {values['speed']:.3g} m/s"
@@ -385,9 +397,9 @@ def _title(segment: TaskSegment) -> str:
 
 
 def pace_in_time(sequence: TimedSequence, time: Floats) -> tuple[Floats, Floats, Floats]:
-    """Pace of one wearer in a task sequence at times [s]; the same polynomials as ``model.gait``, for arrays.
+    """Return phase [turns], stride frequency [Hz] and stride relative to the recorded one [-] at times [s].
 
-    These are the phase [turns], strides per second [Hz] and the stride over the recorded one [-].
+    For one wearer; the polynomials are the ones of ``model.gait``, evaluated for arrays.
     """
     table = np.array([leaves(part) for part in sequence.parts], dtype=np.float64)
     row = table[np.searchsorted(table[:, 0], time, side="right") - 1].T
@@ -403,7 +415,10 @@ def pace_in_time(sequence: TimedSequence, time: Floats) -> tuple[Floats, Floats,
 
 
 def turns_walked(sequence: TimedSequence, time: float) -> Numbers:
-    """Strides, parts of one included, from the start of a task sequence to a time [s]; floats or arrays (wearers,)."""
+    """Return the number of strides, fractions included, from the start of a task sequence to a time [s].
+
+    The numbers are floats or arrays (wearers,).
+    """
     turns: Numbers = 0.0
     for part in sequence.parts:
         passed = np.clip(time - part.start, 0.0, part.length)
@@ -414,12 +429,15 @@ def turns_walked(sequence: TimedSequence, time: float) -> Numbers:
 
 
 def standing_gait(leg: LegParameters, timing: GaitTiming, sequence: TimedSequence) -> GaitNow:
-    """Start of a task sequence: shank vertical, foot flat, both at rest; numbers may be arrays (wearers,)."""
+    """Return the gait at the start of a task sequence: shank vertical, foot flat, both at rest.
+
+    The numbers may be arrays (wearers,).
+    """
     first = sequence.parts[0]
     return standing_on(leg, timing.ground_angle, *flat_foot(timing), first.turns, first.load)
 
 
 def flat_foot(timing: GaitTiming) -> tuple[Numbers, Numbers]:
-    """Sine and cosine of the angle of the flat foot over the horizontal; floats or arrays (wearers,)."""
+    """Return sine and cosine of the flat foot's angle from the horizontal, as floats or arrays (wearers,)."""
     ground: Numbers = timing.ground_angle
     return sine_and_cosine(ground / (2.0 * math.pi))

@@ -1,4 +1,4 @@
-"""Runs a walk, or one of many wearers; compares it with the same without a device and with a healthy ankle."""
+"""Simulation of a walk, or of many wearers, and comparison with no device and with a healthy ankle."""
 
 import math
 from collections import Counter
@@ -47,7 +47,7 @@ Progress = Callable[[float, float], None]
 
 
 def silent(done: float, total: float) -> None:  # both are there for those who listen
-    """Ignore how far a walk is, where nobody wants to see it."""
+    """Ignore the progress of a walk; default callback."""
 
 
 @checked
@@ -62,7 +62,7 @@ def walk(
     plugins: Plugins = (),
     progress: Progress = silent,
 ) -> WalkResult:
-    """Walk for ``minutes`` [min]: a scenario that is a walk, the name of a shipped one, or a file.
+    """Simulate a walk for ``minutes`` [min]: a scenario that is a walk, the name of a shipped one, or a file.
 
     Unless ``minutes`` are given it is as long as the file says, or its task sequence, or one minute where there is
     none, and up to ten on a bottle, which may end it before.
@@ -121,10 +121,11 @@ def walk(
 
 
 def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = silent) -> BottleLife:
-    """Walk on the bottle of a walk until that ends it: the one answer to how long a device lasts.
+    """Walk on the scenario's bottle until the bottle is exhausted; return the time that it lasted.
 
-    It is the run of ``walk`` on a bottle, as long as ``schedule`` allows, with its rests; a task sequence is repeated.
-    Faults are left out: a device that has stopped empties no bottle. ScenarioError for a walk on no bottle.
+    The simulation is the one of ``walk`` on a bottle, with the rests and the longest duration of ``schedule``; a task
+    sequence is repeated. Faults are ignored, since a stopped device uses no gas. Raises ScenarioError for a walk
+    without a bottle.
     """
     sound = dict.fromkeys(walk_of(scenario).faults, FaultSettings())
     scenario = replace(scenario, motion=replace(walk_of(scenario), faults=sound, broken={}))
@@ -149,7 +150,7 @@ def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = sil
 
 
 def lasting(scenario: Scenario, minutes: float | None) -> Scenario:
-    """A walk of some minutes [min], of its own length unless given; ScenarioError if too short or too long."""
+    """Return the walk with a duration [min], its own by default; raises ScenarioError if too short or too long."""
     if minutes is None:
         return scenario
     for is_bad, line in duration_problems(scenario, 60.0 * minutes):
@@ -160,7 +161,7 @@ def lasting(scenario: Scenario, minutes: float | None) -> Scenario:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkComparison:
-    """A walk with the device, the same without it, and numbers of the healthy gait by name."""
+    """Walk with the device, the same walk without it, and metrics of the healthy gait by name."""
 
     with_device: WalkResult
     without_device: WalkResult
@@ -168,7 +169,7 @@ class WalkComparison:
 
     @property
     def is_completed(self) -> bool:
-        """True where both walks reached their end."""
+        """True if both walks were completed."""
         return self.with_device.status.is_completed and self.without_device.status.is_completed
 
 
@@ -213,7 +214,7 @@ def compare_walks(
 
 
 def with_device_off(configuration: Scenario) -> Scenario:
-    """A walk of this wearer and device with both chambers vented: no gas flows, no bottle and no lines are needed."""
+    """Return the walk with both chambers vented: no gas flows, and neither bottle nor supply lines are used."""
     name = f"{configuration.name}-off"
     control = Control(event_on_off.OFF.name, {}, configuration.controller.period)
     motion = replace(walk_of(configuration), bottle=None, timing=THRESHOLDS)
@@ -233,9 +234,10 @@ _NO_CHAMBER = 1.0e-3
 
 
 def without_device(configuration: Scenario) -> Scenario:
-    """A walk of this wearer without a device: no plate, torque or friction, the ankle's own range of motion.
+    """Return the walk of this wearer without a device: no foot plate, actuator torque or friction.
 
-    It is one walk for every device and valve; what fails of a device is gone with it.
+    The ankle has its own range of motion. The result does not depend on device or valve; faults of the device are
+    removed.
     """
     off = with_device_off(configuration)
     device, motion = off.device, walk_of(off)
@@ -250,7 +252,7 @@ def without_device(configuration: Scenario) -> Scenario:
 
 
 def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
-    """The metrics of a walk with a healthy ankle, SI units; without a moment curve there is no work."""
+    """Return the metrics of a walk with a healthy ankle, in SI units; the work needs a moment curve."""
     gait, wearer = walk_of(configuration).gait, walk_of(configuration).wearer
     metrics = {
         "toe_clearance": Metric(0.0, "m", "0 by definition: measured from the healthy gait"),
@@ -293,7 +295,7 @@ SHOWN = {
 
 @dataclass(frozen=True, slots=True)
 class WearerQuantity:
-    """A quantity of every wearer: unit and meaning."""
+    """Unit and meaning of a quantity that is evaluated for every wearer."""
 
     unit: str
     summary: str
@@ -315,9 +317,10 @@ TRAITS: dict[str, WearerQuantity] = {
 class Population:
     """Wearers and the outcomes of their walks, each an array (wearers,) by name, in SI units.
 
-    ``diverged`` counts the wearers whose walk left what is possible; they are not in ``outcomes`` nor in ``traits``.
-    ``vented`` counts those whose controller stopped for good, ``paused`` the others who had less help for a while.
-    ``fault_flags`` counts both by the last one that was seen, with the most frequent first.
+    ``diverged`` is the number of wearers whose simulation diverged; they are excluded from ``outcomes`` and ``traits``.
+    ``vented`` is the number of wearers whose controller stopped permanently, ``paused`` the number of other wearers
+    with reduced assistance for a while. ``fault_flags`` counts the wearers of both groups by their last fault flag, the
+    most frequent first.
     """
 
     scenario: Scenario
@@ -332,12 +335,12 @@ class Population:
 
     @property
     def count(self) -> int:
-        """Number of wearers that walked to the end."""
+        """Number of wearers whose walk was completed."""
         return int(self.outcomes["gas"].size)
 
     @property
     def message(self) -> str:
-        """End of the walks, in words."""
+        """Description of the end of the walks."""
         if not self.diverged:
             return "completed"
         return f"{self.diverged} of {self.diverged + self.count} wearers diverged and are left out; {REMEDY}"
@@ -355,7 +358,7 @@ def walk_population(
     seed: Seed = 1,
     progress: Progress = silent,
 ) -> Population:
-    """Walks of many random wearers; the first is the wearer of the configuration.
+    """Simulate the walks of many randomly drawn wearers; the first is the wearer of the configuration.
 
     Arguments:
         scenario: a walk, its name or its file

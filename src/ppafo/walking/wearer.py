@@ -52,7 +52,11 @@ STATURES = (1.45, 2.0)
 
 
 class HeelRocker(NamedTuple):
-    """Lever [m] of the ground force behind the ankle: nearly flat, far up, and the tilt [rad] half of the way up."""
+    """Heel rocker: lever of the ground force behind the ankle as a function of foot tilt.
+
+    ``flat`` [m] is the lever with the foot nearly flat, ``raised`` [m] the lever of a raised foot, ``half`` [rad] the
+    tilt half of the way between.
+    """
 
     flat: float
     raised: float
@@ -90,7 +94,7 @@ class Wearer:
     keeps_gait: Annotated[float, Number("1", _KEEPS_GAIT, 0.0, 0.0, 1.0)]
 
     def leg(self) -> LegParameters:
-        """The leg as the engine takes it, on a heel that does not roll."""
+        """Return the leg as parameters of the engine, with a heel that does not roll."""
         return leg_parameters(self, HeelRocker(self.heel_lever, self.heel_lever, 1.0))
 
 
@@ -114,7 +118,7 @@ SCALING = {
 
 
 def scaled(leg: Wearer | LegParameters, mass: Any, stature: Any) -> dict[str, Any]:
-    """Return the numbers of a leg [SI] at multiples [-] of body mass and stature, each of which may be an array."""
+    """Return the numbers of a leg [SI] multiplied for a relative body mass and stature [-], scalars or arrays."""
     # A product has the same bits for one person as for a column of them, which a power need not have.
     masses, statures = (1.0, mass), (1.0, stature, stature * stature)
     return {
@@ -124,7 +128,7 @@ def scaled(leg: Wearer | LegParameters, mass: Any, stature: Any) -> dict[str, An
 
 
 def leg_parameters(wearer: Wearer, rocker: HeelRocker) -> LegParameters:
-    """The leg of a wearer as the engine takes it."""
+    """Return the leg of a wearer as parameters of the engine."""
     return LegParameters(
         shank_length=wearer.shank_length,
         shank_mass_centre=wearer.shank_mass_centre,
@@ -148,20 +152,20 @@ def leg_parameters(wearer: Wearer, rocker: HeelRocker) -> LegParameters:
 
 
 def paper_subject() -> Wearer:
-    """Return the wearer that a walk has unless one is given: the subject of the paper."""
+    """Return the default wearer of a walk: the subject of the paper."""
     return Wearer(**{quantity.name: float(quantity.default or 0.0) for quantity in WEARER})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyScale:
-    """Body mass and stature of many people over one person's, each (people,)."""
+    """Body mass and stature of many people relative to one person [-], each (people,)."""
 
     mass: Floats
     stature: Floats
 
 
 def draw_builds(count: int, generator: np.random.Generator) -> BodyScale:
-    """Draw the build of ``count`` people; the first is the wearer that is scaled."""
+    """Draw the builds of ``count`` people; the first person has the build of the wearer unchanged."""
     normal = draw_bounded_normal(generator, (2, count))
     stature = normal[0]
     # Two normal numbers with this correlation, from two that have none.
@@ -173,7 +177,7 @@ def draw_builds(count: int, generator: np.random.Generator) -> BodyScale:
 
 
 def draw_bounded_normal(generator: np.random.Generator, shape: tuple[int, ...]) -> Floats:
-    """Standard normal draws [-] of this shape, those beyond ``MAXIMUM_DEVIATIONS`` set to that limit."""
+    """Return standard normal draws [-] of this shape, clipped at ``MAXIMUM_DEVIATIONS``."""
     return np.clip(generator.standard_normal(shape), -MAXIMUM_DEVIATIONS, MAXIMUM_DEVIATIONS)
 
 
@@ -192,47 +196,47 @@ _SHANK_INERTIA, _FOOT_INERTIA = _SHARES["shank_inertia"], _SHARES["foot_inertia"
 
 
 def shank_length_of(stature: float) -> float:
-    """Length of the shank [m] of a person of some stature [m]."""
+    """Return the shank length [m] for a stature [m]."""
     return SHANK_SHARE * stature
 
 
 def shank_mass_centre_of(stature: float) -> float:
-    """Distance from the knee to the mass centre of the shank [m], of a stature [m]."""
+    """Return the distance from the knee to the mass centre of the shank [m], for a stature [m]."""
     return _SHANK_CENTRE * stature
 
 
 def foot_mass_centre_of(stature: float) -> float:
-    """Distance from the ankle to the mass centre of the foot [m], of a stature [m]."""
+    """Return the distance from the ankle to the mass centre of the foot [m], for a stature [m]."""
     return _FOOT_CENTRE * stature
 
 
 def heel_lever_of(stature: float) -> float:
-    """Distance from the ankle back to the heel [m], of a stature [m]."""
+    """Return the horizontal distance from the ankle back to the heel [m], for a stature [m]."""
     return _HEEL * stature
 
 
 def toe_lever_of(stature: float) -> float:
-    """Distance from the ankle to the toes [m], of a stature [m]."""
+    """Return the horizontal distance from the ankle forward to the toes [m], for a stature [m]."""
     return _TOE * stature
 
 
 def shank_mass_of(_stature: float, body_mass: float) -> float:
-    """Mass of the shank [kg] of a body mass [kg]."""
+    """Return the mass of the shank [kg] for a body mass [kg]."""
     return _SHANK_MASS * body_mass
 
 
 def foot_mass_of(_stature: float, body_mass: float) -> float:
-    """Mass of the foot [kg] of a body mass [kg]."""
+    """Return the mass of the foot [kg] for a body mass [kg]."""
     return _FOOT_MASS * body_mass
 
 
 def shank_inertia_of(stature: float, body_mass: float) -> float:
-    """Inertia of the shank about its mass centre [kg m^2] of a stature [m] and a body mass [kg]."""
+    """Return the inertia of the shank about its mass centre [kg m^2], for a stature [m] and a body mass [kg]."""
     return _SHANK_INERTIA * body_mass * stature * stature
 
 
 def foot_inertia_of(stature: float, body_mass: float) -> float:
-    """Inertia of the foot about its mass centre [kg m^2] of a stature [m] and a body mass [kg]."""
+    """Return the inertia of the foot about its mass centre [kg m^2], for a stature [m] and a body mass [kg]."""
     return _FOOT_INERTIA * body_mass * stature * stature
 
 
@@ -251,7 +255,7 @@ STATURE, BODY_MASS = "wearer.stature", "wearer.body_mass"
 
 
 def links_of_stature(document: Mapping[str, Any]) -> Graph:
-    """Links from stature and body mass to the segments of a walk file: now, or once the stature is given."""
+    """Return links from stature and body mass to segments of a walk file, active now or when a stature is given."""
     later = value_at(document, STATURE) is None
     links: dict[str, tuple[LinkedDefault, ...]] = {}
     for name, function in _FOLLOWING.items():
@@ -263,9 +267,9 @@ def links_of_stature(document: Mapping[str, Any]) -> Graph:
 
 
 def read_wearer(reading: DocumentReader, gait: Gait, is_named: bool) -> Wearer:
-    """Return the wearer of a walk file; what it leaves out is of the gait's subject, or of the paper's by default.
+    """Return the wearer of a walk file; defaults are of the gait's subject, or of the paper's without a named gait.
 
-    Where it gives the stature, segments follow that and the body mass.
+    With a given stature, the default segments are scaled with stature and body mass.
     """
     paper = subject = _PAPER
     # The built-in gait, where nobody names it, is walked by the paper's subject and not by its own.
@@ -306,14 +310,14 @@ walk otherwise, and not only with less mass.
 
 
 def wearer_origin(reading: DocumentReader, gait: Gait, is_named: bool) -> str:
-    """Origin of the wearer's body mass, in words."""
+    """Return a description of the origin of the wearer's body mass."""
     if value_at(reading.document, "wearer.body_mass") is not None:
         return "as wearer.body_mass states"
     return f"the subject of gait '{gait.name}'" if is_named else "the paper's subject"
 
 
 def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
-    """Return one line on the person who walks, and on the gait's own subject where that is another."""
+    """Return a line on the wearer, and on the gait's own subject if that is another person."""
     line = f"wearer: {wearer.body_mass:.4g} kg, {origin}"
     is_subject = origin.startswith("the subject of")
     usual = (gait.stature if is_subject else None) or _PAPER.stature

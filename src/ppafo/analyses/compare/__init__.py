@@ -1,1 +1,1 @@
-"""Paired comparison of configurations: difference of each metric with its interval, and the better one."""
+"""Paired comparison of configurations: difference of each metric with its interval, and the best configuration."""

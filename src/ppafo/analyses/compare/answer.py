@@ -1,4 +1,4 @@
-"""A comparison as a finding: a table for each task, paired statistics, error against gas, the changes."""
+"""Report of a comparison: table for each task, paired statistics, tracking error against gas, changes."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -33,12 +33,15 @@ _ERROR, _GAS = "rms_error", "gas_supplied"
 
 @dataclass(frozen=True, slots=True)
 class ConfigurationResult:
-    """A configuration on a task: how the nominal run ended, its metrics, and how many draws failed and first why.
+    """Result of a configuration on a task.
 
-    ``tracking`` is the verdict on a nominal run that does not follow its reference.
-
-    ``rows`` are its runs over the draws, ``renoised`` the first of them again with other noise; None where there are
-    none.
+    ``status``: end of the nominal run
+    ``metrics``: metrics of the nominal run [SI]
+    ``tracking``: verdict on a nominal run that does not follow its reference
+    ``failed_draws``: number of draws whose run failed
+    ``reason``: reason of the first failure
+    ``rows``: runs over the draws; None without draws
+    ``renoised``: first runs of ``rows`` repeated with other sensor noise; None without noise
     """
 
     configuration: str
@@ -53,26 +56,27 @@ class ConfigurationResult:
 
     @property
     def word(self) -> str:
-        """End of the nominal run in words; a run that does not follow its reference is not recommended."""
+        """End of the nominal run in words; not recommended if the run does not follow its reference."""
         return self.tracking.kind if self.tracking is not None and not self.follows else self.status.kind
 
     @property
     def follows(self) -> bool:
-        """Tell whether the nominal run follows its reference, or misses it only as its scenario announces."""
+        """True if the nominal run follows its reference, or misses it only as announced by its scenario."""
         return self.tracking is None or not self.tracking.is_useless
 
     def value(self, metric: str) -> float:
-        """Return a metric [SI] of the nominal run, nan where it has none."""
+        """Return a metric [SI] of the nominal run, nan if the run does not have this metric."""
         values = self.metrics.get(metric)
         return math.nan if values is None else values.value
 
 
 @dataclass(frozen=True, slots=True)
 class OnTask:
-    """All configurations on one task.
+    """Results of all configurations on one task.
 
-    ``pareto_front`` are those that no other beats in both error and gas, ``pairs`` the statistics of each against the
-    baseline, ``best`` the probability of each to be the best, by metric; both empty without draws.
+    ``pareto_front``: configurations that are Pareto-optimal in error and gas
+    ``pairs``: paired statistics of each configuration against the baseline; empty without draws
+    ``best``: probability of each configuration to be the best, by metric; empty without draws
     """
 
     task: str
@@ -83,16 +87,17 @@ class OnTask:
     best: dict[str, dict[str, ConfidenceInterval]]
 
     def case(self, configuration: str) -> ConfigurationResult:
-        """Return what a configuration did."""
+        """Return the result of a configuration."""
         return next(case for case in self.cases if case.configuration == configuration)
 
 
 @dataclass(frozen=True, slots=True)
 class ComparisonResult:
-    """Configurations on tasks, one of them the ``baseline``; numbers in SI.
+    """Comparison of configurations on tasks with a ``baseline``; numbers in SI.
 
-    ``draws`` is 0 without uncertainty; ``varied`` are the uncertain paths but the noise; ``confidence`` is the level of
-    the intervals.
+    ``draws``: number of draws, 0 without uncertainty
+    ``varied``: uncertain paths except sensor noise
+    ``confidence``: confidence level of the intervals
     """
 
     units: str
@@ -108,7 +113,7 @@ class ComparisonResult:
 
     @property
     def has_noise(self) -> bool:
-        """True where a controller receives noise."""
+        """True if a controller receives sensor noise."""
         return any(case.renoised is not None for task in self.tasks for case in task.cases)
 
 
@@ -128,7 +133,7 @@ _PARETO = (
 
 
 def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
-    """Return a comparison in words, tables and panels."""
+    """Return a comparison as a finding with sentences, tables and panels."""
     names = comparison.configurations
     has_errors = _ERROR in comparison.metrics
     said = [_READING] if comparison.draws else []
@@ -179,7 +184,7 @@ def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
 
 
 def _parts(comparison: ComparisonResult, task: OnTask) -> list[Section]:
-    """Return the metrics of all configurations, each other one against the baseline, and which is the best."""
+    """Return the tables of a task: metrics, changes against the baseline, probability of being the best."""
     where = "" if len(comparison.tasks) == 1 else f", {task.task}"
     kinds = [(name, of_metric(name)) for name in comparison.metrics]
     best = {
@@ -209,7 +214,7 @@ _PROBABILITY = Kind(form=".4g")
 
 
 def _paired(comparison: ComparisonResult, task: OnTask, name: str) -> list[Column]:
-    """Return a row for each metric: change without and with uncertainty, mean difference, probability of a gain."""
+    """Return the columns of a table with a row for each metric: change, mean difference, probability of improvement."""
     pairs = task.pairs[name]
     kinds = [of_metric(pair.metric, "+.3g") for pair in pairs]
     nominal: list[str] = []
@@ -248,7 +253,7 @@ def _percent(fraction: float) -> str:
 
 
 def remarks_of(comparison: ComparisonResult) -> list[str]:
-    """Return what is not as one would expect: other tasks, runs that failed, means that few draws decide, noise."""
+    """Return remarks on differing tasks, failed runs, means that depend on few draws, and noise."""
     said, failed, carried = [], [], []
     for task in comparison.tasks:
         asked = {case.configuration: (case.scenario.reference, case.scenario.run.duration) for case in task.cases}
@@ -283,7 +288,7 @@ def remarks_of(comparison: ComparisonResult) -> list[str]:
 
 
 def front_of(cases: Sequence[ConfigurationResult]) -> list[str]:
-    """Return the configurations that no other beats in both error and gas; none that does not follow its reference."""
+    """Return the configurations that follow their reference and are Pareto-optimal in error and gas."""
     judged = [case for case in cases if case.follows]
     points = np.array([[case.value(name) for name in (_ERROR, _GAS)] for case in judged]).reshape(-1, 2)
     return [case.configuration for case, is_front in zip(judged, pareto_front(points), strict=True) if is_front]
@@ -305,7 +310,7 @@ def _change_panels(comparison: ComparisonResult) -> list[Panel]:
 
 
 def _pareto(comparison: ComparisonResult, task: OnTask) -> Panel:
-    """Return error over gas, a mark for each configuration that completed and a dot for each draw."""
+    """Return a panel of error over gas, with a mark for each completed configuration and a dot for each draw."""
     cases = [case for case in task.cases if case.status.is_completed]
     front, marks, on_front = front_of(cases), [], []
     # As everywhere: the colour of a valve, where that tells the configurations apart.
@@ -329,7 +334,7 @@ def _pareto(comparison: ComparisonResult, task: OnTask) -> Panel:
 
 
 def _change(comparison: ComparisonResult, task: OnTask, metric: str) -> Panel:
-    """Return histograms of the change of a metric against the baseline; dashed: the nominal device."""
+    """Return a panel with histograms of the change of a metric against the baseline; dashed: nominal device."""
     baseline, marks, ends = task.case(comparison.baseline), [], []
     for number, name in enumerate(comparison.configurations):
         own, colour = task.case(name), COLOURS[number % len(COLOURS)]

@@ -1,4 +1,4 @@
-"""Two configurations in the same draws: differences, probabilities, and what no other dominates."""
+"""Paired statistics of two configurations over the same draws, and the Pareto front."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,15 +40,17 @@ COMPARED: dict[str, int] = {
 
 @dataclass(frozen=True, slots=True)
 class Paired:
-    """Metric of a configuration compared with the baseline's, over the pairs in which both have a value.
+    """Paired statistics of a metric of a configuration against the baseline, over the pairs in which both have a value.
 
-    ``difference`` is the mean of configuration less baseline [SI] with its confidence interval; ``change`` the median
-    over the draws of the same as a fraction of the baseline (nan where that is 0), ``change_low`` and ``change_high``
-    its 5 and 95 % quantiles: how uncertain the change is, however many draws are made. ``better`` is the probability
-    that the configuration is better in a draw, with its confidence interval: how well that is known from these draws;
-    None where neither end of the metric is better. ``equal`` is the fraction of draws in which both are the same.
-    ``effective_size`` is how many pairs determine the mean difference, ``noise`` the fraction of the variance of the
-    difference that is due to sensor noise, None where there is none.
+    ``pairs``: number of pairs
+    ``difference``: mean of configuration minus baseline [SI], with confidence interval
+    ``change``: median over the draws of this difference divided by the baseline value, nan if the baseline is 0
+    ``change_low``, ``change_high``: 5 and 95 % quantile of the same ratio; more draws do not narrow this range
+    ``better``: probability that the configuration is better in a draw, with confidence interval; None for a metric
+        without preferred direction
+    ``equal``: fraction of draws in which both values are equal
+    ``effective_size``: effective sample size of the mean difference
+    ``noise``: fraction of the variance of the difference that is due to sensor noise; None without noise
     """
 
     metric: str
@@ -64,7 +66,7 @@ class Paired:
 
 
 def pareto_front(points: Floats) -> Masks:
-    """Return which points (points, goals) are not dominated: no other is at least as low in all goals, lower in one."""
+    """Return a mask of the points (points, goals) that no other point dominates; every goal is minimised."""
     front = np.zeros(len(points), dtype=np.bool_)
     for row, point in enumerate(points):
         if np.all(np.isfinite(point)):
@@ -81,11 +83,11 @@ def compare_pairs(
     confidence: float,
     other_noise: tuple[Floats, Floats] | None = None,
 ) -> Paired | None:
-    """Return the statistics of values (draws,) [SI], nan where there is none; None without any pair.
+    """Return the paired statistics of values (draws,) [SI], nan for a missing value; None without any pair.
 
-    The draws are dealt out to replicates in turn. ``other_noise`` are both again, for the first draws with other noise.
-    ``better`` is -1 where less is better, 1 where more is, 0 where neither is. A draw in which both are the same counts
-    for neither.
+    Draws are assigned to the replicates in turn. ``other_noise`` has the values of both configurations for the first
+    draws, repeated with other noise. ``better`` is -1 if a smaller value is better, 1 if a larger value is better, 0 if
+    neither. A draw with equal values counts for neither configuration.
     """
     both = np.isfinite(baseline) & np.isfinite(other)
     first, second = baseline[both], other[both]

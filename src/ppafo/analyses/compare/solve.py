@@ -1,4 +1,4 @@
-"""Configurations side by side: each as it is, and all of them over the same uncertain values."""
+"""Comparison of configurations: nominal runs, and runs over the same draws of uncertain values."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -35,8 +35,10 @@ _SAME = 1.0e-9
 class Draws:
     """Number of draws of the uncertain values, and acceptance rules for their runs.
 
-    ``requested`` None is the default, ``seed`` None the study's own. More than the fraction ``maximum_failed`` of
-    failed runs is an error.
+    ``requested``: number of draws; None for the default
+    ``seed``: random seed; None for the seed of the study
+    ``confidence``: confidence level of the intervals
+    ``maximum_failed``: fraction of failed runs above which the comparison is refused
     """
 
     requested: int | None
@@ -52,7 +54,7 @@ class Draws:
         return DEFAULT_DRAWS if self.requested is None else self.requested
 
     def check(self) -> None:
-        """Refuse numbers outside their ranges with a StudyError."""
+        """Raise StudyError for numbers outside their ranges."""
         if not FEWEST_DRAWS <= self.count <= MAXIMUM_DRAWS:
             raise StudyError(f"draws = {self.count!r}: must be at least {FEWEST_DRAWS} and at most {MAXIMUM_DRAWS:,}")
         check_fraction(self.confidence, *CONFIDENCE)
@@ -74,11 +76,12 @@ def compared(
     study: Study | None,
     draws: Draws,
 ) -> ComparisonResult:
-    """Return configurations side by side on tasks, pairs of name and overrides, and over the values of a study.
+    """Return the comparison of configurations on tasks and over the uncertain values of a study.
 
-    All are compared with the ``baseline``, the first unless one is named; without a task the scenarios are as written.
-    Without a study the noise of the sensors alone is drawn, where there is any. StudyError where too many runs fail,
-    and for a study that draws a value in which the configurations differ.
+    ``tasks`` are pairs of name and overrides; without tasks, the scenarios run as written. ``baseline`` is the name of
+    the reference configuration, by default the first one. Without a study, only sensor noise is drawn, if there is any.
+
+    Raises StudyError if too many runs fail, and for a study that draws a value in which the configurations differ.
     """
     names = [configuration.name for configuration in configurations]
     if baseline is not None and baseline not in names:
@@ -131,9 +134,9 @@ def _drawn_runs(
     draws: Draws,
     seed: int,
 ) -> _DrawnRuns:
-    """Return the runs of every case, all over the same draws; nothing where nothing is drawn.
+    """Return the runs of every case over the same draws; empty if nothing is random.
 
-    StudyError for draws that were requested where nothing is.
+    Raises StudyError if draws are requested although nothing is random.
     """
     if not uncertainty.drawn:
         if draws.requested is not None:
@@ -174,7 +177,7 @@ def _drawn_runs(
 
 
 def _cases(scenarios: Scenarios, drawn: _DrawnRuns, threads: int | None) -> dict[str, list[ConfigurationResult]]:
-    """Return the cases of each task: the nominal run of every configuration, beside its runs over the draws."""
+    """Return the results of each task: nominal run of every configuration, and its runs over the draws."""
     # With the seed of each scenario: what the tables call nominal is one realisation of its noise.
     results = simulate_many(list(scenarios.values()), threads)
     cases: dict[str, list[ConfigurationResult]] = {}
@@ -204,7 +207,7 @@ def _on_task(
     metrics: Sequence[str],
     confidence: float,
 ) -> OnTask:
-    """Return the cases of a task with their statistics, without draws none: each against the baseline, and the best."""
+    """Return the results of a task; with draws, also paired statistics against the baseline and the best one."""
     first = next(case for case in cases if case.configuration == baseline)
     pairs: dict[str, list[Paired]] = {}
     for case in cases:

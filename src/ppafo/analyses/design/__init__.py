@@ -1,1 +1,1 @@
-"""Design of a device: for a wearer, for a torque profile, or Pareto-optimal in error, gas and mass."""
+"""Design of a device for a wearer or for a torque profile."""

@@ -1,4 +1,4 @@
-"""A design file: a torque profile and what a device is to do with it."""
+"""Loading of a design file: a torque profile and the requirements on a device."""
 
 from importlib import resources
 from pathlib import Path
@@ -16,11 +16,12 @@ FILE = TomlKind("design", "design", resources.files("ppafo.analyses.design") / "
 
 @checked
 def load_design(problem: str | Path, *, plugins: Plugins = ()) -> SizingProblem:
-    """Return the problem of a design file, by its name in the package or by its path; paths in it begin in its folder.
+    """Return the problem of a design file, by its name in the package or by its path.
 
-    StudyError or ParameterError for what is not usable, in one line.
+    Paths in a design file are relative to its folder. ``plugins`` are modules of your own whose objects files may name,
+    as in ``simulate``.
 
-    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    Raises StudyError or ParameterError, in one line, for an invalid file.
 
     >>> import ppafo
     >>> ppafo.load_design("push-off").name

@@ -1,4 +1,4 @@
-"""The value from which on a condition is met, in words, a table and a figure."""
+"""Report of a threshold: sentences, a table and a figure."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,10 +16,13 @@ from ppafo.report.style import BLACK, GREEN, GREY, VERMILION
 
 @dataclass(frozen=True, slots=True)
 class FindSample:
-    """A value [SI] that was tried, the metric there [SI], nan where the run failed, and by what it was judged [SI].
+    """A tried value and its metric.
 
-    ``judged`` is the metric, where the loop oscillates on the hold the larger one of it and of the RMS error there, and
-    nan where the loop oscillates throughout.
+    ``value``: tried value [SI]
+    ``metric``: metric at this value [SI]; nan if the run failed
+    ``judged``: number compared with the limit [SI]: the metric, or the RMS error on the hold if that is larger and the
+        loop oscillates there; nan if the loop oscillates throughout
+    ``is_of_grid``: True if the value belongs to the initial grid
     """
 
     value: float
@@ -30,12 +33,14 @@ class FindSample:
 
 @dataclass(frozen=True, slots=True)
 class Threshold:
-    """The lowest, or highest, value that meets a condition on a metric; numbers in SI.
+    """Lowest or highest value that meets a condition on a metric; numbers in SI.
 
-    ``value`` is None where none does, and ``not_met_at`` the next value on its outer side that was tried and does not,
-    None at the end of the range. ``changes`` counts how often the condition begins or ceases to be met along the values
-    that were tried, ``met`` are the ends of each stretch where it is. ``unsettled`` counts the runs whose loop
-    oscillates at the instant of the metric, so that their RMS error on the hold has to meet the condition too.
+    ``value``: value found; None if no value meets the condition
+    ``not_met_at``: next tried value on the outer side, which does not meet the condition; None at the end of the range
+    ``changes``: number of changes between met and not met along the tried values
+    ``met``: first and last value of each interval in which the condition is met
+    ``unsettled``: number of runs whose loop oscillates at the instant of the metric, so that their RMS error on the
+        hold must meet the condition too
     """
 
     scenario: str
@@ -59,7 +64,7 @@ class Threshold:
 
 
 def finding_of(outcome: FindResult) -> Finding[Threshold]:
-    """Return the search in words, a table of where the condition is met, and the metric over the value."""
+    """Return the search as a finding: sentences, table of the intervals that meet the condition, metric over value."""
     wanted = "highest" if outcome.highest else "lowest"
     path, condition, tried = outcome.path, outcome.condition, outcome.tried
     # In the unit of the range that was given.
@@ -106,17 +111,17 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
 
 
 def _changes(outcome: FindResult) -> int:
-    """Return how often the condition begins or ceases to be met along the values."""
+    """Return the number of changes between met and not met along the tried values."""
     return int(np.count_nonzero(np.diff(outcome.is_met)))
 
 
 def _not_followed(outcome: FindResult) -> int:
-    """Return at how many values the condition is met, but the reference is not followed."""
+    """Return the number of values that meet the condition with a reference that is not followed."""
     return int(np.count_nonzero(~outcome.tried["follows"] & outcome.condition.is_kept(outcome.tried["judged"])))
 
 
 def _verdict(outcome: FindResult, kind: Kind) -> str:
-    """Return the value, or where none meets the condition the one that comes nearest."""
+    """Return a sentence on the value found, or on the nearest value if none meets the condition."""
     path, condition, tried = outcome.path.path, outcome.condition, outcome.tried
     of_condition, (place, beyond) = of_metric(condition.metric), outcome.found
     wanted, further = ("highest", "higher") if outcome.highest else ("lowest", "lower")
@@ -138,7 +143,7 @@ def _verdict(outcome: FindResult, kind: Kind) -> str:
 
 
 def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
-    """Yield what else is to be known: runs, other stretches, noise, oscillation and failures."""
+    """Yield remarks on runs, further intervals, noise, oscillation and failures."""
     condition, is_met, tried, runs = outcome.condition, outcome.is_met, outcome.tried, outcome.runs
     place, _ = outcome.found
     evenly = np.count_nonzero(tried["is_of_grid"])
@@ -180,7 +185,7 @@ def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
 
 
 def _panel(outcome: FindResult, kind: Kind) -> Panel:
-    """Return the metric over the value, with the limit, where it is met, and the value that was found."""
+    """Return a panel of the metric over the value, with the limit, the values that meet it, and the result."""
     tried, condition = outcome.tried, outcome.condition
     values, metrics, judged = tried["value"], tried["metric"], tried["judged"]
     dots, dashes = {"linestyle": "", "marker": "o", "markersize": 3}, {"linestyle": "--", "linewidth": 1.0}

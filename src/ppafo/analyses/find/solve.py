@@ -1,4 +1,4 @@
-"""The lowest or highest value that meets a condition on a metric: a grid, then ever smaller brackets."""
+"""Search for the lowest or highest value that meets a condition on a metric: grid, then bisection."""
 
 import re
 from dataclasses import dataclass, replace
@@ -53,7 +53,7 @@ def range_of(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
 def condition_of(text: str, base: Scenario, path: str) -> MetricLimit:
     """Return the condition of a text ``METRIC <= LIMIT`` or ``METRIC >= LIMIT``; StudyError for any other text.
 
-    The ambient pressure behind a gauge pressure is the scenario's, unless ``path``, which varies, is that pressure.
+    Gauge pressures refer to the ambient pressure of the scenario, unless ``path``, the varied number, is this pressure.
     """
     quoted = f"'{one_line(text)}'"
     parts = _CONDITION.fullmatch(text)
@@ -84,7 +84,7 @@ the reference is followed in all streams. ``is_of_grid``: of the first values, n
 
 @dataclass(frozen=True, slots=True)
 class FindResult:
-    """Values that were tried, ascending, as a structured array of ``TRIED``, and the ``runs`` that this took."""
+    """Search result: tried values, ascending, as a structured array of ``TRIED``, and the counted ``runs``."""
 
     scenario: str
     path: VariedPath
@@ -96,12 +96,12 @@ class FindResult:
 
     @property
     def is_met(self) -> NDArray[np.bool_]:
-        """True for each value that meets the condition with a reference that is followed."""
+        """Mask of the values that meet the condition with a reference that is followed."""
         return np.asarray(self.condition.is_kept(self.tried["judged"]) & self.tried["follows"])
 
     @property
     def found(self) -> tuple[int | None, float | None]:
-        """Place of the outermost value that meets the condition, and its neighbour on the outer side; None for none."""
+        """Index of the outermost value that meets the condition, and its outer neighbour [SI]; None if missing."""
         met = np.flatnonzero(self.is_met)
         if met.size == 0:
             return None, None
@@ -111,7 +111,7 @@ class FindResult:
 
     @property
     def stretches(self) -> list[list[float]]:
-        """The first and last value of each stretch of neighbours that meet the condition."""
+        """First and last value of each interval of consecutive values that meet the condition."""
         # Not met beyond both ends: a stretch that reaches the end of the range ends there.
         padded = np.concatenate([[False], self.is_met, [False]]).astype(int)
         first, after = np.flatnonzero(np.diff(padded) > 0), np.flatnonzero(np.diff(padded) < 0)
@@ -119,7 +119,7 @@ class FindResult:
         return [[values[low], values[high - 1]] for low, high in zip(first, after, strict=True)]
 
     def with_values(self, base: Scenario, values: Floats, seeds: Floats, is_of_grid: bool) -> "FindResult":
-        """Try values, each over all streams of noise, and return them with those tried before."""
+        """Try values, each with all noise streams, and return them merged with the values tried before."""
         metric, streams = self.condition.metric, max(1, seeds.size)
         columns = {self.path.path: np.tile(values, streams)}
         if seeds.size:
@@ -154,10 +154,12 @@ def outermost(
     threads: int | None = None,
     progress: Report | None = None,
 ) -> FindResult:
-    """Return the search for the outermost value; StudyError for bad input, and where no run has the metric.
+    """Search for the lowest or highest value that meets a condition.
 
-    ``vary`` is ``PATH=LOW..HIGH`` and ``such_that`` is ``METRIC <= LIMIT`` or ``METRIC >= LIMIT``; ``grid`` values
-    are tried first, the highest that meets the condition is sought, or else the lowest.
+    ``vary`` is ``PATH=LOW..HIGH`` and ``such_that`` is ``METRIC <= LIMIT`` or ``METRIC >= LIMIT``. ``highest`` selects
+    the highest value instead of the lowest; ``grid`` is the number of values tried first.
+
+    Raises StudyError for invalid input, and if no run has the metric.
     """
     with at_fault("vary"):
         path, low, high = range_of(vary, base)

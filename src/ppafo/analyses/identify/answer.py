@@ -1,4 +1,4 @@
-"""An identification: estimates and checks in the units of the set, the new set, the figures."""
+"""Report of an identification: estimates and checks in the units of the parameter set, new set, figures."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -32,7 +32,14 @@ from ppafo.wording import count_of
 
 @dataclass(frozen=True, slots=True)
 class Identification:
-    """The outcome of a problem: what could be had, results in the order of making, the set before and after."""
+    """Result of an identification problem.
+
+    ``name``: name of the problem
+    ``results``: results of the procedures, in the order of their evaluation
+    ``trajectory``: result of the trajectory fit; None without one
+    ``before``: parameter set before the identification
+    ``new_set``: parameter set with the identified values
+    """
 
     name: str
     results: tuple[BenchResult, ...]
@@ -42,19 +49,19 @@ class Identification:
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
-        """All estimates of all procedures, the trajectory fit's last."""
+        """Estimates of all procedures, followed by the estimates of the trajectory fit."""
         fitted = () if self.trajectory is None else self.trajectory.fit.estimates
         return (*(estimate for result in self.results for estimate in result.estimates), *fitted)
 
     @property
     def is_good(self) -> bool:
-        """Tell whether all recordings agree on their numbers and the new set makes a device."""
+        """True if no recordings contradict each other and the new set is a valid device."""
         is_fitted = self.trajectory is None or self.trajectory.is_good
         return is_fitted and not self.new_set.problem and not any(result.conflict for result in self.results)
 
     @property
     def kind(self) -> RecordingKind:
-        """The kind of all recordings together."""
+        """Common kind of all recordings."""
         kinds = [result.kind for result in self.results]
         return kind_of([*kinds, *(() if self.trajectory is None else (kind_of_fit(self.trajectory.fit),))])
 
@@ -96,7 +103,7 @@ _CHANNELS = {
 
 
 def trajectory_panels(measurement: Recording, model: Recording) -> list[Panel]:
-    """Return samples, model and residuals of one experiment over time, two panels for each channel that was fitted.
+    """Return samples, model and residuals of one experiment over time, two panels for each fitted channel.
 
     Both recordings have the same times.
     """
@@ -130,7 +137,7 @@ _MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
 
 @in_units(lambda found: counted_from(found.before.shown, atmospheric_pressure(found.before)))
 def finding_of(identification: Identification) -> Finding[Identification]:
-    """Return what was identified in words and tables; passed where recordings agree and the set makes a device."""
+    """Return an identification as a finding; passed if the recordings agree and the new set is a valid device."""
     name, new_set, before = identification.name, identification.new_set, identification.before
     parts = []
     for result in identification.results:
@@ -171,7 +178,7 @@ def _toml_bytes(parameter_set: ParameterSet) -> bytes:
 
 
 def _table(heading: str, estimates: Iterable[Estimate], before: ParameterSet, remarks: Sequence[str]) -> Section:
-    """Return a row for each estimate, in the units of the set before, and remarks below them."""
+    """Return a table with a row for each estimate in the units of the previous set, with remarks below."""
     rows = (estimate_row(estimate, before) for estimate in estimates)
     return Section(heading, columns_of(("",) * 4, rows), remarks=tuple(remarks))
 
@@ -181,7 +188,7 @@ _FAR_FROM_SET = 5.0
 
 
 def _far_from(before: ParameterSet, estimates: Iterable[Estimate]) -> Iterator[str]:
-    """Yield a remark on each value that is many times what the set had, or a small part of it."""
+    """Yield a remark on each estimate that differs from its previous value by a large factor."""
     for estimate in estimates:
         entry = before.numbers.get(estimate.path)
         value, unit = in_set_unit(estimate.value, estimate.path, estimate.unit, before)
@@ -196,12 +203,12 @@ def _far_from(before: ParameterSet, estimates: Iterable[Estimate]) -> Iterator[s
 
 
 def _conflict(sentence: str) -> tuple[str, ...]:
-    """Return what a sentence on a conflict means for the numbers; nothing without one."""
+    """Return a remark on the validity of the numbers under a conflict; empty without a conflict."""
     return (f"holds for this model only: {sentence}",) if sentence else ()
 
 
 def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Section:
-    """Return estimates, each with its sentence, then tolerances that matter, what is left, and candidates."""
+    """Return the section of the trajectory fit: estimates, tolerances, remarks and proposed next experiments."""
     kind, fit = kind_of_fit(outcome.fit), outcome.fit
     origin = "" if kind == "measured" else f" ({kind})"
     remarks = [
@@ -258,13 +265,16 @@ def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> lis
 
 
 def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[float, str]:
-    """Return a number in the unit of the set, one that the set does not have in the unit that people read."""
+    """Return a number in the unit of the set, or in the display unit if the set does not have the number."""
     reported, own = in_set_unit(number, path, unit, before)
     return in_shown_unit(number, unit) if own == unit else (reported, own)
 
 
 def estimate_row(estimate: Estimate, before: ParameterSet) -> tuple[str, ...]:
-    """Return path, value, interval and verdict of an estimate in the unit of the set, digits that tell its ends."""
+    """Return path, value, interval and verdict of an estimate in the unit of the set.
+
+    The number of digits resolves the ends of the interval.
+    """
     if math.isnan(estimate.value):
         return estimate.path, "no value", "", estimate.verdict
     shown = [
@@ -281,7 +291,7 @@ def estimate_row(estimate: Estimate, before: ParameterSet) -> tuple[str, ...]:
 
 
 def _figures(identification: Identification) -> list[Section]:
-    """Return a figure for each procedure and recording, figure 3 where both of its panels are there."""
+    """Return a figure for each procedure and recording, and figure 3 if both of its panels are available."""
     figures = []
     counts: dict[str, int] = {}
     for result in identification.results:
@@ -304,7 +314,7 @@ def _figures(identification: Identification) -> list[Section]:
 
 
 def kind_of_fit(fit: TrajectoryFit) -> RecordingKind:
-    """Return the kind of all recordings of a fit together."""
+    """Return the common kind of all recordings of a fit."""
     return kind_of([recording.kind for recording in fit.measurements])
 
 

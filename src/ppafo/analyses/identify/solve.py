@@ -31,10 +31,10 @@ from ppafo.units.shown import counted_from, shown_in
 
 
 def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:
-    """Return the outcome of a problem whose paths begin in ``folder``; ``file`` is what messages call it.
+    """Return the result of an identification problem.
 
-    The procedures go first, in the order in which each leans on those before it, then the section [trajectory]. Raises
-    the errors of ``identify``.
+    Paths are relative to ``folder``; ``file`` is the name used in error messages. The procedures run first, in the
+    order in which each depends on the earlier ones, then the section [trajectory]. Raises the errors of ``identify``.
     """
     name = problem.device.set
     beside = folder / name
@@ -103,9 +103,9 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
 def _sources(
     problem: ProblemFile, path: Path, file: str, columns: str | None, parameter_set: ParameterSet
 ) -> tuple[RecordingSource, ...]:
-    """Return the recordings in a file that a problem names, read through one of its column maps if it says one.
+    """Return the recordings in a file that a problem names, read through a column map if one is given.
 
-    The set has the atmosphere from which gauge pressures count, and the gas of volume flows.
+    ``parameter_set`` provides the atmosphere for gauge pressures and the gas for volume flows.
     """
     atmosphere = atmospheric_pressure(parameter_set)
     if path.is_dir():
@@ -120,7 +120,7 @@ def _sources(
 
 @dataclass(frozen=True, slots=True)
 class _Task:
-    """A procedure with its recordings, and what messages call it."""
+    """Identification procedure with its recordings, and the name used in error messages."""
 
     procedure: ProcedureProblem
     sources: tuple[RecordingSource, ...]
@@ -128,9 +128,9 @@ class _Task:
 
 
 def _uses(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -> tuple[UsedRecording, ...]:
-    """Return what the procedures use of which recording.
+    """Return the use of each recording by each procedure.
 
-    One recording may serve two procedures, which ask it other things; IdentificationError where it serves one twice.
+    A recording may serve two different procedures. Raises IdentificationError if a procedure uses a recording twice.
     """
     uses: dict[str, list[UsedRecording]] = {}
     for task in tasks:
@@ -156,9 +156,9 @@ _REPORTED = "reported."
 
 
 def _named_set(identification: Identification, problem: ProblemFile) -> ParameterSet:
-    """Return the new set with name, title, citation and notes that say from which recordings its values come.
+    """Return the new set with name, title, citation and notes that state the recordings behind its values.
 
-    What others report of another device is left out of a set that has values of this one.
+    Values reported by others for another device are left out if the set has identified values.
     """
     old, new = identification.new_set.parameter_set, identification.new_set
     named = [name for procedure in problem.procedure for name in procedure.recordings]

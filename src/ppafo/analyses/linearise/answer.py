@@ -35,9 +35,11 @@ _LARGEST_COMMAND = 0.7
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepResponses:
-    """Torque [N m] after steps of the command, less the steady one: (steps, times) on the runs and linear.
+    """Torque responses to steps of the command, of the nonlinear runs and of the linear model.
 
-    ``amplitudes`` (steps,) of the command [-], ``times`` [s] after the step.
+    ``amplitudes`` (steps,): step heights of the command [-]
+    ``times``: time after the step [s]
+    ``runs``, ``linear`` (steps, times): torque change from the steady state [N m]
     """
 
     amplitudes: Floats
@@ -47,19 +49,19 @@ class StepResponses:
 
     @property
     def errors(self) -> Floats:
-        """Largest difference of the torque of each step [N m]."""
+        """Largest torque difference between runs and linear model for each step [N m]."""
         return np.asarray(np.max(np.abs(self.runs - self.linear), axis=1))
 
     @property
     def sizes(self) -> Floats:
-        """Largest change of the torque in each step [N m]."""
+        """Largest torque change for each step [N m]."""
         return np.asarray(np.max(np.abs(self.runs), axis=1))
 
 
 def can_step(model: LinearModel) -> bool:
-    """True where runs can begin at the point: gas in steady state, a locked ankle, a valve that is at its command.
+    """True if runs can start at the operating point: steady gas states, locked ankle, valve state equal to the command.
 
-    The command is one that the largest step, 0.3 of it, still leaves below full opening.
+    The command must also stay below full opening for the largest step, 0.3 times the steady command.
     """
     is_locked = model.scenario.motion.locked_angle is not None
     has_gas_alone = all(variable.name.startswith("pressure") for variable in model.states)
@@ -69,7 +71,10 @@ def can_step(model: LinearModel) -> bool:
 
 
 def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> StepResponses:
-    """Torque after steps of the command by shares of its steady value [-]; the model is one that ``can_step``."""
+    """Return the torque responses to steps of the command by fractions of its steady value [-].
+
+    The model must satisfy ``can_step``.
+    """
     command = _value_at_point(model, "command")
     times: Floats = INTERVAL * np.arange(round(DURATION / INTERVAL) + 1, dtype=np.float64)
     still, *runs = (_torque(model, command * (1.0 + share)) for share in (0.0, *shares))
@@ -84,12 +89,12 @@ def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> StepResp
 
 
 def _value_at_point(model: LinearModel, name: str) -> float:
-    """Value of a state or an input at the point, in its SI unit."""
+    """Value of a state or an input at the operating point [SI]."""
     return next(variable.value for variable in (*model.states, *model.inputs) if variable.name == name)
 
 
 def _torque(model: LinearModel, command: float) -> Floats:
-    """Torque [N m] (times,) of a run that begins in the steady state, under another constant command [-]."""
+    """Torque [N m] (times,) of a run from the steady state under another constant command [-]."""
     scenario = replace(
         with_control(model.scenario, Control(PYTHON_CONTROLLER, {}, INTERVAL)),
         run=replace(model.scenario.run, duration=DURATION, step=INTERVAL, output_interval=INTERVAL),
@@ -128,7 +133,7 @@ _STEPS_CAPTION = (
 
 @in_units(lambda model: model.scenario.device.shown)
 def finding_of(model: LinearModel) -> Finding[LinearModel]:
-    """Return a linear model in words, tables and panels."""
+    """Return a linear model as a finding with sentences, tables and panels."""
     when = "in its steady state" if model.time is None else f"at {model.time:g} s"
     steps, caption = partial(steps_panels, model), _STEPS_CAPTION
     far = Section("How far it holds", panels=steps, name="steps", caption=caption, across=2, size=(3.0, 2.8))
@@ -157,7 +162,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
 
 
 def _sentences(model: LinearModel) -> list[str]:
-    """Return what the model is of, where it holds, and what it leaves out."""
+    """Return sentences on size, validity and omissions of the model."""
     size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
     sentences = [f"the plant without controller and sensors: {size}; differences from the point, SI units"]
     if not model.is_steady:
@@ -175,7 +180,7 @@ def _sentences(model: LinearModel) -> list[str]:
 
 
 def _point(model: LinearModel) -> Section:
-    """Return the table of states, inputs and outputs at the point; an output that is a state stands in it once."""
+    """Return the table of states, inputs and outputs at the operating point; states are not repeated as outputs."""
     states = {variable.name for variable in model.states}
     outputs = [variable for variable in model.outputs if variable.name not in states]
     rows = []
@@ -188,9 +193,9 @@ def _point(model: LinearModel) -> Section:
 
 
 def _poles(model: LinearModel) -> Section:
-    """Return the poles with their time constants; a pair of complex ones is a row with its frequency and damping.
+    """Return the table of poles with time constants; a complex pair is one row with frequency and damping.
 
-    The frequency response is drawn where the command changes anything.
+    The frequency response is drawn if the command has any effect.
     """
     rows: list[tuple[str | float | None, ...]] = []
     for pole in model.poles.tolist():
@@ -215,7 +220,7 @@ def _poles(model: LinearModel) -> Section:
 
 
 def _matrices(model: LinearModel) -> list[Section]:
-    """Return a table for each matrix; those of the outputs stand on the page alone."""
+    """Return a table for each matrix; the output matrices appear only on the page."""
     parts = []
     for name, values, rows, columns, is_detail in (
         ("A", model.a, model.states, model.states, False),
@@ -233,7 +238,7 @@ def _matrices(model: LinearModel) -> list[Section]:
 
 
 def frequency_panels(model: LinearModel) -> list[Panel]:
-    """Return the response of the torque to the command: size and phase, and the phase with what is left out."""
+    """Return panels of the frequency response of torque to command: magnitude, phase, phase with omitted delays."""
     poles = np.abs(model.poles) / (2.0 * np.pi)
     lowest = min(float(np.min(poles[poles > 0.0], initial=1.0)), 1.0)
     frequencies = np.geomspace(_LOWEST_SHARE * lowest, _HIGHEST_FREQUENCY, _POINTS)
@@ -271,7 +276,7 @@ def frequency_panels(model: LinearModel) -> list[Panel]:
 
 
 def steps_panels(model: LinearModel) -> list[Panel]:
-    """Return steps of the command on the runs and of the linear model, and their difference over the amplitude."""
+    """Return panels of step responses, nonlinear and linear, and of their difference divided by the amplitude."""
     steps = steps_of(model)
     over_time = []
     for number, colour in zip(_DRAWN_STEPS, (BLUE, VERMILION), strict=True):
@@ -303,7 +308,7 @@ def steps_panels(model: LinearModel) -> list[Panel]:
 
 
 def _arrays(model: LinearModel) -> bytes:
-    """The matrices, names, units and values at the point as a NumPy archive."""
+    """Matrices, names, units and operating point as a NumPy archive."""
     arrays: dict[str, Any] = {"A": model.a, "B": model.b, "C": model.c, "D": model.d, "rates": model.rates}
     for kind in ("states", "inputs", "outputs"):
         variables = getattr(model, kind)

@@ -1,4 +1,4 @@
-"""The linear model of a plant near one point: matrices, what they stand for, poles and frequency response."""
+"""Linear model of a plant near an operating point: matrices, signal names, poles and frequency response."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -21,7 +21,7 @@ _SINGULAR = 1.0e13
 
 @dataclass(frozen=True, slots=True)
 class LinearSignal:
-    """A state, input or output: its name, unit in SI, and value at the point."""
+    """State, input or output: name, SI unit, and value at the operating point."""
 
     name: str
     unit: str
@@ -30,9 +30,10 @@ class LinearSignal:
 
 @dataclass(frozen=True, slots=True)
 class SlopeKink:
-    """A kink of the plant at the point: state or input along which slopes of both sides differ, and the side taken.
+    """Kink of the plant at the operating point, where the slopes with respect to a state or input differ by side.
 
-    The linear model holds above the value of the point where ``is_above`` is true, else below it.
+    ``name`` is the state or input. The linear model holds above its value at the operating point if ``is_above`` is
+    true, else below.
     """
 
     name: str
@@ -50,11 +51,14 @@ class OmittedDelays:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearModel:
-    """The plant of a scenario near one point, x' = A x + B u, y = C x + D u, for differences from the point in SI.
+    """Linear plant model of a scenario, x' = A x + B u, y = C x + D u, for deviations from the operating point in SI.
 
-    ``a`` (states, states), ``b`` (states, inputs), ``c`` (outputs, states), ``d`` (outputs, inputs); ``rates``
-    (states,) are x' at the point itself, 0 in a steady state. ``time`` [s] is None for a steady state. ``sides`` say in
-    words which side of each limit of the plant was taken, ``edges`` where the point lies on one.
+    ``time``: time of the operating point [s]; None for a steady state
+    ``a`` (states, states), ``b`` (states, inputs), ``c`` (outputs, states), ``d`` (outputs, inputs): matrices
+    ``rates`` (states,): x' at the operating point, 0 in a steady state
+    ``sides``: side of each limit of the plant, in words
+    ``edges``: kinks on which the operating point lies
+    ``delays``: delays that the model omits
     """
 
     scenario: Scenario
@@ -83,9 +87,9 @@ class LinearModel:
         return eigenvalues[np.argsort(np.abs(eigenvalues))]
 
     def response(self, frequencies: Floats, output: str = "torque", source: str = "command") -> NDArray[np.complex128]:
-        """Frequency response (frequencies,) of an output to an input, complex, in SI; frequencies [Hz].
+        """Return the complex frequency response (frequencies,) of an output to an input in SI; frequencies [Hz].
 
-        ScenarioError for a name that is no output or input, and for a frequency at which the model has a pole.
+        Raises ScenarioError for an unknown output or input, and for a frequency at which the model has a pole.
         """
         row, column = _index_of(output, self.outputs, "output"), _index_of(source, self.inputs, "input")
         eye, responses = np.eye(len(self.states)), []
@@ -104,7 +108,7 @@ class LinearModel:
         return np.array(responses, dtype=np.complex128)
 
     def json_document(self) -> dict[str, Any]:
-        """Return point, matrices, poles and sides as plain data in SI."""
+        """Return operating point, matrices, poles and sides as plain data in SI."""
         rates = self.rates.tolist()
         return {
             "format": "ppafo linear model",
@@ -131,7 +135,10 @@ class LinearModel:
         }
 
     def to_control(self) -> Any:
-        """Return the model as a ``control.StateSpace`` with its names; ScenarioError without the extra ``control``."""
+        """Return the model as a ``control.StateSpace`` with signal names.
+
+        Raises ScenarioError if the extra ``control`` is not installed.
+        """
         if find_spec("control") is None:
             raise ScenarioError(MISSING_CONTROL)
         import control
@@ -141,7 +148,10 @@ class LinearModel:
 
 
 def _index_of(name: str, variables: Sequence[LinearSignal], kind: str) -> int:
-    """Index of a variable by its name, whose ``kind`` is a word for the error; ScenarioError where there is none."""
+    """Index of a signal by name; ``kind`` is the noun for the error message.
+
+    Raises ScenarioError for an unknown name.
+    """
     names = [variable.name for variable in variables]
     if name not in names:
         hint = nearest_name(name, names)

@@ -1,4 +1,4 @@
-"""Plant of a run without its controller and sensors as a function of named numbers, and its one-sided slopes."""
+"""Plant of a run without controller and sensors as a function of named values, and its one-sided slopes."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -44,12 +44,12 @@ _SIZES = {"Pa": 1.0e5, "K": 300.0}
 
 
 def size_of(name: str) -> float:
-    """Size of a state or an input [SI], of which differences are fractions."""
+    """Reference size of a state or an input [SI], by which difference steps are scaled."""
     return _SIZES.get(UNITS.get(name, ""), 1.0)
 
 
 class PlantValues(NamedTuple):
-    """Rates of all states and outputs, each by name [SI]."""
+    """Time derivatives of all states, and outputs, each by name [SI]."""
 
     rates: dict[str, float]
     outputs: dict[str, float]
@@ -57,10 +57,12 @@ class PlantValues(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LinearisedPlant:
-    """Plant of a run without its controller and sensors; the shank of a leg is where it is at ``time`` [s].
+    """Plant of a run without controller and sensors.
 
-    ``way`` is the direction of a free vane, 0 for one that is held by friction or a stop; None where the ankle is
-    prescribed: angle and angular velocity are inputs then. ``functions`` are those of the model as the run has them.
+    ``way``: direction of a free vane, 0 if friction or a stop holds it; None if the ankle is prescribed, so that angle
+        and angular velocity are inputs
+    ``time``: time [s] for which the shank of a leg is fixed
+    ``functions``: functions of the model, as used in the run
     """
 
     run: Run
@@ -75,9 +77,9 @@ class LinearisedPlant:
         return ("command", "supply_pressure", "dorsiflexion_pressure", *more)
 
     def at(self, values: Mapping[str, float]) -> PlantValues:
-        """Rates and outputs at values of all states and inputs by name [SI].
+        """Return time derivatives and outputs for values of all states and inputs by name [SI].
 
-        A valve state that the valve takes from its command at once is no state: it has a rate of 0 and no effect.
+        A valve state that follows the command immediately does not count as a state: its derivative is 0.
         """
         run, program, call = self.run, self.run.program, self.functions.of
         driven: dict[str, Any] = {name: values[name] for name in DRIVEN}
@@ -109,10 +111,10 @@ DRIVEN = ("supply_pressure", "dorsiflexion_pressure", "external_torque")
 
 
 def plant_of(run: Run, way: float | None, values: Mapping[str, float], time: float = 0.0) -> LinearisedPlant:
-    """Return the plant of a run near some values; other arguments as in ``LinearisedPlant``.
+    """Return the plant of a run near given states and inputs; other arguments as in ``LinearisedPlant``.
 
-    Near a request that has arrived no slew limit is at work: a small command is followed in no time. SimulationError
-    for an effect with a state of its own.
+    If the valve has reached its requested opening, the slew limit is inactive: the valve follows a small command
+    immediately. Raises SimulationError for an effect that has a state.
     """
     limitless, functions = without_slew_limit(run), functions_in(run)
     has_arrived = valve_at(run, functions, values).state == valve_at(limitless, functions, values).state
@@ -120,7 +122,10 @@ def plant_of(run: Run, way: float | None, values: Mapping[str, float], time: flo
 
 
 def functions_in(run: Run) -> PythonFunctions:
-    """Return the functions of the model as a run has them; SimulationError for an effect with a state of its own."""
+    """Return the functions of the model as used in a run.
+
+    Raises SimulationError for an effect that has a state.
+    """
     for effect in run.program.effects:
         if effect.state is not None:
             raise SimulationError(
@@ -131,13 +136,13 @@ def functions_in(run: Run) -> PythonFunctions:
 
 
 def valve_states(program: Program) -> dict[str, str]:
-    """Name of each state of the valve to its path in the rows of the lanes."""
+    """Return the names of the valve states, each with its path in the rows of the simulation."""
     paths = leaf_paths(program.valve.state, "valve_state")
     return {VALVE + path.removeprefix("valve_state.").replace(".", "_"): path for path in paths}
 
 
 class SettledValve(NamedTuple):
-    """State of the valve after the changes that it makes at once, its openings [-], and rates of its states by name."""
+    """Valve state after its immediate changes, openings [-], and time derivatives of the states by name."""
 
     state: Any
     openings: Openings
@@ -145,7 +150,7 @@ class SettledValve(NamedTuple):
 
 
 def valve_at(run: Run, functions: PythonFunctions, values: Mapping[str, float]) -> SettledValve:
-    """The valve of a run at values of its states and of the command by name."""
+    """Return the valve of a run for given valve states and command, by name."""
     valve, names = run.program.valve, valve_states(run.program)
     command = functions.of(at_valve)(values["command"])
     state = rebuilt(valve.state, [values[name] for name in names])
@@ -156,13 +161,13 @@ def valve_at(run: Run, functions: PythonFunctions, values: Mapping[str, float]) 
 
 
 def without_slew_limit(run: Run) -> Run:
-    """The run with a valve that requests the opening of its command at once, as one does that has arrived."""
+    """Return the run with a valve that follows its command without a slew limit."""
     is_limited = hasattr(run.valve, "slew_limit")
     return replace(run, valve=run.valve._replace(slew_limit=NO_SLEW_LIMIT)) if is_limited else run
 
 
 def opens_in_proportion(run: Run) -> bool:
-    """Return whether a small change of the command changes the openings of the valve, or how fast they move."""
+    """Return whether a small change of the command changes the openings or their rates."""
     limitless = without_slew_limit(run)
     start = dict(zip(valve_states(run.program), numbers(run.program.valve.initial()), strict=True))
     functions = functions_in(limitless)
@@ -185,11 +190,11 @@ ORDERS = 5
 
 
 def one_sided_slopes(function: Callable[[float], Floats], at: float, side: float, size: float) -> tuple[Floats, Floats]:
-    """Slopes of a function (rows,) at a number, towards one ``side`` (1 or -1), and estimates of their errors.
+    """Slopes of a function (rows,) at a value towards one ``side`` (1 or -1), and estimates of their errors.
 
-    Differences of values on that side, from a hundredth of ``size`` to a millionth, extrapolated to none by
-    Ridders' method (Adv. Eng. Softw. 4, 1982): of each row the slope whose two neighbours are nearest to it. The value
-    at the number itself is not asked for, so that a jump there does not matter.
+    Finite differences on that side, with steps from a hundredth to a millionth of ``size``, are extrapolated to zero
+    step by Ridders' method (Adv. Eng. Softw. 4, 1982). For each row, the extrapolation with the smallest estimated
+    error is taken. The function is not evaluated at the value itself, so a jump there has no effect.
     """
     places = at + side * LONGEST * size / SHORTER ** np.arange(LENGTHS)
     values = np.array([function(place) for place in places.tolist()])
@@ -206,9 +211,10 @@ def one_sided_slopes(function: Callable[[float], Floats], at: float, side: float
 
 
 def side_of(name: str, values: Mapping[str, float], way: float | None) -> float:
-    """Side of a number on which a linear model holds: the command goes up, or back from full opening.
+    """Side of a value (1 or -1) for which a linear model holds.
 
-    The faster or fuller side of a vane, of chamber 1 and its supply; the emptier one of chamber 2.
+    The command goes up, or back from full opening. The angle, the velocity, chamber 1 and its supply go up (a moving
+    vane faster); all other values, chamber 2 among them, go down.
     """
     if name == "command":
         return 1.0 if abs(values[name]) < 1.0 else -float(np.sign(values[name]))

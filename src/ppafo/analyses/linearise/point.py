@@ -1,4 +1,4 @@
-"""The point of a linear model: an instant of a run, or the steady state that a scenario asks for."""
+"""Operating point of a linear model: an instant of a run, or the steady state of a scenario."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -41,9 +41,11 @@ _MOST_STEPS = 60
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """Values of all states and inputs of the plant by name [SI], at a ``time`` [s] of the run; None for a steady state.
+    """Operating point of the plant.
 
-    ``way`` is the direction of a free vane, 0 where friction or a stop holds it; None where the ankle is prescribed.
+    ``time``: time [s] in the run; None for a steady state
+    ``values``: all states and inputs by name [SI]
+    ``way``: direction of a free vane, 0 if friction or a stop holds it; None if the ankle is prescribed
     """
 
     time: float | None
@@ -52,7 +54,10 @@ class Point:
 
 
 def point_at(scenario: Scenario, time: float) -> Point:
-    """The point that the run of a scenario passes at a time [s], to the nearest step; ScenarioError outside the run."""
+    """Return the operating point of a scenario's run at a time [s], rounded to the nearest step.
+
+    Raises ScenarioError for a time outside the run.
+    """
     # Allowance for rounding: the end of the run itself is a valid time.
     if not 0.0 <= time <= scenario.run.duration * (1.0 + 1.0e-12):
         raise ScenarioError(
@@ -64,7 +69,7 @@ def point_at(scenario: Scenario, time: float) -> Point:
 
 
 def _after(scenario: Scenario, run: Run, steps: int) -> tuple[dict[str, float], float | None]:
-    """Values after some steps of a run, and the way of its vane."""
+    """Return the states and inputs after a number of steps of a run, and the direction of the vane."""
     batch = batch_of(replace(run, step_count=steps))
     custom = scenario.controller.custom
     outcome = run_batch(batch) if custom is None else run_sampled(batch, custom)
@@ -89,7 +94,7 @@ def _after(scenario: Scenario, run: Run, steps: int) -> tuple[dict[str, float], 
 
 
 def _way(run: Run, values: Mapping[str, float], time: float) -> float | None:
-    """Direction of a free vane, 0 where it is held, at a time [s]."""
+    """Direction of a free vane at a time [s], 0 if it is stuck; None if the ankle is prescribed."""
     if run.program.angle is not None:
         return None
     rate, angle = values["angular_velocity"], values["angle"]
@@ -102,11 +107,10 @@ def _way(run: Run, values: Mapping[str, float], time: float) -> float | None:
 
 
 def equilibrium(scenario: Scenario) -> Point:
-    """The steady state that a scenario asks for; ScenarioError where there is none.
+    """Return the steady state of a scenario; ScenarioError if there is none.
 
-    The ankle stands where it is at the end of the run, with no velocity; nothing in the chambers or in the valve
-    changes any more; the actuator has the torque that the reference has at the end of the run, or, where the
-    controller is a constant command, the command is that one.
+    The ankle rests at its angle at the end of the run, and all states of chambers and valve are constant. The actuator
+    torque is the last value of the reference, or, for a constant command, the command is given instead.
     """
     whole = plan_run(scenario)
     if whole.leg is not None and whole.program.shank is not CONSTANT:
@@ -150,7 +154,7 @@ def equilibrium(scenario: Scenario) -> Point:
 
 
 def _steady(run: Run, held: float | None, values: Mapping[str, float], wanted: float | None) -> dict[str, float] | None:
-    """Values of a steady state with a torque [N m], or with the present command; None where none is found."""
+    """Return a steady state with a torque [N m], or with the present command; None if none is found."""
     # Where the search begins: at the end of the run, then about the pressures that have the torque.
     starts = [dict(values)]
     lowest, torque = run.plant.atmospheric_pressure, wanted or 0.0
@@ -165,7 +169,7 @@ def _steady(run: Run, held: float | None, values: Mapping[str, float], wanted: f
     names = [*plant.at(values).rates, *([] if wanted is None else ["command"])]
 
     def imbalance(values: Mapping[str, float]) -> Floats:
-        """All rates over the sizes of their states [1/s], and the torque less the one that is wanted [N m]."""
+        """Time derivatives divided by the size of their states [1/s], and the torque error [N m]."""
         found = plant.at(values)
         # So that pascals and openings count alike.
         rates = [rate / size_of(name) for name, rate in found.rates.items()]
@@ -176,20 +180,20 @@ def _steady(run: Run, held: float | None, values: Mapping[str, float], wanted: f
 
 
 def opening_names(values: Mapping[str, float]) -> list[str]:
-    """Names of the openings of the valve among some values."""
+    """Return the names of the valve openings among some values."""
     return [name for name in values if name in (f"{VALVE}requested", f"{VALVE}opening")]
 
 
 def _newton(
     function: Callable[[Mapping[str, float]], Floats], names: Sequence[str], start: Mapping[str, float]
 ) -> dict[str, float] | None:
-    """Values at which a function is 0, by Newton's method with steps cut where they lead too far; None where none."""
+    """Return a root of a function, found by Newton's method with damped steps; None if the search fails."""
     sizes = np.array([size_of(name) for name in names])
     values = dict(start)
     residual = function(values)
 
     def along(name: str) -> Floats:
-        """Slopes of the function by a value (rows,)."""
+        """Slopes of the function with respect to a value (rows,)."""
         side, size = side_of(name, values, None), size_of(name)
         return one_sided_slopes(lambda value: function({**values, name: value}), values[name], side, size)[0]
 

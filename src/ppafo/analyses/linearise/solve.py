@@ -1,4 +1,4 @@
-"""A linear model of the plant of a scenario, at an instant of its run or at its steady state."""
+"""Linear model of a scenario's plant, at an instant of its run or at its steady state."""
 
 from collections.abc import Mapping
 from numbers import Real
@@ -36,7 +36,7 @@ Slopes by differences agree to some 1e-9 where the plant has no kink.
 
 
 def sides_of(run: Run, point: Point, joint: JointNames) -> dict[str, str]:
-    """Side of each limit that the operating point is on, in words, by component; ``joint`` names what moves."""
+    """Return in words the side of each limit at the operating point, by component; ``joint`` names the joint."""
     at, plant = point.values, run.plant
     openings = valve_at(run, functions_in(run), at).openings
     room, first, second = plant.atmospheric_pressure, at["pressure_1"], at["pressure_2"]
@@ -86,7 +86,7 @@ DEAF = (
 def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
     """Return the linear model of a scenario at a time [s] of its run, a number or a text, or at ``EQUILIBRIUM``.
 
-    ScenarioError for regulated supplies, a valve that is on or off, and a point that is not there.
+    Raises ScenarioError for regulated supplies, an on/off valve, and an operating point that does not exist.
     """
     run = plan_run(scenario)
     if scenario.supply_lines is not None:
@@ -107,7 +107,7 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
 
 
 def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
-    """The linear model at a point, towards the side of each state and input that ``side_of`` says."""
+    """Return the linear model at an operating point, with one-sided slopes on the sides given by ``side_of``."""
     values, plant = dict(point.values), plant_of(run, point.way, point.values, point.time or 0.0)
     here = plant.at(values)
     slopes = {name: _both_slopes(plant, values, name) for name in (*here.rates, *plant.inputs)}
@@ -148,7 +148,10 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
 
 
 def _both_slopes(plant: LinearisedPlant, values: Mapping[str, float], name: str) -> tuple[Floats, Floats, Floats]:
-    """Slopes (rates and outputs,) by a state or an input on its side of the point, beyond it, and their errors."""
+    """Return slopes (rates and outputs,) with respect to a state or an input on both sides of the operating point.
+
+    The first are the slopes on the side of ``side_of``, the second on the other side, the third the error estimates.
+    """
 
     def moved(value: float) -> Floats:
         found = plant.at({**values, name: value})

@@ -1,4 +1,4 @@
-"""A catalogue of parts, or one part of it, in words, tables and plain data, with the origin of every figure."""
+"""Report of a catalogue of parts, or of a single part, with the origin of every figure."""
 
 import textwrap
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ _WIDTH = 110
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Parts of a catalogue: one, or all where ``part`` is None."""
+    """Catalogue of parts, and the selected part; ``part`` is None for the whole catalogue."""
 
     catalogue: Catalogue
     part: Part | None
@@ -44,7 +44,7 @@ class Parts:
 
 
 def finding_of_catalogue(catalogue: Catalogue) -> Finding[Parts]:
-    """Return a table for each group of a catalogue: each part with its mass, and with what is doubtful or not known."""
+    """Return a table for each group of a catalogue, with mass and doubtful or unknown figures of each part."""
     # Notes are written over several lines of a file: how they were broken there means nothing.
     notes = "\n".join(textwrap.wrap(" ".join(catalogue.notes.split()), _WIDTH))
     head = ("part", "maker and model", ("mass", Kind(quantity="part mass")), "figures to check", "not known")
@@ -67,7 +67,7 @@ def finding_of_catalogue(catalogue: Catalogue) -> Finding[Parts]:
 
 
 def finding_of_part(catalogue: Catalogue, part: Part) -> Finding[Parts]:
-    """Return a table of all figures of one part of a catalogue, each as it was given, with its origin and source."""
+    """Return a table of all figures of a part, each as stated, with origin and source."""
     kind = f", {part.kind}" if part.kind else ""
     figures = [
         (name, f"{figure.value:.4g} {figure.unit}".rstrip(), figure.origin, figure.source)

@@ -1,6 +1,6 @@
-"""Report sections on the parts of a device for other analyses: the parts, and the figures to check.
+"""Report sections on the parts of a device: the parts, and the figures to check.
 
-A doubtful figure is a pair of a part and the name of a figure of it that is quoted or assumed.
+A doubtful figure is a pair of a part and the name of a figure that is quoted or assumed.
 """
 
 from collections.abc import Iterable
@@ -12,12 +12,15 @@ from ppafo.report.finding import facts
 
 
 def part_titles(parts: Iterable[Part]) -> finding.Section:
-    """Return maker and model of parts, each once, for the page."""
+    """Return a section with maker and model of each part, without duplicates, for the page."""
     return finding.Section("Parts", facts({part.name: part.title for part in parts}.items()), is_detail=True)
 
 
 def parts_to_check(doubtful: Iterable[tuple[Part, str]]) -> list[finding.Section]:
-    """Return what to check before buying, a row for each part, and for the page the reason of each doubtful figure."""
+    """Return the sections on figures to check before buying.
+
+    The table has a row for each part; the page also has the reason for each doubtful figure.
+    """
     pairs = tuple(doubtful)
     if not pairs:
         return []
@@ -40,7 +43,7 @@ def parts_to_check(doubtful: Iterable[tuple[Part, str]]) -> list[finding.Section
 
 
 def doubts_data(doubtful: Iterable[tuple[Part, str]]) -> list[dict[str, Any]]:
-    """Return doubtful figures as plain data: part, name, and the figure as it was given."""
+    """Return doubtful figures as plain data: part, name, and figure as stated."""
     return [
         {"part": part.name, "figure": name, **part.figures[name].model_dump(mode="json")} for part, name in doubtful
     ]

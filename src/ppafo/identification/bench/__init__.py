@@ -1,4 +1,4 @@
-"""The direct methods of the bench: each one law from recordings to estimates, residuals of the one estimator."""
+"""Bench procedures: each compares one physical law with recordings, through the common least-squares estimator."""
 
 from ppafo.identification.bench.free_decay import free_decay
 from ppafo.identification.bench.open_valve_flow import open_valve_flow

@@ -1,4 +1,4 @@
-"""The free decay in a recording: from the end of the push to standstill, the first reversal, or the end."""
+"""Free-decay part of a recording: from the end of the push to standstill, the first reversal, or the end."""
 
 from typing import NamedTuple
 
@@ -13,23 +13,23 @@ from ppafo.signals.recording import Floats
 PROCEDURE = "free-decay"
 ANGLE = "angle"
 VELOCITY = "angular_velocity"
-"""Fitted besides the angle where it was recorded."""
+"""Channel fitted together with the angle if it was recorded."""
 MINIMUM_SAMPLES = 20
-"""Samples of a decay at least."""
+"""Least number of samples of a decay."""
 FEWEST_SMOOTHED = 5
-"""Samples that a local parabola is fitted to at least."""
+"""Least number of samples to which a local parabola is fitted."""
 _SMOOTHED_FRACTION = 0.04
-"""Fraction of a decay that a local parabola is fitted to."""
+"""Fraction of the samples of a decay to which a local parabola is fitted [-]."""
 _REVERSAL = 0.02
-"""Rate against the push, over the largest, from which a vane swings back: at rest it has a rate of 0 but for noise."""
+"""Velocity against the push, divided by the largest, from which the vane swings back [-]; noise at rest stays below."""
 _VELOCITY_MAY_DIFFER = 0.1
-"""Fraction by which the velocity may differ from the rate of the angle: another unit or another sign differs more."""
+"""Largest relative difference between velocity and rate of the angle [-]; a wrong unit or sign differs by more."""
 _MINIMUM_OVER_NOISE = 20.0
-"""Range of the angle over its noise from which something moves."""
+"""Least range of the angle divided by its noise [-] for motion to be detected."""
 
 
 class FreeDecay(NamedTuple):
-    """Free decay: times from its start [s], angle [rad], its direction (1 or -1), and its velocity [rad/s] if known."""
+    """Free decay: times from the start [s], angle [rad], direction (1 or -1), velocity [rad/s] if recorded."""
 
     time: Floats
     angle: Floats
@@ -38,10 +38,10 @@ class FreeDecay(NamedTuple):
 
 
 def decay_of(source: RecordingSource, start: float | None, end: float | None) -> FreeDecay:
-    """Return the decay in a recording between two times [s]; without a start it begins where the speed is largest.
+    """Return the decay in a recording between two times [s]; without ``start``, the decay starts at the largest speed.
 
-    IdentificationError, with the file, the sample and the remedy, where too few samples are left, where nothing moves,
-    or where the sensor is saturated or contradicts itself.
+    Raises IdentificationError, with file, sample and remedy, if there are too few samples, if nothing moves, or if the
+    sensor is saturated or contradicts the velocity.
     """
     check_moves(source, PROCEDURE, ANGLE)
     part = window(source.recording, start, end)
@@ -85,7 +85,7 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
 def _falling_part(source: RecordingSource, part: Recording, starts_here: bool) -> tuple[slice, float]:
     """Return the samples from the end of the push to the first reversal, and the direction of the push, 1 or -1.
 
-    Where the caller said where the decay starts, the push is over by then.
+    If the user gave the start (``starts_here``), the push has ended by then.
     """
     velocity, _ = smoothed_rates(part.time, part[ANGLE])
     fastest = 0 if starts_here else int(np.argmax(np.abs(velocity)))
@@ -103,7 +103,7 @@ def _falling_part(source: RecordingSource, part: Recording, starts_here: bool) -
 
 
 def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:
-    """Return angular velocity [rad/s] and acceleration [rad/s^2] from local parabolas, at the times of the samples."""
+    """Return angular velocity [rad/s] and acceleration [rad/s^2] at the samples, from local parabolas."""
     from scipy.signal import savgol_filter
 
     # The filter wants an even clock.
@@ -116,5 +116,5 @@ def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:
 
 
 def smoothing_width(count: int) -> int:
-    """Return an odd number of samples to smooth over."""
+    """Return the odd number of samples of a smoothing window, given the number of samples of a decay."""
     return max(FEWEST_SMOOTHED, int(_SMOOTHED_FRACTION * count)) | 1

@@ -1,12 +1,12 @@
-"""Laws of flow, on arrays: orifice, ISO 6358 and laminar; all antisymmetric. With the tolerances of gas and sensors.
+"""Flow laws on arrays (orifice, ISO 6358, laminar; all antisymmetric), and tolerances of gas and sensors.
 
-With r the downstream over the upstream pressure and k the heat capacity ratio, mass flow [kg/s] is
+With r the ratio of downstream to upstream pressure and k the heat capacity ratio, the mass flow [kg/s] is
 
     orifice    Cd A C1 P_up psi(r),   C1 = sqrt(k / (R T) (2 / (k + 1))^((k + 1) / (k - 1)))       equations (6), (7)
-               psi = 1 up to the critical ratio, then sqrt(2 k / (k - 1) r^(2/k) (1 - r^((k - 1)/k))) over C1 sqrt(R T)
+               psi = 1 up to the critical ratio, then sqrt(2 k / (k - 1) r^(2/k) (1 - r^((k - 1)/k))) / (C1 sqrt(R T))
     ISO 6358   C rho_0 sqrt(T_0 / T) P_up phi(r),   phi = 1 up to b, then sqrt(1 - ((r - b) / (1 - b))^2)
     laminar    c (P_a^2 - P_b^2)
-    both       an orifice, or ISO 6358 with a critical ratio that is known, and a laminar gap side by side
+    both       a laminar gap in parallel with an orifice, or with ISO 6358 of known critical ratio
 """
 
 from collections.abc import Callable, Mapping
@@ -28,15 +28,15 @@ from ppafo.signals.recording import Floats
 Law = Literal["orifice", "iso6358", "laminar", "both"]
 
 LINEAR_RATIO = 0.99999
-"""Pressure ratio from which flow falls on a straight line to zero, a pascal at the atmosphere, which no bench resolves.
+"""Pressure ratio [-] above which the flow falls linearly to zero: about 1 Pa at the atmosphere, below bench resolution.
 
-The line of the engine, ``flow.linear_ratio`` of a set, is numerics of a step; what was read of an opening has none.
+The parameter ``flow.linear_ratio`` of a set belongs to the numerics of the engine, not to a measured opening.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class GasAt:
-    """A gas: molar mass [kg/mol], heat capacity ratio [-], temperature [K] and its standard deviation [K]."""
+    """Gas: molar mass [kg/mol], heat capacity ratio [-], temperature and its standard deviation [K]."""
 
     molar_mass: float
     heat_capacity_ratio: float
@@ -55,7 +55,7 @@ class GasAt:
 
     @property
     def flow_per_sonic_conductance(self) -> float:
-        """Choked mass flow over C times upstream pressure [kg/m^3], rho_0 sqrt(T_0 / T) of ISO 6358-1:2013."""
+        """Choked mass flow divided by C and upstream pressure [kg/m^3], rho_0 sqrt(T_0 / T) of ISO 6358-1:2013."""
         return sonic_conductance_mass(1.0, self.specific_gas_constant, self.temperature)
 
 
@@ -65,14 +65,14 @@ APPARENT = "gap that a gain of the flow meter looks like"
 
 
 def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[FitVariable, ...]:
-    """Return what is not known exactly of the gas: its temperature [K] and its law [-]."""
+    """Return the uncertain quantities of the gas: temperature [K] and relative departure from the ideal gas law [-]."""
     return (*tolerance(TEMPERATURE, gas.temperature_deviation), *within(GAS_LAW, tolerances.law_of_gas))
 
 
 def flow_tolerances(
     gas: GasAt, tolerances: Tolerances, names: tuple[str, str], largest: float
 ) -> tuple[FitVariable, ...]:
-    """Return what is not known exactly of a flow bench; ``names`` are the channels of the pressures.
+    """Return the uncertain quantities of a flow bench: gas, gains and zeros; ``names`` are the pressure channels.
 
     ``largest`` is the largest reading of the flow meter [kg/s].
     """
@@ -86,19 +86,19 @@ def flow_tolerances(
 
 
 def read_flow(at: Values, gas: GasAt, flow: Floats) -> Floats:
-    """Return what a flow meter shows [kg/s] of a flow of gas as it is stated [kg/s]."""
+    """Return the reading of the flow meter [kg/s] for a flow at the nominal gas state [kg/s]."""
     # Flow through an opening goes with one over the root of the temperature.
     warm = np.sqrt(gas.temperature / (gas.temperature + at[TEMPERATURE]))
     return np.asarray((1.0 + at[GAS_LAW]) * (1.0 + at[METER]) * warm * flow + at[ZERO])
 
 
 def true_pressure(at: Values, name: str, shown: Floats) -> Floats:
-    """Return the pressure [Pa] behind the reading of a sensor [Pa], whose gain counts from the atmosphere."""
+    """Return the true pressure [Pa] for a sensor reading [Pa]; a gain error acts on the gauge pressure."""
     return np.asarray(shown - at[f"zero of {name}"] - at[SENSORS] * (shown - STANDARD_ATMOSPHERE))
 
 
 def orifice_shape(first: Floats, second: Floats, heat_capacity_ratio: float) -> Floats:
-    """Return upstream pressure times flow function [Pa], positive from first to second; (6), (7) over Cd A C1."""
+    """Return upstream pressure times flow function [Pa], positive from first to second: (6), (7) divided by Cd A C1."""
     k = heat_capacity_ratio
 
     def curve(ratio: Floats) -> Floats:
@@ -110,7 +110,7 @@ def orifice_shape(first: Floats, second: Floats, heat_capacity_ratio: float) -> 
 
 
 def iso6358_shape(first: Floats, second: Floats, critical_ratio: float) -> Floats:
-    """Return upstream pressure times flow function [Pa], positive from first to second; ISO 6358 over C rho_0."""
+    """Return upstream pressure times flow function [Pa], positive from first to second: ISO 6358 divided by C rho_0."""
 
     def curve(ratio: Floats) -> Floats:
         position = np.maximum(ratio - critical_ratio, 0.0) / (1.0 - critical_ratio)
@@ -120,7 +120,7 @@ def iso6358_shape(first: Floats, second: Floats, critical_ratio: float) -> Float
 
 
 def _shape(first: Floats, second: Floats, curve: Callable[[Floats], Floats]) -> Floats:
-    """Return upstream pressure times a curve of the pressure ratio, with the sign of the flow."""
+    """Return upstream pressure times a function of the pressure ratio [Pa], with the sign of the flow."""
     upstream = np.maximum(np.maximum(first, second), 1.0)
     ratio = np.maximum(np.minimum(first, second), 0.0) / upstream
     flow = upstream * curve(np.minimum(ratio, LINEAR_RATIO))
@@ -129,7 +129,11 @@ def _shape(first: Floats, second: Floats, curve: Callable[[Floats], Floats]) -> 
 
 
 class OpeningSizes(NamedTuple):
-    """Unknowns of an opening: Cd, A or Cd A, C [m^3/(s Pa)], or c [kg/(s Pa^2)]; b [-]; c of a parallel gap."""
+    """Unknowns of an opening.
+
+    ``size`` is Cd [-], A [m^2] or Cd A [m^2] of an orifice, C [m^3/(s Pa)] of ISO 6358, or c [kg/(s Pa^2)] of a laminar
+    gap. ``critical_ratio`` is b [-]; ``beside`` is c of a parallel laminar gap.
+    """
 
     size: float
     critical_ratio: float = 0.0
@@ -138,11 +142,11 @@ class OpeningSizes(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """Flow through an opening: its law, and its known quantities.
+    """Flow through an opening: gas, law, and known quantities.
 
-    For an orifice the area [m^2] or the discharge coefficient [-] that ``known`` multiplies; for ISO 6358 ``known`` is
-    not used, and the critical ratio [-] is sought where it is not given. ``both`` is ISO 6358 beside a laminar gap
-    where the critical ratio is given, an orifice beside one where it is not.
+    For an orifice, ``known`` is the area [m^2] or discharge coefficient [-] that multiplies the unknown size; ISO 6358
+    does not use it. A ``critical_ratio`` [-] of None is estimated. The law ``both`` is a laminar gap in parallel with
+    ISO 6358 if the critical ratio is given, or else with an orifice.
     """
 
     gas: GasAt
@@ -151,7 +155,7 @@ class Opening:
     critical_ratio: float | None = None
 
     def flow(self, sizes: OpeningSizes, first: Floats, second: Floats) -> Floats:
-        """Return the mass flow [kg/s], positive from first to second [Pa]."""
+        """Return the mass flow [kg/s] for pressures [Pa], positive from first to second."""
         laminar = np.asarray(first**2 - second**2)
         if self.law == "laminar":
             return np.asarray(sizes.size * laminar)
@@ -164,9 +168,9 @@ class Opening:
         return through + sizes.beside * laminar if self.law == "both" else through
 
     def rough_sizes(self, first: Floats, second: Floats, flow: Floats) -> tuple[OpeningSizes, OpeningSizes]:
-        """Return sizes that leave least of a flow [kg/s], none below 0, and those of each part if it were all of it.
+        """Return non-negative least-squares sizes for a flow [kg/s], and the size of each part for all of the flow.
 
-        The flow is linear in them, but for a critical ratio, which is taken as usual.
+        The flow is linear in the sizes; the nonlinear critical ratio is set to its usual value.
         """
         ratio = CRITICAL_RATIOS[0]
         parts = [self.flow(OpeningSizes(1.0, ratio), first, second)]
@@ -178,22 +182,22 @@ class Opening:
 
 
 CRITICAL_RATIOS = 0.2, 0.01, 0.95
-"""Critical ratio of ISO 6358 where it is sought [-]: start, lowest, highest."""
+"""Critical ratio of ISO 6358 [-] if it is estimated: start, lowest and highest value."""
 
 
 class Paths(NamedTuple):
-    """Names of the numbers of an opening, which are not sought where they are empty."""
+    """Names of the estimated quantities of an opening; an empty name means that the quantity is not estimated."""
 
     size: str
     critical_ratio: str = ""
     beside: str = ""
 
     def sizes(self, at: Values) -> OpeningSizes:
-        """Return the sizes among the numbers of a law."""
+        """Return the sizes of the opening from the values of a law."""
         return OpeningSizes(at[self.size], at[self.critical_ratio], at[self.beside])
 
     def sought(self, start: OpeningSizes, alone: OpeningSizes) -> tuple[FitVariable, ...]:
-        """Return the numbers that are sought; a part of which nothing may be seen has the scale of all of the flow."""
+        """Return the unknowns with start values; parallel parts are scaled as if each carried the whole flow."""
         scale = alone.size if self.beside else 0.0
         return (
             sought(self.size, start.size, 0.0, scale=scale),
@@ -210,9 +214,9 @@ def solve_flow(
     tolerances: Tolerances,
     confidence: float,
 ) -> tuple[Fit, Floats]:
-    """Return the fit of an opening to the flow through it, and the flow that it gives [kg/s]; see ``law.solve``.
+    """Return the fit of an opening to measured flow, and the fitted flow [kg/s]; see ``law.solve``.
 
-    ``pressures`` are two channels [Pa absolute], the one from which a positive flow [kg/s] comes first.
+    ``pressures`` are two channels [Pa absolute]; a positive flow [kg/s] runs from the first to the second.
     """
     names, flow = (*pressures,), readings.measured
     largest = float(np.abs(flow).max())
@@ -240,4 +244,4 @@ NEXT_LAW: Mapping[Law, str] = {
     "iso6358": "try law = 'both'",
     "both": "neither an orifice nor a laminar gap nor both explain them",
 }
-"""Remedy if readings do not agree on one opening; the sum of both laws contains each of them."""
+"""Remedy, by law, if the readings do not fit one opening; the law ``both`` contains each of its parts."""

@@ -4,11 +4,11 @@ With no pressure and no gravity, equation (1) is, until the vane stands still,
 
     I w' = -beta w - T_c (1 + q / (1 + (w / w_s)^2))                                             equations (1), (10)
 
-I is the inertia [kg m^2], w the angular velocity [rad/s] in the direction of the push, beta the viscous damping
-[N m s/rad], T_c the dynamic friction [N m]. Viscous damping bends the curve from the start, Coulomb friction ends it:
-that is what tells the two apart. Near standstill a seal grips up to as hard as at rest (Stribeck; Hess and Soom, J.
+I is the inertia [kg m^2], w the angular velocity [rad/s] in the direction of the push, beta the viscous damping [N m
+s/rad], T_c the dynamic friction [N m]. Viscous damping curves w(t) from the start and Coulomb friction stops the vane
+in finite time, which separates the two. Near standstill a seal may grip as hard as at rest (Stribeck; Hess and Soom, J.
 Tribology 112, 1990): q, up to T_s / T_c - 1, and w_s are tolerances, as are the inertia and the gain of the sensor.
-Without an inertia only beta/I [1/s] and T_c/I [rad/s^2] follow.
+Without an inertia only beta/I [1/s] and T_c/I [rad/s^2] can be estimated.
 """
 
 import math
@@ -43,18 +43,18 @@ from ppafo.wording import count_of
 # How a vane slows down without pressure: equation (1) as angle and speed over time, from a push to standstill.
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
-"""Gauss's rule of three nodes, for each step of the speed."""
+"""Nodes and weights of three-point Gauss-Legendre quadrature, used in each step of the speed."""
 _STEPS = 240
-"""Steps of the speed from the start to standstill."""
+"""Number of steps of the speed from the start to standstill."""
 _SLOWEST = 1.0e-9
-"""Deceleration, over that at the start, below which none counts: without Coulomb friction there is no standstill."""
+"""Lower bound of the deceleration as a fraction of the largest [-]: without Coulomb friction there is no standstill."""
 
 
 class Slowing(NamedTuple):
-    """Damping over the inertia [1/s], dynamic friction over the inertia [rad/s^2], and its rise near standstill.
+    """Damping and dynamic friction, divided by inertia [1/s, rad/s^2], and rise of the friction near standstill.
 
-    ``rise`` is the friction at rest over the dynamic one, less 1 [-]; at ``rise_velocity`` [rad/s] half of it is left,
-    and at a velocity of 0 there is none.
+    ``rise`` is the ratio of friction at rest to dynamic friction, minus 1 [-]. At ``rise_velocity`` [rad/s] half of the
+    rise is left; a ``rise_velocity`` of 0 means no rise.
     """
 
     damping_rate: float
@@ -63,7 +63,7 @@ class Slowing(NamedTuple):
     rise_velocity: float = 0.0
 
     def at(self, speed: Floats) -> Floats:
-        """Return the deceleration [rad/s^2] at speeds [rad/s]; equation (1)."""
+        """Return the deceleration [rad/s^2] at given speeds [rad/s]; equation (1)."""
         if self.rise_velocity > 0.0:
             grip = self.rise / (1.0 + np.square(speed / self.rise_velocity))
         else:
@@ -72,7 +72,7 @@ class Slowing(NamedTuple):
 
 
 class _DecayCurve(NamedTuple):
-    """Times [s], angle swept [rad] and speed [rad/s] from the start to standstill."""
+    """Times [s], swept angle [rad] and speed [rad/s] from the start to standstill."""
 
     time: Floats
     swept: Floats
@@ -80,7 +80,7 @@ class _DecayCurve(NamedTuple):
 
 
 def course_to_standstill(speed: float, slowing: Slowing) -> _DecayCurve:
-    """Return the course from a speed [rad/s] to standstill, of dt = -dw / deceleration by Gauss's rule over w."""
+    """Return the decay from a speed [rad/s] to standstill, by Gauss quadrature of dt = -dw / deceleration over w."""
     # Cubed, for the slowing near standstill, where a seal grips, needs the shortest steps.
     speeds = speed * np.linspace(1.0, 0.0, _STEPS + 1) ** 3
     middle, half = 0.5 * (speeds[1:] + speeds[:-1]), 0.5 * (speeds[:-1] - speeds[1:])
@@ -94,7 +94,7 @@ def course_to_standstill(speed: float, slowing: Slowing) -> _DecayCurve:
 
 
 def course(times: Floats, speed: float, slowing: Slowing) -> _DecayCurve:
-    """Return the course at times [s] after a start at a speed [rad/s]; after standstill the vane stays."""
+    """Return swept angle and speed at times [s] after a start at ``speed`` [rad/s]; zero speed after standstill."""
     from scipy.interpolate import CubicHermiteSpline
 
     known = course_to_standstill(speed, slowing)
@@ -107,13 +107,13 @@ def course(times: Floats, speed: float, slowing: Slowing) -> _DecayCurve:
 _RISE, _RISE_VELOCITY, _INERTIA, _GAIN = "rise of the friction near standstill", "its velocity", "inertia", "gain"
 """Names of the tolerances: log of 1 + q [-], w_s [rad/s], relative errors of the inertia and of the angle [-]."""
 _START_ANGLE, _START_SPEED = "start angle {}", "start speed {}"
-"""Names of what each decay starts with [rad, rad/s], by its number."""
+"""Names of the initial angle [rad] and speed [rad/s] of each decay, by its number."""
 _USUAL_RISE_VELOCITY, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY = 0.1, 1.0e-3, 2.0
-"""Velocity at which half of the rise is left [rad/s]."""
+"""Velocity at which half of the friction rise is left [rad/s]: usual, lowest and highest value."""
 _LEAST_SPEED, _LEAST_SWEPT = 1.0e-6, 1.0e-9
-"""Speed [rad/s] and angle [rad] from which a fit starts at least, where nothing is seen to move."""
+"""Least initial speed [rad/s] and swept angle [rad] of a fit if no motion is seen."""
 _MOVING = 0.03
-"""Fraction of the largest speed below which the panel of the damping shows no acceleration: it is noise there."""
+"""Fraction of the largest speed [-] below which the damping panel omits the acceleration, which is noise there."""
 
 
 def free_decay(
@@ -126,14 +126,14 @@ def free_decay(
     confidence: float = 0.95,
     tolerances: Tolerances = DEFAULTS,
 ) -> BenchResult:
-    """Return viscous damping [N m s/rad] and dynamic friction [N m], or both over the inertia [1/s, rad/s^2]; (1).
+    """Return viscous damping [N m s/rad] and dynamic friction [N m], or both divided by inertia [1/s, rad/s^2]; (1).
 
-    The angular velocity is fitted with the angle where a recording has it. Several recordings are several impulses to
-    the same device: the numbers are common, each has its own start. The vane turns freely from ``start`` to ``end``
-    [s]; without a start the decay begins where the speed is largest. Without an inertia [kg m^2], whose standard
-    deviation is ``inertia_deviation``, only ratios over it are known. ``rise`` is friction at rest over dynamic
-    friction, less 1 [-], by which seals may grip near standstill.
-    IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
+    Angle and, if recorded, angular velocity are fitted. Several recordings are several impulses to the same device,
+    with common parameters and separate initial states. The vane turns freely from ``start`` to ``end`` [s]; without
+    ``start`` the decay starts at the largest speed. ``inertia_deviation`` is the standard deviation of ``inertia`` [kg
+    m^2]; without an inertia only ratios to it are estimated. ``rise`` is the ratio of friction at rest to dynamic
+    friction, minus 1 [-], by which seals may grip near standstill. Raises IdentificationError, with file, sample and
+    remedy, for recordings from which neither can be estimated.
     """
     check_sources(sources, PROCEDURE, (ANGLE,), MINIMUM_SAMPLES)
     sources, said = without_wrong_samples(sources, PROCEDURE, (ANGLE, VELOCITY), start, end)
@@ -217,7 +217,7 @@ _OVER_INERTIA = (
 
 
 def _readings(sources: tuple[RecordingSource, ...], decays: tuple[FreeDecay, ...]) -> PooledReadings:
-    """Return the samples of all decays in the order of the law, told apart by sensor and half of the way."""
+    """Return the samples of all decays in the order of the law, labelled by sensor and by half of the swept angle."""
     series, sensors, halves = list[Floats](), list[str](), list[str]()
     for decay in decays:
         moved = np.abs(decay.angle - decay.angle[0])
@@ -233,7 +233,7 @@ def _readings(sources: tuple[RecordingSource, ...], decays: tuple[FreeDecay, ...
 
 
 def _panels(decays: tuple[FreeDecay, ...], model: Floats, slowing: Slowing) -> tuple[Panel, Panel]:
-    """Return the angles over time, and the accelerations over the velocity with the straight line of equation (1)."""
+    """Return two panels: angle over time, and acceleration over velocity with the straight line of equation (1)."""
     angles, rates, place = list[Mark](), list[Mark](), 0
     measured, fitted, fastest = "measured", "fitted", 0.0
     for decay in decays:

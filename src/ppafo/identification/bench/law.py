@@ -1,4 +1,4 @@
-"""A law of the bench as residuals of the one estimator, and what a bench does not know as numbers with priors."""
+"""Fit of a bench law with the common estimator, and uncertain quantities of the bench as variables with priors."""
 
 import math
 from collections import defaultdict
@@ -16,19 +16,19 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 
 Values = Mapping[str, float]
-"""Numbers of a law by name, SI units; one that is not there is 0."""
+"""Values of the variables of a law by name, in SI units; a missing name means 0."""
 
 _MEMORY = 2
-"""Coefficients of the noise at most: for a slow sensor, drift or hum. More would pass the misfit of a law for noise."""
+"""Highest order of the noise autoregression: enough for sensor lag, drift or hum, too low to absorb model error."""
 
 _WIDEST = 12.0
-"""Limits by which a tolerance may be off at most in the search."""
+"""Largest deviation of a tolerance in the search, as a multiple of its limit [-]."""
 
 
 def tolerance(name: str, deviation: float, start: float = 0.0, family: str = "") -> tuple[FitVariable, ...]:
-    """Return a number known to a standard deviation about its start [SI]; nothing where it is known exactly.
+    """Return a variable with a prior of standard deviation ``deviation`` about ``start`` [SI]; nothing if exact.
 
-    Those of one ``family`` are tested together.
+    Variables of one ``family`` are tested together.
     """
     if not deviation > 0.0:
         return ()
@@ -39,20 +39,22 @@ def tolerance(name: str, deviation: float, start: float = 0.0, family: str = "")
 
 
 def within(name: str, limit: float, family: str = "") -> tuple[FitVariable, ...]:
-    """Return an error of the bench, known within a limit on either side of 0 [SI]; see ``tolerance``."""
+    """Return an error of the bench, known to lie within +-``limit`` [SI]; see ``tolerance``."""
     return tolerance(name, deviation_of_limit(limit), family=family)
 
 
 def sought(name: str, start: float, low: float = -math.inf, high: float = math.inf, scale: float = 0.0) -> FitVariable:
-    """Return a number that is sought [SI]; its scale is its start where none is given."""
+    """Return an unknown without a prior [SI]; the default scale is the magnitude of its start."""
     return FitVariable(name, start, low, high, scale or abs(start) or 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class PooledReadings:
-    """Readings by their sensor, whose noise is one, by recording or repetition, and by groups: a label for each.
+    """Readings of all recordings, with labels for each reading.
 
-    Numbers of a recording, of a sensor and of a group are compared with the numbers of all.
+    ``measured`` are the values [unit of the channel], ``sensors`` name the sensor (one noise each), ``recordings`` the
+    recording or repetition, and ``groups`` further groups. The estimates of each sensor, recording and group are tested
+    against the common ones.
     """
 
     measured: Floats
@@ -62,7 +64,7 @@ class PooledReadings:
 
 
 def recordings_of(sources: tuple[RecordingSource, ...], counts: Iterable[int] = ()) -> list[str]:
-    """Return what a recording is called, with its file, for each of its readings, of which there are ``counts``."""
+    """Return the recording label with file name of each reading; ``counts`` are the readings of each recording."""
     sizes = tuple(counts) or [len(source.recording) for source in sources]
     pairs = enumerate(zip(sources, sizes, strict=True), start=1)
     return [label for number, (source, size) in pairs for label in [f"recording {number} ({source.name})"] * size]
@@ -71,7 +73,7 @@ def recordings_of(sources: tuple[RecordingSource, ...], counts: Iterable[int] = 
 def solve(
     law: Callable[[Values], Floats], readings: PooledReadings, numbers: Sequence[FitVariable], confidence: float
 ) -> tuple[Fit, Floats]:
-    """Return the fit of a law to readings, and what the law gives there, in the unit of what was measured."""
+    """Return the fit of a law to readings, and the fitted values at the readings, in the unit of the readings."""
     names, measured = [number.name for number in numbers], readings.measured
     keys = list(zip(readings.recordings, readings.sensors, *readings.groups, strict=True))
     # In the order of their first reading, so that the first block is the first recording.

@@ -2,9 +2,9 @@
 
     m = Cd A C1 P_up psi(r)  or  C rho_0 sqrt(T_0 / T) P_up phi(r; b)  or  c (P_up^2 - P_down^2),   r = P_down / P_up
 
-m is the mass flow [kg/s], P_up and P_down the absolute pressures before and behind the valve [Pa]; flow functions and
-constants as in ``flow``. Temperature and law of the gas, gains of the sensors, the zero of each of them are
-tolerances. Of ISO 6358, C is the choked flow, and b shows only where there is choked and subsonic flow.
+m is the mass flow [kg/s], P_up and P_down the absolute pressures upstream and downstream of the valve [Pa]; flow
+functions and constants as in ``flow``. Temperature and law of the gas, and gains and zeros of the sensors are
+tolerances. Of ISO 6358, C is the choked flow, and b is observable only from both choked and subsonic flow.
 """
 
 from dataclasses import replace
@@ -33,17 +33,17 @@ from ppafo.signals.recording import Floats
 PROCEDURE = "open-valve-flow"
 CHANNELS = ("upstream_pressure", "downstream_pressure", "mass_flow")
 MINIMUM_SAMPLES = 5
-"""Readings at the open valve without which nothing tells the numbers apart."""
+"""Least number of readings at the open valve that separates the unknowns."""
 _FULLY_OPEN = 0.99
-"""Size of the command [-] from which a valve is fully open."""
+"""Magnitude of the command [-] from which a valve is fully open."""
 _NEARLY_EQUAL = 0.9
-"""Ratio of the pressures [-] above which they are nearly equal."""
+"""Pressure ratio [-] above which the pressures are nearly equal."""
 _LEVELS = "choked flow", "subsonic flow", "flow at nearly equal pressures"
-"""Name of a reading's flow regime, by its pressure ratio."""
+"""Names of the flow regimes, by pressure ratio."""
 _SPAN, _SUBSONIC = 0.15, 0.6
-"""Span of the pressure ratios, and the largest of them, from which both numbers of ISO 6358 can be fitted."""
+"""Least span and least maximum of the pressure ratios [-] needed to fit both parameters of ISO 6358."""
 _LARGEST_COEFFICIENT = 1.0
-"""Discharge coefficient [-] that no opening exceeds: the flow would exceed a loss-free nozzle."""
+"""Largest possible discharge coefficient [-]: the flow of a loss-free nozzle."""
 
 
 def open_valve_flow(
@@ -58,10 +58,10 @@ def open_valve_flow(
 ) -> BenchResult:
     """Return Cd [-] or Cd A [m^2], or C [m^3/(s Pa)] and b [-], or c [kg/(s Pa^2)], of the open valve; (6), (7).
 
-    With an ``area`` [m^2] the orifice law gives Cd; without one only the product Cd A is known. The law ``both`` gives
-    Cd, Cd A or, with a ``critical_ratio`` [-], C, and c of a laminar gap beside it. ``path`` is the valve's in a set
-    (``valves.main``).
-    IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
+    With an ``area`` [m^2] the orifice law gives Cd, without one the product Cd A. The law ``both`` gives Cd, Cd A or,
+    with a ``critical_ratio`` [-], C, together with c of a parallel laminar gap. ``path`` is the path of the valve in a
+    set (``valves.main``). Raises IdentificationError, with file, sample and remedy, for recordings from which the flow
+    law cannot be estimated.
     """
     upstream, downstream, flow, labels, remarks = open_readings(sources, gas, tolerances)
     # Beside a laminar gap the critical ratio decides whether the opening is an orifice.
@@ -125,7 +125,7 @@ _BESIDE = ReportedNumber("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "
 
 
 def _size(opening: Opening, area: float | None, path: str) -> ReportedNumber:
-    """Return the number that is sought: where a set has it, its unit, and what it is."""
+    """Return the reported size of the opening: path in a set, unit and description."""
     if opening.law == "laminar":
         return ReportedNumber(
             "open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the open valve"
@@ -141,9 +141,10 @@ def _size(opening: Opening, area: float | None, path: str) -> ReportedNumber:
 def open_readings(
     sources: tuple[RecordingSource, ...], gas: GasAt, tolerances: Tolerances
 ) -> tuple[Floats, Floats, Floats, list[str], tuple[str, ...]]:
-    """Absolute pressures [Pa], flow [kg/s] and recording of readings with an open valve; remarks on those left out.
+    """Return upstream and downstream pressure [Pa], flow [kg/s], and recording label of open-valve readings; remarks.
 
-    IdentificationError for exchanged pressures and a valve that never was open.
+    Remarks name the readings left out. Raises IdentificationError for exchanged pressures and a valve that is never
+    open.
     """
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS[:2])
     for source in sources:

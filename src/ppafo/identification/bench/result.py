@@ -1,6 +1,6 @@
-"""Result of a bench procedure: estimates with one verdict each, a table and two panels, in SI units.
+"""Result of a bench procedure: estimates with verdicts, a table and two panels, in SI units.
 
-Figure 3 of the paper is the static torque beside the free decay.
+Figure 3 of the paper combines the static torque and the free decay.
 """
 
 from collections.abc import Sequence
@@ -20,9 +20,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class BenchResult:
-    """Result of one procedure. ``kind`` is the kind of its recordings; figures say so where nobody measured them.
+    """Result of one procedure.
 
-    ``conflict`` is the sentence on readings that want other numbers than all together, empty where they agree.
+    ``kind`` is the kind of its recordings; figures state it if the recordings were not measured. ``conflict`` is a
+    sentence on readings whose own estimates differ from the common ones, empty if all agree.
     """
 
     procedure: str
@@ -34,7 +35,7 @@ class BenchResult:
     remarks: tuple[str, ...] = ()
 
     def __getitem__(self, path: str) -> Estimate:
-        """Return the estimate at a path; KeyError where the procedure gave none."""
+        """Return the estimate at a path. Raises KeyError if the procedure did not estimate it."""
         for estimate in self.estimates:
             if estimate.path == path:
                 return estimate
@@ -43,9 +44,10 @@ class BenchResult:
 
 @dataclass(frozen=True, slots=True)
 class ReportedNumber:
-    """A number of a fit that is reported: its name there, which is its path, SI unit, and what it is in a sentence.
+    """Estimated quantity to report: path (its name in the fit), SI unit, and description as a sentence.
 
-    ``size`` stands in for the size of a value that may be zero, in that unit: zero is then an answer, and no bound.
+    ``size`` is a typical magnitude [unit] of a quantity that may be zero: an estimate of zero is then a valid result
+    and not the bound of the search.
     """
 
     path: str
@@ -55,7 +57,7 @@ class ReportedNumber:
 
 
 _AT_BOUND = 1.0e-6
-"""Distance to a bound, over the scale of a number, up to which it has ended there."""
+"""Distance from a bound, as a fraction of the scale [-], up to which an estimate counts as at its bound."""
 
 
 def result_of(
@@ -68,9 +70,9 @@ def result_of(
     remedy: str,
     remarks: tuple[str, ...] = (),
 ) -> BenchResult:
-    """Return what a procedure has found: an estimate for each number that is reported, and what to know of them.
+    """Return the result of a procedure: an estimate for each reported quantity, and remarks on the recordings.
 
-    ``remedy`` is what to do where some readings want other numbers than all together.
+    ``remedy`` is the advice if some readings contradict the others.
     """
     origin = tuple(source.trace for source in sources)
     return BenchResult(
@@ -85,7 +87,7 @@ def result_of(
 
 
 def _estimate(fitted: Fit, reported: ReportedNumber, origin: tuple[str, ...]) -> Estimate:
-    """Return a number of a fit with its verdict and sentence; ``origin`` are the recordings that it comes from."""
+    """Return one estimate of a fit with verdict and sentence; ``origin`` are references of the recordings used."""
     index = [*fitted.by_name].index(reported.path)
     value, low, high = (float(column[index]) for column in (fitted.values, fitted.low, fitted.high))
     number = fitted.numbers[index]
@@ -110,20 +112,20 @@ def _estimate(fitted: Fit, reported: ReportedNumber, origin: tuple[str, ...]) ->
 
 
 _SIZE = (3.1, 2.7)
-"""Inches of a panel: two of them side by side can be read at the width of a column."""
+"""Width and height of a panel [in]; two panels side by side fit a journal column."""
 
 
 def bench_figure(panels: Sequence[Panel], kind: RecordingKind) -> "Figure":
-    """Return the two panels of a procedure side by side, with letters."""
+    """Return a figure with the two panels of a procedure side by side, lettered A and B."""
     pairs = zip("AB", panels, strict=True)
     lettered = [replace(panel, title=f"$\\bf{{{letter}}}$   {panel.title}") for letter, panel in pairs]
     return draw_panels(lettered, 2, _SIZE, kind=kind)
 
 
 def figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
-    """Return figure 3 of the paper, torque over pressure and damping, from a static torque and a free decay.
+    """Return figure 3 of the paper, static torque and damping, from a static torque and a free decay result.
 
-    Each panel says of itself where its recordings are synthetic.
+    The title of each panel states if its recordings are synthetic or simulated.
     """
     panels = []
     for result, panel in ((torque, torque.panels[0]), (decay, decay.panels[1])):

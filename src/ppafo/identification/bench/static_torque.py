@@ -1,15 +1,15 @@
 """Static torque over rising and falling pressure: torque constant and friction; figure 3, top, of the paper.
 
-While the pressure rises, friction keeps part of the torque from the scale; while it falls, friction adds to it. So
+While the pressure rises, friction reduces the torque at the scale; while it falls, friction adds to it:
 
     T = K dP + T_0 - s (T_s + g |dP|),   s = +1 rising, -1 falling                               equations (2), (10)
 
-T is what the scale shows [N m], dP the pressure difference [Pa], K the torque constant [m^3], T_0 the zero of the scale
-[N m], T_s the friction without pressure [N m], g its growth with pressure [m^3] (effect ``seal_friction``). Zero and
-gain of the pressure sensor and the gain of the scale are tolerances, and so is the friction of each of several
-recordings: seals do not grip alike from one to another. Where a position or an angle moves with the
-direction, and not the pressure, the actuator slid, and T_s is its friction in motion. A ``force`` [N] in place of the
-torque gives an area [m^2] and forces, for which a set has no place.
+T is the reading of the scale [N m], dP the pressure difference [Pa], K the torque constant [m^3], T_0 the zero of the
+scale [N m], T_s the friction without pressure [N m], g its growth with pressure [m^3] (effect ``seal_friction``). Zero
+and gain of the pressure sensor and gain of the scale are tolerances. So is the friction of each of several recordings,
+because seals grip differently from one to another. If a position or an angle moves with the direction while the
+pressure does not, the actuator slid, and T_s is the kinetic friction. A ``force`` [N] in place of the torque gives an
+area [m^2] and forces, for which a set has no entry.
 """
 
 from dataclasses import dataclass
@@ -43,21 +43,21 @@ PROCEDURE = "static-torque"
 _TORQUE, _FORCE = "torque", "force"
 _MOVING = ("position", "angle")
 MINIMUM_SAMPLES = 6
-"""Readings without which slope, friction, its growth and the zero are not told apart."""
+"""Least number of readings that separates slope, friction, growth of the friction, and zero."""
 _MINIMUM_LEVELS = 3
-"""Different pressures without which nothing shows whether the torque is a straight line over them."""
+"""Least number of different pressures that shows whether the torque is linear in pressure."""
 _MORE_THAN_FRICTION = 0.3
-"""Fraction of its range by which the torque may move at one pressure, as friction turns round."""
+"""Fraction of its range [-] by which the torque may change at one pressure when friction reverses."""
 _PARTS = 20
-"""Equal parts of the span of the pressures: readings in one of them are at one pressure."""
+"""Number of bins over the pressure range; readings within one bin have the same pressure level."""
 _FLAT = 0.002
-"""Share of the range of the torque within which readings are the flat start of a scale that only pulls."""
+"""Fraction of the torque range [-] within which readings belong to the flat start of a scale that only pulls."""
 _MOVES_WITH_DIRECTION = 0.5
-"""Share of its range by which a channel moves with the direction in a sweep, where that is what the direction is of."""
+"""Least change of a channel per sweep, as a fraction of its range [-], for the direction to refer to the channel."""
 _MOST_REPETITIONS = 12
-"""Up to this many repetitions are groups of their own; of more, the recordings are."""
+"""Largest number of repetitions that are tested one by one; with more, whole recordings are tested."""
 _SIGMAS = 4.0
-"""Standard errors by which a rough friction must lie below 0 to be a wrong sign and no noise."""
+"""Standard errors by which a first guess of the friction must be negative to be a wrong sign rather than noise."""
 
 
 def static_torque(
@@ -65,10 +65,10 @@ def static_torque(
 ) -> BenchResult:
     """Return torque constant [m^3], friction without pressure [N m], its growth [m^3], zero of the scale [N m]; (2).
 
-    The friction is that at rest, or in motion where the actuator slid; of a force they are in m^2 and N. Readings whose
-    direction is 0 belong to no branch and are left out. So is a flat start of the rising branch, where a scale that
-    only pulls shows nothing until friction is overcome.
-    IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
+    The friction is static, or kinetic if the actuator slid. For a force the units are m^2 and N. Readings with
+    direction 0 belong to no branch and are left out. So is a flat start of the rising branch, where a scale that only
+    pulls shows nothing until friction is overcome. Raises IdentificationError, with file, sample and remedy, for
+    recordings that cannot separate the unknowns.
     """
     readings = readings_of(sources)
     names = readings.names
@@ -147,7 +147,7 @@ def static_torque(
 
 
 def _marks(readings: "_Sweeps", slope: float, zero: float) -> list[Mark]:
-    """Return both branches over the pressure, and the line without friction of a slope and a zero."""
+    """Return the plot marks of both branches over pressure, and of the frictionless line with this slope and zero."""
     branches = {"rising": readings.branch > 0.0, "falling": readings.branch < 0.0}
     # Of an actuator that slides at constant pressure the branches are its two ways.
     ways = {"rising": "moving with the pressure", "falling": "moving against the pressure"}
@@ -160,16 +160,16 @@ def _marks(readings: "_Sweeps", slope: float, zero: float) -> list[Mark]:
 
 
 def _of_files(at: Values, names: list[str], files: Labels) -> Floats:
-    """Tolerance of each reading: its file's, or the only one there is; 0 for none."""
+    """Return the tolerance of each reading: the value of its file, or the common value; 0 if there is none."""
     values = np.array([at[name] for name in names] or [0.0])
     return np.asarray(values[files] if len(names) > 1 else values)
 
 
 def _straight_line(readings: "_Sweeps", files: str) -> tuple[float, float, float, float]:
-    """Return first guesses from a straight line through both branches, in units of the load.
+    """Return first guesses from a linear fit of both branches: slope, zero, friction, and scale of the friction.
 
-    The slope over the pressure [Pa], the zero, the friction, and the size of the latter or of its scatter.
-    IdentificationError, with the names of the files, for signs that no device has.
+    The slope is in units of load per Pa, the others in units of load; the scale is at least the scatter. Raises
+    IdentificationError, with ``files`` first, if a sign is impossible.
     """
     columns = (readings.pressure, np.ones_like(readings.pressure), -readings.branch)
     design = np.stack(columns, axis=1)
@@ -194,9 +194,9 @@ def _straight_line(readings: "_Sweeps", files: str) -> tuple[float, float, float
 
 @dataclass(frozen=True, slots=True)
 class _LoadNames:
-    """Unknowns of a load in one unit, by path, unit and word: the slope, and static or kinetic friction.
+    """Names, paths and units of the unknowns for a torque or force: slope, static or kinetic friction, growth, zero.
 
-    Only what a set has a place for has a path of a set.
+    Unknowns without an entry in a parameter set have a path that starts with ``static_torque``.
     """
 
     load: str
@@ -212,7 +212,7 @@ class _LoadNames:
 
 
 def names_of(load: str, slides: bool) -> _LoadNames:
-    """Return what the numbers of a torque or a force are called, of an actuator that slides or is held."""
+    """Return the names of the unknowns for a torque or force; ``slides`` selects kinetic instead of static friction."""
     word, key = ("friction in motion", "dynamic") if slides else ("static friction", "static")
     if load == _FORCE:
         unit, slope = "N", ("area", "static_torque.area", "m^2")
@@ -225,10 +225,10 @@ def names_of(load: str, slides: bool) -> _LoadNames:
 
 @dataclass(frozen=True, slots=True)
 class _Sweeps:
-    """Readings of both branches: pressure difference [Pa], load [N m or N], branch (+1, -1).
+    """Readings of both branches: pressure difference [Pa], load [N m or N], branch (+1 rising, -1 falling).
 
-    ``weight`` is one over the noise of each, 1 for a usual reading: the mean of many samples has less. ``recordings``
-    are labels of the repetition or, of many repetitions, the recording; ``files`` are the places of their sources.
+    ``weight`` is the reciprocal relative noise of each reading [-]: above 1 for means of many samples. ``recordings``
+    are labels of the repetition or, with many repetitions, of the recording; ``files`` are the indices of the sources.
     """
 
     pressure: Floats
@@ -242,7 +242,7 @@ class _Sweeps:
 
 
 def slides(sources: tuple[RecordingSource, ...]) -> bool:
-    """Tell whether a position or an angle moves with the direction and the pressure does not."""
+    """Return whether a position or an angle moves with the direction while the pressure does not."""
     pressure = float(np.ptp(pool(sources, "pressure_difference")))
     moving = [
         _swept(one, name) / max(float(np.ptp(one.recording[name])), 1.0e-300)
@@ -255,7 +255,7 @@ def slides(sources: tuple[RecordingSource, ...]) -> bool:
 
 
 def _swept(source: RecordingSource, name: str) -> float:
-    """Mean change of a channel with the direction of a sweep, over all sweeps."""
+    """Return the mean magnitude of the change of a channel per sweep in one direction [unit of the channel]."""
     direction = source.recording["direction"]
     within = (direction[1:] == direction[:-1]) & (direction[1:] != 0.0)
     used = direction[direction != 0.0]
@@ -264,7 +264,7 @@ def _swept(source: RecordingSource, name: str) -> float:
 
 
 def readings_of(sources: tuple[RecordingSource, ...]) -> _Sweeps:
-    """Return the readings of all recordings; IdentificationError where they cannot separate slope from friction."""
+    """Return the readings of all recordings. Raises IdentificationError if they cannot separate slope from friction."""
     is_force = bool(sources) and all(_FORCE in one.recording and _TORQUE not in one.recording for one in sources)
     load = _FORCE if is_force else _TORQUE
     check_sources(sources, PROCEDURE, (load, "pressure_difference", "direction"), 1, moving=(load,))
@@ -324,7 +324,10 @@ def _one_a_stroke(
     direction: Floats,
     names: _LoadNames,
 ) -> _Sweeps:
-    """Return one reading for the samples of a stroke; ``used`` says which samples of all recordings the others are."""
+    """Return readings averaged over samples at one pressure of a stroke.
+
+    ``used`` marks the samples of all recordings to which ``pressure``, ``torque`` and ``direction`` belong.
+    """
     # A repetition of a recording is one cluster; so is a recording without repetitions.
     parts = [(number, one.recording) for number, one in enumerate(sources)]
     files = np.concatenate([np.full(len(one), number) for number, one in parts])[used]
@@ -346,9 +349,9 @@ def _one_a_stroke(
 
 
 def _runs(pressure: Floats, labels: NDArray[np.float64]) -> Labels:
-    """Return which reading each sample belongs to: samples in a row of one branch at one pressure are one reading.
+    """Return the reading index of each sample; consecutive samples of one branch at one pressure are one reading.
 
-    Within a stroke the friction follows the place, so that its samples are no independent readings of the law.
+    Friction varies with position within a stroke, so that these samples are not independent readings of the law.
     """
     widest = np.ptp(pressure) / _PARTS / 2.0
     begun, places = 0, np.zeros(pressure.size, dtype=np.int64)

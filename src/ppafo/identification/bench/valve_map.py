@@ -1,12 +1,13 @@
-"""Valve map: command against opening; dead band, gain, saturation and hysteresis of a proportional valve.
+"""Valve map: flow over command; dead band, gain, saturation and hysteresis of a proportional valve.
 
     m = Cd A(u') C1 P_up psi(P_down / P_up),   Cd A = sign(u') k min(max(|u'| - u_0, 0), u_s - u_0)     (6), (7)
     u' = play(u; h):   y = max(u - h/2, min(u + h/2, y)),   u' = y / (1 - h/2)     effect ``spool_play``
 
 m is the mass flow [kg/s], positive into chamber 1, u the command from -1 to 1, u_0 the dead band, u_s the command from
-which the valve opens no further, h the width of the play, k the effective area per command [m^2]. Flow is over what the
-pressures of the moment give, so that a supply that sags does not look like a valve that saturates. Temperature and law
-of the gas, gains and zeros of the sensors are tolerances; the zero of the flow meter shows inside the dead band.
+which the valve opens no further, h the width of the backlash, k the effective area per command [m^2]. The flow is
+divided by the flow per area at the measured pressures, so that a sagging supply does not look like saturation.
+Temperature and law of the gas, gains and zeros of the sensors are tolerances; the zero of the flow meter is observable
+inside the dead band.
 """
 
 from dataclasses import dataclass
@@ -30,26 +31,26 @@ PROCEDURE = "valve-map"
 CHANNELS = ("command", "mass_flow", "upstream_pressure", "downstream_pressure")
 PRESSURES = ("upstream_pressure", "downstream_pressure")
 MINIMUM_SAMPLES = 12
-"""Readings without which the numbers of a map are not told apart."""
+"""Least number of readings that separates the unknowns of a map."""
 _MINIMUM_RANGE = 0.5
-"""Range of the command [-] without which dead band and gain are not told apart."""
+"""Least range of the command [-] that separates dead band and gain."""
 _SHUT, _HALF_OPEN = 0.05, 0.5
-"""Shares of the largest area below which the valve is shut, and above which it is neither shut nor fully open."""
+"""Fraction of the largest area [-] below which the valve is shut, and fraction above which it is at least half open."""
 _SATURATES = 0.02
-"""Least distance of the saturation from the highest command for it to be identified [-]."""
+"""Least distance from the highest command [-] for the saturation to be identified."""
 _CLEAR_COMMAND = 0.1
-"""Size of a command [-] from which on it is one towards its chamber."""
+"""Magnitude of a command [-] from which its direction, to chamber 1 or 2, is clear."""
 _SMALL_COMMAND = 0.2
-"""Stands in for the size of a dead band or a play [-] that may be 0."""
+"""Typical magnitude [-] of a dead band or backlash, which may be 0."""
 _GAIN, _PLAY, _SATURATION = "valve_map.gain", "effects.spool_play.width", "valve_map.saturation_command"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sweep:
-    """Readings of a valve, each (readings,): command [-], flow [kg/s], pressures [Pa, absolute].
+    """Readings of a valve, each (readings,): command [-], flow [kg/s], upstream and downstream pressure [Pa absolute].
 
-    ``branch`` is 1 where the command rises, -1 where it falls. ``commands`` has the command of each recording, in which
-    a play begins anew.
+    ``branch`` is 1 where the command rises, -1 where it falls. ``commands`` has the commands of each recording; the
+    backlash is reset at the start of each.
     """
 
     commands: tuple[Floats, ...]
@@ -61,12 +62,12 @@ class _Sweep:
 
     @property
     def highest_command(self) -> float:
-        """Largest size of a command [-]."""
+        """Largest magnitude of a command [-]."""
         return float(np.abs(self.command).max())
 
     @property
     def is_two_way(self) -> bool:
-        """True where the command rises and falls, so that a play shows."""
+        """True if the command both rises and falls, so that backlash is observable."""
         return bool((self.branch > 0).any() and (self.branch < 0).any())
 
 
@@ -79,8 +80,8 @@ def valve_map(
 ) -> BenchResult:
     """Return dead band [-], gain [m^2], saturation and hysteresis [-] from command and flow; equations (6), (7).
 
-    ``path`` is the valve's in a set (``valves.main``).
-    IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
+    ``path`` is the path of the valve in a set (``valves.main``). Raises IdentificationError, with file, sample and
+    remedy, for recordings from which the map cannot be estimated.
     """
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("command", "mass_flow"), absolute=PRESSURES)
     for source in sources:
@@ -137,7 +138,7 @@ def valve_map(
 
 
 def _sought(sources: tuple[RecordingSource, ...], sweep: _Sweep, areas: Floats, band: str) -> tuple[FitVariable, ...]:
-    """Return what is sought, with first guesses from the effective areas [m^2] of the readings; ``band`` is a path."""
+    """Return the unknowns with first guesses from the effective area [m^2] of each reading; ``band`` is a path."""
     size, largest, highest = np.abs(sweep.command), float(np.abs(areas).max()), sweep.highest_command
     half = float(size[np.abs(areas) > _HALF_OPEN * largest].min())
     if not half > 0.0:
@@ -158,7 +159,7 @@ def _sought(sources: tuple[RecordingSource, ...], sweep: _Sweep, areas: Floats, 
 
 
 def _readings(sources: tuple[RecordingSource, ...], sweep: _Sweep) -> PooledReadings:
-    """Return the flow to fit, in groups whose own numbers are compared with those of all."""
+    """Return the flow readings with labels for consistency tests: branch, direction and magnitude of the command."""
     groups = (
         np.where(sweep.branch < 0.0, "falling commands", "rising commands").tolist(),
         np.where(sweep.command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
@@ -168,7 +169,7 @@ def _readings(sources: tuple[RecordingSource, ...], sweep: _Sweep) -> PooledRead
 
 
 def _reported(sweep: _Sweep, band: str, saturation: float) -> list[ReportedNumber]:
-    """Return the numbers to report: a saturation [-] below the highest command, a play where the command turned."""
+    """Return the quantities to report; no saturation [-] near the highest command, no backlash for one-way commands."""
     reported = [
         ReportedNumber(band, "", "Command below which nothing flows, in both directions", _SMALL_COMMAND),
         ReportedNumber(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band"),
@@ -181,7 +182,7 @@ def _reported(sweep: _Sweep, band: str, saturation: float) -> list[ReportedNumbe
 
 
 def _marks(sweep: _Sweep, model: Floats) -> list[Mark]:
-    """Return readings and fitted curve over the command, the rising and the falling ones apart."""
+    """Return the plot marks of readings and fitted flow over command, separately for rising and falling commands."""
     marks = []
     for role, sign in (("rising", 1.0), ("falling", -1.0)):
         on = sweep.branch == sign
@@ -192,13 +193,13 @@ def _marks(sweep: _Sweep, model: Floats) -> list[Mark]:
 
 
 def area_of_command(command: Floats, dead_band: float, gain: float, saturation: float) -> Floats:
-    """Return the effective area [m^2] of a command of the spool [-], positive towards chamber 1."""
+    """Return the effective area [m^2] for a spool command [-], positive towards chamber 1."""
     beyond = np.clip(np.abs(command) - dead_band, 0.0, max(saturation - dead_band, 0.0))
     return np.asarray(np.sign(command) * gain * beyond)
 
 
 def spool_of(command: Floats, width: float) -> Floats:
-    """Return the command [-] that a spool with play of a whole ``width`` [-] follows; it begins at the first one."""
+    """Return the spool command [-] after backlash of full ``width`` [-]; the spool starts at the first command."""
     if width <= 0.0:
         return command
     position, positions = float(command[0]), []
@@ -209,9 +210,9 @@ def spool_of(command: Floats, width: float) -> Floats:
 
 
 def _areas(sources: tuple[RecordingSource, ...], sweep: _Sweep, gas: GasAt) -> Floats:
-    """Return the effective area [m^2] of each reading; IdentificationError for readings that cannot say it.
+    """Return the effective area [m^2] of each reading. Raises IdentificationError if the readings do not determine it.
 
-    It is the flow over what the pressures would let pass, so that a supply that sags is no valve that saturates.
+    The area is flow divided by flow per area at the measured pressures, so that a sagging supply is not saturation.
     """
     span = float(np.ptp(sweep.command))
     if span < _MINIMUM_RANGE:
@@ -234,9 +235,9 @@ def _areas(sources: tuple[RecordingSource, ...], sweep: _Sweep, gas: GasAt) -> F
 
 
 def _branch(source: RecordingSource) -> Floats:
-    """Return the direction of the command (readings,), 1, -1 or 0 before it first changes.
+    """Return the direction of the command (readings,): 1, -1, or 0 before the first change.
 
-    Taken from the recording's channel, else from the last change of the command.
+    The direction is taken from the recorded channel, or else from the last change of the command.
     """
     if "direction" in source.recording:
         return source.recording["direction"]

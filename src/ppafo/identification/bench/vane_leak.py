@@ -1,15 +1,15 @@
-"""Leak across the vane or the piston, of two closed chambers or in steady flow: its area, conductance or coefficient.
+"""Leak across the vane or the piston, from closed chambers or steady flow: area, conductance or laminar coefficient.
 
     steady     m = g(P_1, P_2)
     closed     D' = -(1 + V_1/V_2) (R T / V_1) g(P_1, P_2),   D = P_1 - P_2,   V_1 P_1 + V_2 P_2 = constant
 
 g is the mass flow [kg/s] of a law of ``flow``, equations (6), (7): Cd A_leak of an orifice, C of ISO 6358 or a laminar
-coefficient; P_1 and P_2 the absolute pressures [Pa] of the fuller chamber and the other, V_1 and V_2 their volumes
+coefficient; P_1 and P_2 are the absolute pressures [Pa] of the fuller chamber and the other, V_1 and V_2 their volumes
 [m^3], equation (3) at constant temperature. The time to fall from one D to another is an integral over D, computed once
-for a law. A chamber whose pressure stands still is taken for a room. Just filled, gas and
-walls come to rest: each pressure is off by P r exp(-t / tau) at first. Volumes, temperature and law of the gas, r and
-tau, zeros of the sensors are tolerances, of steady flow the gains too: one common to both sensors does not change how
-fast D falls.
+per law. A chamber with constant pressure is treated as the surrounding room. Just after filling, gas and walls are not
+yet in equilibrium: each pressure has an initial error P r exp(-t / tau). Volumes, temperature and law of the gas, r and
+tau, and zeros of the sensors are tolerances; for steady flow also the gains. A gain common to both sensors does not
+change the rate at which D falls.
 """
 
 import math
@@ -61,14 +61,14 @@ CHANNELS = ("pressure_1", "pressure_2")
 STEADY = (*CHANNELS, "mass_flow")
 MINIMUM_SAMPLES, _FEWEST_STEADY = 20, 8
 EDGE = 20
-"""Samples at either end that are averaged for a first guess, at most a tenth of a record."""
+"""Largest number of samples averaged at either end for a first guess, at most a tenth of a record."""
 
 STANDS_STILL = 0.02
-"""Change of a pressure over the other's, up to which a chamber counts as a room."""
+"""Ratio of the pressure changes of both chambers [-] up to which the chamber with the smaller change is a room."""
 _NEARLY_EQUAL = 0.01
 _RATIO, _VOLUME, _RELAXATION = "ratio of the volumes", "volume", "time of the relaxation"
 _RELAXED, _MOST_RELAXED = 5.0, 0.02
-"""Times that a relaxation usually fits into a recording, and how far it moves a pressure at most."""
+"""Usual ratio of recording length to relaxation time [-], and largest relative pressure error from relaxation [-]."""
 _REMEDY = "{}, or give start and end; gas may leak elsewhere, or relax with its walls"
 
 
@@ -88,12 +88,12 @@ def vane_leak(
 ) -> BenchResult:
     """Return the leak: A_leak [m^2], C [m^3/(s Pa)] or a laminar coefficient [kg/(s Pa^2)]; equations (6), (7).
 
-    Recordings with a ``mass_flow`` are steady: the flow that keeps up the pressure, at several pressures. Of closed
-    chambers the samples from ``start`` to ``end`` [s] count. Without the volume [m^3] of the chamber that empties there
-    is no area, only one over the volume; ``volume_deviation`` [-] is the standard deviation of a volume over it. A
-    ``discharge_coefficient`` [-] makes an area of the product, a ``critical_ratio`` [-] asks for a sonic conductance,
-    the ``law`` laminar for a laminar coefficient, both for one beside what the set has.
-    IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
+    Recordings with a ``mass_flow`` are steady: the flow that maintains the pressure, at several pressures. For closed
+    chambers the samples from ``start`` to ``end`` [s] are used. Without the volume [m^3] of the emptying chamber, only
+    the area divided by the volume is estimated; ``volume_deviation`` is the relative standard deviation of a volume
+    [-]. A ``discharge_coefficient`` [-] turns the product Cd A into an area, a ``critical_ratio`` [-] selects the sonic
+    conductance, ``law`` "laminar" a laminar coefficient, and "both" a laminar gap in parallel with the law of the set.
+    Raises IdentificationError, with file, sample and remedy, for recordings from which the leak cannot be estimated.
     """
     form: Law = law if law != "orifice" or critical_ratio is None else "iso6358"
     opening = Opening(gas, form, discharge_coefficient or 1.0, critical_ratio)
@@ -117,7 +117,7 @@ def vane_leak(
 
 
 def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumber:
-    """Return the number that is sought: where a set has it, its unit, and what it is."""
+    """Return the reported size of the leak: path in a set, unit and description."""
     if opening.law == "laminar":
         return ReportedNumber("vane_leak.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the leak")
     if opening.critical_ratio is not None:
@@ -130,7 +130,11 @@ def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumb
 
 
 class _ClosedChambers(NamedTuple):
-    """Two closed chambers: time [s], pressures [Pa] of the fuller and the other, number of the fuller, of the decay."""
+    """Decay of two closed chambers.
+
+    ``time`` is in s; ``first`` and ``second`` are the pressures [Pa] of the fuller chamber and the other; ``fuller`` is
+    the number of the fuller chamber, 1 or 2; ``number`` is the number of the decay.
+    """
 
     time: Floats
     first: Floats
@@ -140,7 +144,7 @@ class _ClosedChambers(NamedTuple):
 
     @property
     def edge(self) -> int:
-        """Samples at either end that are averaged."""
+        """Number of samples averaged at either end."""
         return max(1, min(EDGE, self.time.size // 10))
 
     @property
@@ -152,7 +156,7 @@ class _ClosedChambers(NamedTuple):
 
     @property
     def room(self) -> int | None:
-        """Place of the pressure that stands still, 0 the first and 1 the second; None where both change."""
+        """Index of the constant pressure, 0 for the first and 1 for the second; None if both change."""
         fall, rise = (abs(change) for change in self.changes)
         if rise <= STANDS_STILL * fall:
             return 1
@@ -160,7 +164,7 @@ class _ClosedChambers(NamedTuple):
 
     @property
     def changing(self) -> int:
-        """Place of the pressure from which the leak is known: the first, but where that is of a room."""
+        """Index of the pressure that determines the leak: the first, or the second if the first is constant."""
         return 1 if self.room == 0 else 0
 
     @property
@@ -170,14 +174,14 @@ class _ClosedChambers(NamedTuple):
 
     @property
     def fitted(self) -> list[tuple[str, Floats]]:
-        """The pressures [Pa] that are fitted, with their channels: the one of a room is not."""
+        """Fitted channels with their pressures [Pa]; the constant pressure of a room is not fitted."""
         return [pair for place, pair in enumerate(self.sensors) if place != self.room]
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Pressure difference at the start and at the end [Pa], each a mean over the samples of an edge.
+        """Pressure difference at the start and at the end [Pa], each from a straight line through the edge samples.
 
-        Taken from straight lines through them, so that an edge in which the difference falls does not shorten the fall.
+        A mean over the edge instead would underestimate the fall.
         """
         edge, difference = self.edge, self.first - self.second
         if edge < 2:
@@ -189,15 +193,15 @@ class _ClosedChambers(NamedTuple):
         return start, end
 
     def start_of(self, sensor: str) -> str:
-        """Name of the pressure of a chamber at the start [Pa]."""
+        """Return the name of the initial pressure [Pa] of a chamber, given its channel."""
         return f"start of {sensor}, decay {self.number}"
 
     def relaxation_of(self, sensor: str) -> str:
-        """Name of the share by which a pressure is off just after filling [-]."""
+        """Return the name of the relative pressure error just after filling [-], given its channel."""
         return f"relaxation of {sensor}, decay {self.number}"
 
     def numbers(self) -> Iterator[FitVariable]:
-        """Yield the unknowns: initial pressures, the room's within its noise, and initial offsets of the readings."""
+        """Yield the unknowns: initial pressures (in a room, with a prior of its noise) and relaxation after filling."""
         for place, (sensor, values) in enumerate(self.sensors):
             size = max(abs(self.changes[self.changing]), float(np.std(np.diff(values))), 1.0)
             found = sought(self.start_of(sensor), float(values[: self.edge].mean()), 1.0, scale=size)
@@ -208,15 +212,15 @@ class _ClosedChambers(NamedTuple):
             yield from within(self.relaxation_of(sensor), _MOST_RELAXED)
 
     def halves(self) -> list[str]:
-        """Return for each sample of a pressure whether the difference has fallen by less than half or by more."""
+        """Return for each sample the label of the early or late half of the fall of the pressure difference."""
         half = int(np.argmax(self.first - self.second < 0.5 * sum(self.ends)))
         return ["the early fall"] * half + ["the late fall"] * (self.time.size - half)
 
 
 def closed_chambers(source: RecordingSource, start: float | None, end: float | None, number: int) -> _ClosedChambers:
-    """Return the chambers of the recording of a decay between its start and equal pressures.
+    """Return the chambers in the recording of a decay, from its start until the pressures are nearly equal.
 
-    IdentificationError where too few samples are left.
+    Raises IdentificationError if too few samples are left.
     """
     part = window(source.recording, start, end)
     skipped = check_no_gap(source, PROCEDURE, part)
@@ -248,17 +252,17 @@ def closed_chambers(source: RecordingSource, start: float | None, end: float | N
 
 _POINTS = 400
 _LOWEST = 1.0e-3
-"""Difference at the end of a computed fall over that at its start."""
+"""Pressure difference at the end of a computed fall, as a fraction of the difference at the start [-]."""
 
 
 def pressures_of_fall(
     opening: Opening, sizes: OpeningSizes, first: float, second: float, ratio: float, rate: float, times: Floats
 ) -> tuple[Floats, Floats]:
-    """Return both pressures [Pa] at times [s] as their difference falls; no gas is lost to the outside.
+    """Return both pressures [Pa] at times [s] as their difference falls, without loss of gas to the outside.
 
-    ``sizes`` are those of the opening, ``first`` and ``second`` are the pressures [Pa] at the start, ``ratio`` is
-    V1/V2 [-], 0 where the second is of a room and infinite where the first is, ``rate`` R T / V1 [Pa/kg], or R T / V2
-    beside a room at the first.
+    ``sizes`` are the sizes of the opening, ``first`` and ``second`` the initial pressures [Pa]. ``ratio`` is V1/V2 [-]:
+    0 if the second side is a room, infinite if the first is. ``rate`` is R T / V1 [Pa/kg], or R T / V2 if the first
+    side is a room.
     """
     start = max(first - second, 1.0)
     # Parts of the difference by which the second pressure rises, and 1 less that by which the first one falls.
@@ -360,7 +364,7 @@ def _decaying_leak(
 
 
 def _over_volume(size: ReportedNumber, fuller: int) -> ReportedNumber:
-    """Return what is reported of a leak out of a chamber whose volume is not known."""
+    """Return the reported leak divided by the unknown volume of the chamber it empties."""
     text = f"{size.text.partition(' with')[0]} over the volume of chamber {fuller}, which is not known"
     if size.unit == "m^2":
         return ReportedNumber("vane_leak.area_over_volume", "1/m", text)
@@ -370,7 +374,7 @@ def _over_volume(size: ReportedNumber, fuller: int) -> ReportedNumber:
 def _ratio(
     decays: tuple[_ClosedChambers, ...], volume: float | None, other: float | None, deviation: float
 ) -> tuple[FitVariable, ...]:
-    """Return the ratio of the volumes [m^3], each known to the relative deviation or sought; none beside a room."""
+    """Return the volume ratio as unknown, or with a prior if both volumes [m^3] are given; nothing beside a room."""
     changes = [decay.changes for decay in decays if decay.room is None]
     if not changes:
         return ()
@@ -386,7 +390,7 @@ def _sought(
     opening: Opening,
     emptied: float,
 ) -> tuple[Paths, tuple[ReportedNumber, ...], OpeningSizes, OpeningSizes]:
-    """Return the numbers of a leak from closed chambers: paths, what is reported, the start, and each part alone."""
+    """Return paths, reported quantities, start values, and the size of each part alone, for closed chambers."""
     gas = opening.gas
     rate = gas.specific_gas_constant * gas.temperature / emptied
     rough = _rough_size(decays, opening, OpeningSizes(1.0), rate)
@@ -400,7 +404,7 @@ def _sought(
 
 
 def _beside(has_volume: bool) -> ReportedNumber:
-    """Return the laminar gap beside an orifice; without the volume of the chamber only its ratio is known."""
+    """Return the reported laminar gap parallel to an orifice, divided by the chamber volume if that is unknown."""
     text = "Laminar coefficient of a gap beside the orifice"
     if has_volume:
         return ReportedNumber(LAMINAR, "kg/(s Pa^2)", text)
@@ -408,7 +412,7 @@ def _beside(has_volume: bool) -> ReportedNumber:
 
 
 def _rough_size(decays: tuple[_ClosedChambers, ...], opening: Opening, unit: OpeningSizes, rate: float) -> float:
-    """Return how many times a ``unit`` of the opening makes the first pressure fall as it does on average; above 0."""
+    """Return the positive multiple of ``unit`` whose flow gives the mean rate of change of the pressure."""
     found = []
     for item in decays:
         flow = float(np.mean(opening.flow(unit, item.first, item.second)))
@@ -425,7 +429,7 @@ def _steady_leak(
     tolerances: Tolerances,
     confidence: float,
 ) -> BenchResult:
-    """Return the leak from flow over pressures; the zero of the flow meter shows where the pressures differ."""
+    """Return the leak from steady flow over pressures; different pressures separate the zero of the flow meter."""
     check_sources(sources, PROCEDURE, STEADY, _FEWEST_STEADY, moving=("mass_flow",), absolute=CHANNELS)
     for source in sources:
         check_not_clipped(source, PROCEDURE, "mass_flow", "pressure_1", source.recording["pressure_1"])

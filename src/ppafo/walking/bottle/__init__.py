@@ -1,1 +1,1 @@
-"""The bottle that a walking device hangs on: what a walk file says of it, its course, and a walk that is coupled."""
+"""Gas bottle that supplies a walking device: section of the walk file, state over time, coupled simulation."""

@@ -1,9 +1,10 @@
-"""A walk on its bottle: the lanes and the supply, which meet every tenth of a second.
+"""Co-simulation of a walk and its gas supply, with data exchange every tenth of a second.
 
-Chambers and lines move within milliseconds, bottle, regulator and hose within seconds. So the lanes run for a tenth of
-a second with what the supply offers at its beginning, and the supply follows with the gas that the regulator let
-through in it; they meet more often where little is left. Nothing is compiled for it: what a supply offers are
-parameters of any program with lines. The walk ends where the bottle no longer feeds it.
+Chambers and lines respond within milliseconds; bottle, regulator and hose within seconds. The walk is therefore
+advanced by a tenth of a second with the supply pressure and the largest flow from the start of the interval, then the
+supply is advanced with the gas mass that the regulator passed in that interval. The intervals are shorter when little
+gas is left. No program is compiled for a bottle: set pressure, gas temperature and largest flow are parameters of any
+program with supply lines. The walk ends when the bottle can no longer supply the device.
 """
 
 import math
@@ -55,7 +56,7 @@ _OPEN = 0.999
 
 
 class Schedule(NamedTuple):
-    """Walking and resting in turn [s], for at most ``longest`` [s]; a rest of 0 s is walking without a break."""
+    """Alternating durations of walking and rest [s], for at most ``longest`` [s]; a rest of 0 s means none."""
 
     walk: float
     rest: float
@@ -64,9 +65,10 @@ class Schedule(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class BottleLife:
-    """A bottle walked to its end: its course over all of the time, time walked and in all [s].
+    """State of a bottle from the start of a walk until the bottle ends it.
 
-    ``repeats`` is how many strides, or task sequences, were walked.
+    ``course`` is the state of the supply over time, ``walked`` the walking time [s], ``total`` the walking time plus
+    the rests [s], and ``repeats`` the number of strides, or of task sequences, that were walked.
     """
 
     course: SupplyCourse
@@ -82,10 +84,10 @@ def run_on_bottle(
     stride_time: float,
     progress: Callable[[float, float], None],
 ) -> tuple[BatchResult, SupplyCourse]:
-    """Run a walk on a bottle, up to where that ends it; return its states and records, and the course of the bottle.
+    """Simulate a walk on a bottle until either ends; return states and records of the walk, and the supply over time.
 
-    ``device`` is what the run was planned for; ``stride_time`` [s] is how long a stride takes; ``progress`` gets the
-    minutes done and in all.
+    ``device`` is the device for which the run was planned, ``stride_time`` the duration of a stride [s]. ``progress``
+    is called with the minutes simulated and the total number of minutes.
     """
     use = _BottleInUse([_Meeting(0.0, supply.start(), supply.offers_first())])
     result, done = _use_bottle(run, device, supply, stride_time, use, progress)
@@ -102,9 +104,9 @@ def life_on_bottle(
     schedule: Schedule,
     progress: Callable[[float, float], None] = lambda _done, _total: None,
 ) -> BottleLife:
-    """Walk until the bottle ends it: the run of ``run_on_bottle``, with rests, repeated where it is a task sequence.
+    """Walk until the bottle is exhausted, with the rests of the schedule; a task sequence is repeated.
 
-    The run is planned for as long as may be walked at most.
+    The run is planned for the longest possible walk. ``progress`` is called as in ``run_on_bottle``.
     """
     use = _BottleInUse([_Meeting(0.0, supply.start(), supply.offers_first())])
     while use.ending is None and use.walked + use.rested < schedule.longest:
@@ -114,7 +116,7 @@ def life_on_bottle(
 
 
 class _Meeting(NamedTuple):
-    """When bottle and device meet [s], the state of the supply then, and what it offers until they meet again."""
+    """Data exchange between bottle and device: time [s], state of the supply, and its output until the next one."""
 
     time: float
     state: SupplyState
@@ -123,7 +125,7 @@ class _Meeting(NamedTuple):
 
 @dataclass(slots=True)
 class _BottleInUse:
-    """A bottle in use: where it met the device, time walked and rested [s], gas through its regulator [kg]."""
+    """Bottle during a walk: exchanges with the device, time walked and rested [s], gas through the regulator [kg]."""
 
     met: list[_Meeting]
     walked: float = 0.0
@@ -133,7 +135,7 @@ class _BottleInUse:
 
 
 def _course_of_use(supply: BottleSupply, use: _BottleInUse) -> SupplyCourse:
-    """Course of a bottle in use; a use that nothing ended went to the end of the walk."""
+    """Return the state of a bottle over a walk; without another ending, the supply lasted until the end of the walk."""
     last = use.met[-1]
     over = f"the walk is over, and {_grams(last.state.mass)} are left in the bottle"
     # In the order of ``UNITS``.
@@ -176,7 +178,7 @@ def _use_bottle(
     progress: Callable[[float, float], None],
     schedule: Schedule | None = None,
 ) -> tuple[BatchResult, int]:
-    """Walk a run on a bottle in ``use``, which is brought up to date; return its rows and the steps that were done."""
+    """Simulate a run on a bottle and update ``use`` in place; return the rows of the run and the number of steps."""
     batch = batch_of(run)
     count = batch.clock.step_count
     block = begin_block(batch, effort_for(batch))
@@ -239,7 +241,7 @@ def _use_bottle(
 
 
 def _met_again(supply: BottleSupply, meeting: _Meeting, drawn: float, duration: float, time: float) -> _Meeting:
-    """Return the supply after ``duration`` [s] in which a mass was drawn [kg], at a time [s]."""
+    """Return the exchange at ``time`` [s], after the device has drawn a mass ``drawn`` [kg] over ``duration`` [s]."""
     table, content = supply.bottle.fluid.table, meeting.offered.content
     state = advance_supply(table, supply.line, supply.bottle.supply, meeting.state, content, drawn, duration)
     return _Meeting(time, state, supply.offers(state, content.temperature, drawn))
@@ -247,9 +249,11 @@ def _met_again(supply: BottleSupply, meeting: _Meeting, drawn: float, duration: 
 
 @dataclass(frozen=True, slots=True)
 class _Lanes:
-    """The lanes as their supply sees them: rows that follow it, and the numbers with gas of the ``start`` [K].
+    """Parameters of the walk program that depend on the state of the supply.
 
-    ``effects`` are the effects of the ``device`` that are on, whose rows may be of the temperature of its gas.
+    ``rows`` are the rows of these parameters in the program. ``plant`` has the values for gas at the temperature
+    ``start`` [K], ``volume`` is the volume of the line [m^3]. ``effects`` are the active effects of the ``device``,
+    whose parameters may depend on the gas temperature.
     """
 
     rows: list[int]
@@ -261,7 +265,7 @@ class _Lanes:
 
     @classmethod
     def of(cls, run: Run, device: Device, start: float) -> "_Lanes":
-        """Return the lanes of a run, whose numbers were planned for gas of a temperature [K]."""
+        """Return the supply-dependent parameters of a run that was planned for gas at the temperature ``start`` [K]."""
         assert run.lines is not None, "a bottle feeds lines"
         effects = tuple(effect for effect in run.program.effects if effect.is_of_device)
         names = row_numbers(run.program.parameter_rows())
@@ -270,10 +274,10 @@ class _Lanes:
         return cls(rows, run.plant, run.lines.parameters.volume_1, start, device, effects)
 
     def parameters(self, now: SupplyNow) -> Floats:
-        """Return the parameters that follow the supply.
+        """Return the values of the parameters that depend on the supply, in the order of ``rows``.
 
-        Gas of its temperature, flows through openings with 1 over its root, and the regulator; then the rows of the
-        effects, prepared anew for gas of that temperature.
+        The gas product is proportional to the gas temperature T, the conductances of valve and leak to 1/sqrt(T). Set
+        pressure and largest flow of the regulator follow, then the parameters of the effects at the temperature T.
         """
         plant, warmth = self.plant, now.gas_temperature / self.start
         # Mass flow at given pressures goes with one over the root of the temperature of the gas.
@@ -284,14 +288,17 @@ class _Lanes:
         return np.array([*own, *(number for effect in self.effects for number in leaves(effect_row(effect, device)))])
 
     def gauge(self, mass: float, now: SupplyNow) -> float:
-        """Return the gauge pressure of the line with a mass [kg] in it over that to which the regulator is set [-]."""
+        """Return the gauge pressure of the line, which contains a mass [kg], divided by the set gauge pressure [-]."""
         plant = self.plant
         pressure = mass * plant.gas_product * now.gas_temperature / (self.start * self.volume)
         return (pressure - plant.atmospheric_pressure) / (plant.supply_pressure - plant.atmospheric_pressure)
 
 
 def _ending(supply: BottleSupply, meeting: _Meeting, reached: float) -> SupplyEnding | None:
-    """End of a walk by its supply, None while it goes on; ``reached``: recent largest gauge pressure over the set."""
+    """Return the end of a walk caused by its supply, or None if the walk continues.
+
+    ``reached`` is the largest recent gauge pressure of the line divided by the set gauge pressure [-].
+    """
     time, state, now = meeting
     bottle = supply.bottle
     left = _grams(state.mass)
@@ -317,5 +324,5 @@ def _ending(supply: BottleSupply, meeting: _Meeting, reached: float) -> SupplyEn
 
 
 def _grams(mass: float) -> str:
-    """Return a mass [kg] as it is said."""
+    """Return a mass [kg] as text in grams."""
     return f"{mass * GRAMS_PER_KILOGRAM:.3g} g"

@@ -1,4 +1,4 @@
-"""A bottle over a walk: what it went through, what ended it, and what must close."""
+"""State of a gas bottle over a walk: time series, reason of the end, and balances of mass and energy."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ UNITS = {
 
 
 class SupplyEnding(NamedTuple):
-    """End of a walk on its bottle: kind, a sentence, and its time [s]."""
+    """End of a walk on a bottle: kind, explanation as a sentence, and time [s]."""
 
     kind: EndKind
     message: str
@@ -39,11 +39,14 @@ class SupplyEnding(NamedTuple):
 
 
 class SupplyBalance(NamedTuple):
-    """Balances of a supply: gas out of the bottle, through its regulator and as ice [kg], energy of all parts [J].
+    """Mass and energy balances of a supply, from the start of a walk to its end.
 
-    left_bottle = regulated + iced. ``given_up`` is what content, wall, regulator and hose lost, ``ice`` the enthalpy
-    that the dry ice in the seat lacks, ``room`` the heat of the room, ``delivered`` the enthalpy of the gas behind the
-    hose: given_up + ice + room = delivered.
+    Mass [kg]: left_bottle = regulated + iced, which are the gas that left the bottle, the gas through the regulator and
+    the dry ice in the seat.
+
+    Energy [J]: given_up + ice + room = delivered. ``given_up`` is the energy released by content, wall, regulator and
+    hose, ``ice`` the enthalpy difference of the dry ice in the seat, ``room`` the heat from the room, and ``delivered``
+    the enthalpy of the gas downstream of the hose.
     """
 
     left_bottle: float
@@ -57,7 +60,12 @@ class SupplyBalance(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SupplyCourse:
-    """A supply over a walk: times [s] (n,) at which bottle and device met, values (n,) by name in ``UNITS``."""
+    """State of a supply over a walk.
+
+    ``times`` [s] (n,) are the times of data exchange between bottle and device, ``values`` (n,) the series by name, in
+    the units of ``UNITS``. ``first`` and ``last`` are the states at the start and at the end, ``regulated`` is the gas
+    through the regulator [kg].
+    """
 
     supply: BottleSupply
     times: Floats
@@ -69,13 +77,13 @@ class SupplyCourse:
 
     @property
     def recording(self) -> Recording:
-        """Return the course of the supply as a recording."""
+        """State of the supply over the walk as a recording."""
         channels = {name: Channel(values, UNITS[name]) for name, values in self.values.items()}
         return Recording(f"bottle {self.supply.bottle.name}", self.times, channels, kind="simulated")
 
     @property
     def balance(self) -> SupplyBalance:
-        """Mass and energy balances of the supply from start to end."""
+        """Mass and energy balances of the supply from the start of the walk to the end."""
         first, last, supply = self.first, self.last, self.supply.bottle.supply
         parts = (
             first.energy - last.energy,
@@ -95,15 +103,15 @@ class SupplyCourse:
 
 
 def lasted(course: SupplyCourse) -> float | None:
-    """Time that a bottle lasted [s]; None where the walk ended before it, or diverged."""
+    """Return the time that a bottle lasted [s], or None if the walk ended or diverged before."""
     return None if course.ending.kind in (WALKED, DIVERGED) else course.ending.time
 
 
 def minutes_text(seconds: float) -> str:
-    """Return minutes with three digits, and whole ones where there are more."""
+    """Return a duration as text with three significant digits, or in whole minutes from 1000 min."""
     return quantity_text(seconds, "duration", ".0f" if display_value(seconds, "duration") >= 999.5 else ".3g")
 
 
 def strides_text(strides: float) -> str:
-    """Return a number of strides as it is shown: a decimal of few, such as of task sequences, whole ones of many."""
+    """Return a number of strides or task sequences as text, with one decimal below 100 and none above."""
     return f"{strides:.1f}" if strides < 99.5 else f"{strides:.0f}"

@@ -1,4 +1,4 @@
-"""The bottle of a walk file: its numbers, the gas behind its regulator, and what does not go with a bottle."""
+"""Gas bottle of a walk file: parameters, gas downstream of the regulator, and settings that conflict with a bottle."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -52,10 +52,12 @@ _FASTEST = 1.0e3
 
 @dataclass(frozen=True, slots=True)
 class BottleSupply:
-    """The bottle that a walk hangs on, in SI: gas [kg] and temperature [K] at the start, ``coupling`` [s].
+    """Gas bottle that supplies a walk, in SI units.
 
-    ``line`` are the properties of the gas behind its regulator, which is set to the supply pressure of the device.
-    ``least_torque`` is the torque over that at the set pressure [-] below which the walk ends.
+    ``mass`` [kg] and ``temperature`` [K] are the values of the gas at the start, ``coupling`` [s] is the interval
+    between two exchanges of data with the device. ``line`` holds the gas properties at the regulator's set pressure,
+    which is the supply pressure of the device. ``least_torque`` is the fraction [-] of the torque at the set pressure
+    below which the walk ends.
     """
 
     bottle: Bottle
@@ -66,7 +68,7 @@ class BottleSupply:
     coupling: float
 
     def start(self) -> SupplyState:
-        """Return the state at the start: all parts at one temperature, no ice."""
+        """Return the initial state: all parts at the same temperature, no ice."""
         energy = content_energy(self.bottle.fluid.table, self.mass, self.bottle.volume, self.temperature)
         return SupplyState(
             mass=self.mass,
@@ -81,24 +83,25 @@ class BottleSupply:
         )
 
     def offers(self, state: SupplyState, near: float, mass: float) -> SupplyNow:
-        """Pressures, temperatures and largest flow of the supply in a state, its content ``near`` a temperature [K].
+        """Return pressures, temperatures and largest flow of the supply in a given state.
 
-        ``mass`` [kg] is what the device drew in the last coupling.
+        ``near`` is an estimate of the temperature of the content [K], ``mass`` the mass that the device drew in the
+        last coupling interval [kg].
         """
         return supply_now(self.bottle.fluid.table, self.line, self.bottle.supply, state, near, mass)
 
     def offers_first(self) -> SupplyNow:
-        """Pressures, temperatures and largest flow of the supply at the start."""
+        """Return pressures, temperatures and largest flow of the supply in the initial state."""
         return self.offers(self.start(), self.temperature, 0.0)
 
     def fed(self, line: SupplyLine) -> SupplyLine:
-        """Return the lines with the droop of the bottle's regulator, and with what it passes at the start."""
+        """Return the supply lines with droop and initial largest flow of the bottle's regulator."""
         droop, most = self.bottle.regulator.droop, self.offers_first().largest_flow
         return replace(line, plantarflexion=replace(line.plantarflexion, droop=droop, largest_flow=most))
 
     @property
     def assumed(self) -> dict[str, str]:
-        """Return the values of the bottle that no source gives, by path, with the reason for each."""
+        """Values of the bottle that are assumed, not taken from a source, by path, each with the reason."""
         return {
             f"{BOTTLE}.{path}": f"{format_quantity(entry.value, entry.unit)}, assumed: {entry.source}"
             for path, entry in self.bottle.entries.items()
@@ -106,7 +109,7 @@ class BottleSupply:
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data in SI units, with the source of each value."""
+        """Return the bottle as plain data in SI units, with the source of each value."""
         return {
             "name": self.bottle.name,
             "title": self.bottle.title,
@@ -119,7 +122,10 @@ class BottleSupply:
 
 
 def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> BottleSupply | None:
-    """Return the bottle of a walk file, None where it has none; ScenarioError or ParameterError for a mistake."""
+    """Return the bottle of a walk file, or None if it names no bottle.
+
+    Raises ScenarioError or ParameterError for a value that cannot be used.
+    """
     section = value_at(reading.document, BOTTLE)
     if section is None:
         return None
@@ -167,7 +173,7 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
 
 
 def _numbers(reading: DocumentReader, section: Mapping[str, Any], bottle: Bottle) -> dict[str, float]:
-    """Return the numbers of the section; the bottle starts at the temperature of the room unless one is given."""
+    """Return the numbers of the bottle section; the default temperature at the start is the room temperature."""
     room = replace(TEMPERATURE, default=bottle.room_temperature)
     items = (
         room if quantity is TEMPERATURE and TEMPERATURE.name not in section else quantity for quantity in BOTTLE_NUMBERS
@@ -189,7 +195,7 @@ def _numbers(reading: DocumentReader, section: Mapping[str, Any], bottle: Bottle
 
 
 def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> None:
-    """Refuse what does not go with a bottle."""
+    """Raise ScenarioError for settings of a walk that conflict with a bottle."""
     fluid, regulator = supply.bottle.fluid, supply.bottle.regulator
     if abs(device.gas.specific_gas_constant / fluid.table.gas_constant - 1.0) > _SAME_GAS:
         raise reading.refusal(

@@ -1,1 +1,1 @@
-"""Figures of walks: the mean stride, the leg and the phases, and the whole walk over time."""
+"""Figures of walks: mean stride, stick figures of the leg, gait phases, and the whole walk over time."""

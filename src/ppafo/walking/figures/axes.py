@@ -1,4 +1,4 @@
-"""Common basis of figures over the time of a walk: time axis, kinds of numbers, styles of the lines."""
+"""Shared elements of figures over the time of a walk: time axis, kinds of numbers, line styles."""
 
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark
@@ -15,5 +15,5 @@ _LONG = 120.0
 
 
 def time_axis(end: float) -> Kind:
-    """Return the kind of the axis of a walk that ends at a time [s]: seconds, or minutes of a long one."""
+    """Return the kind of the time axis of a walk that ends at a time [s]: in seconds, or in minutes for a long walk."""
     return Kind("Time", "s", "duration") if end > _LONG else TIME

@@ -1,4 +1,4 @@
-"""A walk on its bottle over time: pressures, temperatures, peak torques, and the gas that is left."""
+"""Figure of a walk on a gas bottle over time: pressures, temperatures, peak torques and remaining gas."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -33,7 +33,7 @@ _LEAST_TORQUE = 0.1
 
 
 def bottle_figure(result: WalkResult) -> "Figure":
-    """Return the figure of a walk on its bottle; below it stands what ended it."""
+    """Return the figure of a walk on a bottle, with the reason of the end below the panels."""
     supply, recording, peaks = result.supply, result.recording, result.peak_torques
     assert supply is not None, "drawn for a walk on a bottle"
     times, values = supply.times, supply.values
@@ -81,7 +81,7 @@ def bottle_figure(result: WalkResult) -> "Figure":
 
 
 def _marks_behind(result: WalkResult, supply: SupplyCourse) -> list[Mark]:
-    """Largest pressure that the regulator delivers, and the range of the line's pressure in each stride."""
+    """Return the regulator's largest outlet pressure, and the pressure range of the line in each stride, as marks."""
     recording, starts = result.recording, result.starts
     delivered = supply.values["regulated_pressure"]
     marks = [Mark("line", supply.times, delivered, label="delivered at most", colour=GREY, style=_DASHED)]
@@ -96,9 +96,9 @@ def _marks_behind(result: WalkResult, supply: SupplyCourse) -> list[Mark]:
 
 
 def _panel(end: float, ended: Mark, kind: Kind, marks: Sequence[Mark], largest: float | None = None) -> Panel:
-    """Return a panel up to the end of the walk [s] with a line where its bottle ended it.
+    """Return a panel over time up to ``end`` [s], with a line at the time when the bottle ended the walk, if any.
 
-    Where a largest value [SI] is given, its axis begins at 0 and shows that value.
+    With ``largest`` [SI], the value axis starts at 0 and includes this value.
     """
     axis = time_axis(end)
 

@@ -1,4 +1,4 @@
-"""The leg as a stick figure: on the strip of gait phases of figure 1A, in single frames, and animated (GIF)."""
+"""Stick figures of the leg: over the strip of gait phases of figure 1A, as single frames, and as an animation (GIF)."""
 
 import io
 from collections.abc import Callable, Mapping
@@ -77,7 +77,7 @@ _VENTED = ("vented", "#e4e4e4")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Legs:
-    """Postures of one walk and of the healthy gait at the same instants, and their running phases [strides]."""
+    """Postures in a walk and in the healthy gait at the same instants, and their running phases [strides]."""
 
     turns: Floats
     worn: Posture
@@ -85,7 +85,7 @@ class _Legs:
 
 
 def legs_of(result: WalkResult, turns: Floats) -> _Legs:
-    """Return the legs of a walk at running phases [strides], counted from the start of the recording."""
+    """Return the postures of a walk at running phases [strides], counted from the start of the recording."""
     configuration, recording = result.scenario, result.recording
     gait = walk_of(configuration).gait
     path = ankle_path(gait, gait_timing(gait), walk_of(configuration).wearer)
@@ -98,9 +98,9 @@ def legs_of(result: WalkResult, turns: Floats) -> _Legs:
 
 
 def last_phases(result: WalkResult, strides: int, per_stride: int) -> Floats:
-    """Return running phases [strides] of some strides near the end of a walk, an equal number in each.
+    """Return evenly spaced running phases [strides] in a number of strides near the end of a walk.
 
-    They are the last ones in a row that had help, where there are as many.
+    These are the last consecutive assisted strides, if there are enough.
     """
     # Rounding must not take the last stride away.
     last = int(result.recording.time[-1] / walk_of(result.scenario).gait.stride_time + 1.0e-6)
@@ -114,14 +114,14 @@ def last_phases(result: WalkResult, strides: int, per_stride: int) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _LegArtists:
-    """The lines of one leg: shank, and the foot as a wedge of ankle, heel and toes."""
+    """Matplotlib lines of one leg: shank, foot as a wedge of ankle, heel and toes, and ankle joint."""
 
     shank: "Line2D"
     foot: "Polygon"
     joint: "Line2D"
 
     def place(self, posture: Posture, index: int, offset: float) -> None:
-        """Move the leg to one instant; ``offset`` [m] is taken from x."""
+        """Move the leg to the posture at ``index``, with x shifted by -``offset`` [m]."""
         joints = posture.knee, posture.ankle, posture.heel, posture.toe
         knee, ankle, heel, toe = (points[index] - (offset, 0.0) for points in joints)
         self.shank.set_data([knee[0], ankle[0]], [knee[1], ankle[1]])
@@ -130,7 +130,7 @@ class _LegArtists:
 
 
 def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False) -> _LegArtists:
-    """Add the lines of one leg to an axes, of a line width [points]; ``place`` puts them somewhere."""
+    """Add the lines of one leg to the axes, with a line width [points]; ``place`` sets their position."""
     from matplotlib.patches import Polygon
 
     order, foot_order = (2.0, 3.2) if is_ghost else (3.0, 3.0)
@@ -150,18 +150,18 @@ def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False)
 
 
 def draw_ground(axes: "Axes", left: float, right: float) -> None:
-    """Draw the ground between two places [m]."""
+    """Draw the ground from ``left`` to ``right`` [m]."""
     axes.plot([left, right], [0.0, 0.0], color=GREY, linewidth=1.0, zorder=1)
     axes.fill_between([left, right], [-0.25, -0.25], [0.0, 0.0], color="#f1f1f1", linewidth=0.0, zorder=0)
 
 
 def drags(legs: _Legs, index: int) -> bool:
-    """True where the toes are more than 1 cm below the ground."""
+    """Return True if the toes are more than 1 cm below the ground."""
     return bool(legs.worn.toe[index, 1] < DRAG_LIMIT)
 
 
 def frames_figure(comparison: WalkComparison) -> "Figure":
-    """Return ten instants of one stride, without the device above and with it below."""
+    """Return a figure of ten instants of one stride, without the device (top) and with the device (bottom)."""
     from matplotlib.figure import Figure
 
     with house_style():
@@ -202,7 +202,7 @@ def _row(axes: "Axes", result: WalkResult, label: str, colour: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _StateBand:
-    """State of a row: name, its short form for a narrow block, colour, and the test of a channel's values for it."""
+    """State in a row of the strip: name, abbreviation for a narrow block, colour, and predicate on channel values."""
 
     name: str
     short: str
@@ -249,7 +249,7 @@ _ROWS: Mapping[str, tuple[str, tuple[_StateBand, ...]]] = {
 
 
 def strip_figure(result: WalkResult) -> "Figure":
-    """Return the strip of gait phases of a walk; a fraction of strides where they differ."""
+    """Return the strip of gait phases of a walk; where strides differ, colours show the fraction of the strides."""
     with house_style():
         figure, grid = figure_of_panels(_PHASES_SIZE, _MARGINS, len(_HEIGHTS), heights=_HEIGHTS)
         rows = [axes for (axes,) in grid]
@@ -269,7 +269,7 @@ def strip_figure(result: WalkResult) -> "Figure":
 
 
 def _shares(result: WalkResult, channel: str, states: tuple[_StateBand, ...]) -> Floats:
-    """Fraction of the strides with help in each state at ``PHASES``, shape (states, phases); 0 if nothing is known."""
+    """Return the fraction of assisted strides in each state at ``PHASES``, shape (states, phases); 0 without data."""
     chosen = settled(result.helped)
     if channel not in result.recording or not chosen.any():
         return np.zeros((len(states), PHASES.size))
@@ -305,7 +305,7 @@ def _band(axes: "Axes", label: str, fractions: Floats, states: tuple[_StateBand,
 
 
 def _legs(axes: "Axes", result: WalkResult) -> None:
-    """Stick figures over the strip, each over its instant, in an axes of metres that shares the percent below."""
+    """Draw stick figures above the strip, each at its instant, in axes scaled in metres over the same percent axis."""
     turns = last_phases(result, 1, _STRIP_FRAMES) + 0.5 / _STRIP_FRAMES
     legs = legs_of(result, turns)
     panel_width = _PHASES_SIZE[0] - _MARGINS.left - _MARGINS.right
@@ -339,7 +339,7 @@ def _pressures(axes: "Axes", result: WalkResult) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Scene:
-    """Panel with a leg that walks through it."""
+    """Animated panel with a walking leg."""
 
     axes: "Axes"
     legs: _Legs
@@ -349,7 +349,7 @@ class _Scene:
     centre: np.ndarray
 
     def show(self, index: int) -> list[Any]:
-        """Place ground marks and legs; returns what has to be drawn."""
+        """Update ground marks and legs to frame ``index``; return the changed artists."""
         offset = float(self.centre[index])
         marks = np.arange(np.ceil((offset + _VIEW[0]) / _TICK), (offset + _VIEW[1]) / _TICK) * _TICK - offset
         self.ticks.set_data(marks, np.full(marks.size, -0.018))
@@ -362,7 +362,7 @@ class _Scene:
 
 
 def animation(comparison: WalkComparison) -> bytes:
-    """Return the GIF; two strides at half speed."""
+    """Return an animated GIF of two strides at half speed."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 

@@ -1,4 +1,4 @@
-"""The mean stride of walks beside the healthy gait: ankle, torques, pressures and toes, mean with band."""
+"""Figure of the mean stride of walks and of the healthy gait: ankle, torques, pressures, toes; mean and deviation."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -34,7 +34,7 @@ _CHANNELS = {
 
 
 def walk_figure(walks: Mapping[str, Any]) -> "Figure":
-    """Return the mean stride of one or two walks of the same wearer, and the healthy gait beside them.
+    """Return the figure of the mean stride of one or two walks of the same wearer, beside the healthy gait.
 
     ``walks`` are ``WalkResult`` by name, whose own ``plot`` draws this figure.
     """

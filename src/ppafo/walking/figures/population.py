@@ -1,4 +1,4 @@
-"""Outcomes of many wearers: histograms over their walks, and two outcomes over a trait of the wearer."""
+"""Figure of the outcomes of many wearers: histograms, and scatter plots of outcomes against a trait of the wearer."""
 
 from typing import TYPE_CHECKING
 
@@ -26,7 +26,7 @@ _OWN = {"linestyle": "", "marker": "o", "markersize": 6, "clip_on": False, "zord
 
 
 def population_figure(population: Population) -> "Figure":
-    """Return four histograms with quantiles, and two pictures of outcome over trait."""
+    """Return a figure of four histograms with quantiles and two scatter plots of an outcome against a trait."""
     histograms = [_histogram(population, name) for name in _OUTCOMES]
     return draw_panels(
         [*histograms, *(_pair(population, *pair) for pair in _PAIRS)],

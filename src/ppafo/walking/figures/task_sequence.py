@@ -1,4 +1,4 @@
-"""A task sequence over time, with the device and without it: pace, angle, forces, torque, toes and gas by segment."""
+"""Figure of a task sequence over time, with and without the device: pace, angle, forces, torque, toes and gas."""
 
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -40,7 +40,7 @@ _LEAST_RANGE = 1.0e-3
 
 
 def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
-    """Return a task sequence over time with the device (and without it); needs a recording of at least two samples."""
+    """Return a task sequence over time, with the device and optionally without it; needs at least two samples."""
     recording, time = worn.recording, worn.recording.time
     walks = {WITHOUT: bare.recording, WITH: worn.recording}
     names = {WITHOUT: "without the device", WITH: "with it"}
@@ -86,7 +86,7 @@ def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
 
 
 def _name_segments(worn: WalkResult, pace: Floats, axes: "Axes") -> None:
-    """Name the segments above the curve of the pace, with room for that."""
+    """Write the names of the segments above the pace curve, and extend the axis to make room for them."""
     from matplotlib.patheffects import withStroke
 
     end = float(worn.recording.time[-1])
@@ -115,7 +115,7 @@ def _set_limits(end: float, axes: "Axes") -> None:
 
 
 def _phase_strip(recording: Recording) -> list[Mark]:
-    """Return the phase in which the device acts, as a strip under the curve of the torque."""
+    """Return the phase in which the device acts as a coloured strip below the torque curve."""
     if "controller_phase" not in recording:
         return []
     acting, torque = acting_phase(recording), recording["torque"]

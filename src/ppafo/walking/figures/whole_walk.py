@@ -1,4 +1,4 @@
-"""A whole walk over time: gas, toes, phase of the controller, assistance level; with failures, pauses and the stop."""
+"""Figure of a whole walk over time: gas, toes, controller phase, assistance level; with failures, pauses and stop."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -42,7 +42,7 @@ _ROOM = 1.4
 
 
 def whole_walk_figure(result: WalkResult) -> "Figure":
-    """Return gas, toe height, phase and assistance level over the time of a walk, with faults, pauses and the stop."""
+    """Return gas, toe height, phase and assistance level over time, with faults, pauses and the stop marked."""
     recording, time = result.recording, result.recording.time
     end = float(time[-1])
     axis = time_axis(end)
@@ -70,7 +70,7 @@ def whole_walk_figure(result: WalkResult) -> "Figure":
 
 
 def _name_failures(failed: Mapping[str, float], end: float, axis: Kind, axes: "Axes") -> None:
-    """Name what fails beside its line, with room for that above the curve; ``failed`` and ``end`` are times [s]."""
+    """Label each failure next to its line, above the curve; ``failed`` and ``end`` are times [s]."""
     axes.set_ylim(top=_ROOM * axes.get_ylim()[1])
     # Labels of failures that are close would cover each other: they are named together, at the time of the first.
     labels: list[tuple[float, list[str]]] = []
@@ -97,7 +97,7 @@ def _name_phases(axes: "Axes") -> None:
 
 
 def _level_panel(recording: Recording, axis: Kind) -> Panel:
-    """Return the strip of help, pause and stop, with the name of each stretch that is wide enough."""
+    """Return the strip of assistance, pause and stop, with a label in each interval that is wide enough."""
     time, level = recording.time, recording["safe_state"]
     edges = np.flatnonzero(np.diff(level, prepend=-1.0, append=-1.0))
     marks: list[Mark] = []

@@ -1,1 +1,1 @@
-"""The valve, pressure and bottle that are just enough for a torque profile."""
+"""Smallest valve, pressure and bottle that suffice for a torque profile."""

@@ -1,4 +1,4 @@
-"""A sizing study: the valves with pressure and bottle, their margins, the suggestion, the doubts."""
+"""Report of a sizing study: valves with pressure and bottle, margins, suggestion, figures to check."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -36,10 +36,10 @@ _RING = {"linestyle": "", "marker": "o", "markersize": 9, "markerfacecolor": "no
 class SizingMargins:
     """Reserves of a sized valve to its limits, as fractions [-].
 
-    ``error``: how much smaller the RMS error is than its limit. ``torque``: how much more torque the pressure can hold
-    than the profile asks for; below 0 where the error limit lets its crest be cut. ``flow``: how much smaller the
-    opening might be if the gauge pressure were a tenth higher. ``gas``: how much more gas the bottle has than is used;
-    None without a bottle.
+    ``error``: reserve of the RMS error to its limit
+    ``torque``: reserve of the largest possible torque over the peak of the profile; below 0 if the peak is cut off
+    ``flow``: possible reduction of the valve opening at a gauge pressure one tenth higher
+    ``gas``: reserve of gas in the bottle over the gas that is used; None without a bottle
     """
 
     error: float
@@ -50,14 +50,19 @@ class SizingMargins:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SizedValve:
-    """A valve at a supply pressure [Pa absolute] that keeps the error limit: the one with the lightest bottle.
+    """Sizing result of a valve, at the supply pressure that keeps the error limit with the lightest bottle.
 
-    ``works`` False: it keeps the limit at no pressure; then ``pressure`` is the one with the smallest error.
-    ``lowest_pressure`` [Pa absolute] is the lowest that works, and ``limit`` what keeps it from being lower. ``gains``
-    are the controller's, by path, in SI. Error [N m], gas per repetition [kg], total gas with the reserve [kg];
-    ``bottle`` None where none is large enough; ``mass`` [kg] of valve, bottle, regulators, and actuator where one was
-    named. ``remark`` says what is worth knowing of it, empty for nothing; ``curve`` has pressures [Pa absolute], errors
-    [N m] and gas per repetition [kg] with the best gains of each.
+    ``works``: False if no pressure keeps the error limit
+    ``pressure``: chosen supply pressure [Pa absolute]; if none works, the pressure with the smallest error
+    ``lowest_pressure``: lowest pressure that works [Pa absolute]
+    ``gains``: gains of the controller [SI] by path
+    ``error``: RMS torque error [N m]
+    ``gas``, ``gas_in_all``: gas per repetition and total gas with the reserve [kg]
+    ``bottle``: lightest sufficient bottle; None if none is large enough
+    ``mass``: mass [kg] of valve, bottle, regulators, and actuator if specified
+    ``limit``: quantity that limits the lowest pressure
+    ``remark``: note for the reader; empty if there is none
+    ``curve``: pressures [Pa absolute], errors [N m] and gas per repetition [kg], with the best gains at each pressure
     """
 
     valve: Part
@@ -78,11 +83,12 @@ class SizedValve:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sizing:
-    """The result of a sizing study: every valve, and the place of the lightest that works with a bottle, if any.
+    """Result of a sizing study: every valve, and the index of the lightest valve that works with a bottle.
 
-    ``recording`` is the suggestion on the profile, None without one. ``failures`` maps reasons of failed runs to how
-    many had them.
-    ``streams`` of noise were met by every trial, its error the largest of them; 0 without noise.
+    ``suggested``: index of the suggested valve; None if there is none
+    ``recording``: run of the suggested valve on the profile; None without a suggestion
+    ``failures``: number of failed runs by reason
+    ``streams``: number of noise streams of every trial, whose error is the largest over the streams; 0 without noise
     """
 
     problem: SizingProblem
@@ -96,12 +102,12 @@ class Sizing:
 
     @property
     def choice(self) -> SizedValve | None:
-        """The suggestion."""
+        """Suggested valve; None if there is none."""
         return None if self.suggested is None else self.valves[self.suggested]
 
     @property
     def doubtful(self) -> tuple[tuple[Part, str], ...]:
-        """Figures that are quoted or assumed, of the parts that the result rests on."""
+        """Quoted or assumed figures of the parts on which the result rests."""
         parts = [sized.valve for sized in self.valves] + [
             sized.bottle for sized in self.valves if sized.bottle is not None
         ]
@@ -170,7 +176,7 @@ _DOTTED = {"marker": ".", "markersize": 4}
 
 
 def pressure_panels(sizing: Sizing) -> list[Panel]:
-    """Return error and gas over supply pressure, with a ring at the pressure that was chosen for each valve."""
+    """Return panels of error and gas over supply pressure, with a ring at the pressure chosen for each valve."""
     limit = sizing.problem.largest_error
     errors, gases = [Mark("level", (), limit, colour=BLACK, style={"linewidth": 1.0, "linestyle": "--"})], []
     for number, sized in enumerate(sizing.valves):
@@ -238,7 +244,7 @@ _READING = (
 
 @in_units(lambda sizing: sizing.problem.scenario.device.shown)
 def finding_of(sizing: Sizing) -> Finding[Sizing]:
-    """Return a sizing study in words, tables and panels; it has not passed where nothing can be suggested."""
+    """Return a sizing study as a finding; not passed if there is no suggestion."""
     problem, recording = sizing.problem, sizing.recording
     return Finding(
         name="design",
@@ -276,7 +282,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
 
 
 def _wanted(sizing: Sizing) -> str:
-    """Return what a device is wanted for: profile, repetitions, error and reserve."""
+    """Return a sentence on the requirements: profile, repetitions, error limit and reserve."""
     problem, profile = sizing.problem, sizing.problem.profile
     table_error = profile.table_error
     near = f", {profile.knot_times.size} knots, to {_TORQUE.text(table_error)}" if table_error else ""
@@ -288,7 +294,7 @@ def _wanted(sizing: Sizing) -> str:
 
 
 def _remarks(sizing: Sizing) -> tuple[str, ...]:
-    """Return the suggestion, a remark on each valve that has one, and how many runs it took and how many failed."""
+    """Return the suggestion, a remark on each valve that has one, and the numbers of runs and failures."""
     failed = sum(sizing.failures.values())
     failures = f"{failed:,} failed; the first: {next(iter(sizing.failures))}" if failed else "none failed"
     noisy = (
@@ -304,7 +310,7 @@ def _remarks(sizing: Sizing) -> tuple[str, ...]:
 
 
 def _method(problem: SizingProblem) -> tuple[str, ...]:
-    """Return how the numbers were found, in sentences."""
+    """Return sentences on the method of the sizing study."""
     others = f" with {', '.join(part.title for part in problem.carried)}" if problem.carried else ""
     return (
         f"The mass counts valve and full bottle{others}.",
@@ -329,7 +335,7 @@ def _torque_panels(sizing: Sizing) -> list[Panel]:
 
 
 def _tables(sizing: Sizing) -> tuple[finding.Section, finding.Section]:
-    """Return a row for each valve, and the margins and gains of those that work."""
+    """Return the table of all valves, and the table of margins and gains of the valves that work."""
     rows: list[tuple[Cell, ...]] = []
     margins: list[tuple[Cell, ...]] = []
     marked = []
@@ -361,7 +367,7 @@ def _tables(sizing: Sizing) -> tuple[finding.Section, finding.Section]:
 
 
 def suggestion_sentence(sizing: Sizing) -> str:
-    """Return the suggestion with the reason, or why there is none."""
+    """Return a sentence with the suggestion and its reason, or the reason why there is none."""
     choice = sizing.choice
     if choice is None:
         if any(sized.works for sized in sizing.valves):

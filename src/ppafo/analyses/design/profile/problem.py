@@ -1,4 +1,4 @@
-"""A design file with a profile: the torque as a table that a run follows, and the problem in SI units."""
+"""Design file with a torque profile: the profile as a table for a run, and the sizing problem in SI units."""
 
 import math
 from dataclasses import dataclass
@@ -45,9 +45,11 @@ class ProfileSection(StrictTable):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RequiredTorque:
-    """Period of a torque profile: times [s] from 0 and torques [N m] as given, and the knots of its table.
+    """Period of a torque profile.
 
-    ``kind`` says where it comes from: ``measured``, ``simulated``, ``synthetic`` or ``typed``.
+    ``time``, ``torque``: samples as given, times [s] from 0 and torques [N m]
+    ``kind``: origin of the samples: ``measured``, ``simulated``, ``synthetic`` or ``typed``
+    ``knot_times``, ``knot_values``: knots [s], [N m] of the table that a run follows
     """
 
     time: Floats
@@ -63,21 +65,21 @@ class RequiredTorque:
 
     @property
     def table_error(self) -> float:
-        """Largest difference of the table from what was given [N m]."""
+        """Largest difference between the table and the given samples [N m]."""
         return float(np.max(np.abs(self.at(self.time[:-1]) - self.torque[:-1])))
 
     @property
     def largest(self) -> float:
-        """Largest torque of the table, either sign [N m]."""
+        """Largest absolute torque of the table [N m]."""
         return float(np.max(np.abs(self.knot_values)))
 
     def at(self, time: Floats) -> Floats:
-        """Return the table's torque [N m] at times [s] from 0 on."""
+        """Return the torque of the table [N m] at times [s] from 0 on."""
         times, values = np.append(self.knot_times, self.period), np.append(self.knot_values, self.knot_values[0])
         return np.asarray(np.interp(np.mod(time, self.period), times, values))
 
     def overrides(self) -> tuple[str, ...]:
-        """Return the overrides that make a scenario follow the table."""
+        """Return the overrides with which a scenario follows the table."""
         kind = ("reference.kind=tabulated", f"reference.level=0 {_TORQUE}", f"reference.period={self.period!r} s")
         times = enumerate(self.knot_times[1:].tolist(), 2)
         values = enumerate(self.knot_values.tolist(), 1)
@@ -89,7 +91,7 @@ class RequiredTorque:
 
 
 def read_profile(table: ProfileSection, folder: Path, file: str) -> RequiredTorque:
-    """Return the profile of a design file; a recording's path begins in ``folder``."""
+    """Return the profile of a design file; a recording's path is relative to ``folder``."""
     where = f"{file}: profile"
     is_typed = bool(table.time or table.torque)
     if is_typed == (table.recording is not None):
@@ -117,9 +119,9 @@ def read_profile(table: ProfileSection, folder: Path, file: str) -> RequiredTorq
 
 
 def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:
-    """Return at most 32 of the samples, from the first one on, that stand for all: always the worst one is added next.
+    """Return at most 32 samples, starting with the first, whose linear interpolation approximates all samples.
 
-    Between the last sample and the next repetition there is nothing to choose.
+    The sample with the largest error is added next. No knots are added between the last sample and the next repetition.
     """
     chosen = [0, time.size - 1]
     # Greedy, not best: a profile has few features, and each knot takes away what is worst.
@@ -158,7 +160,7 @@ _LARGEST_DENOMINATOR = 10**6
 
 
 class UseTable(StrictTable):
-    """Section of a sizing file: how much is done with one bottle."""
+    """Section of a sizing file: use on one bottle, as repetitions or hours, with a reserve."""
 
     repetitions: Annotated[
         int | None, Field(gt=0, description="number of repetitions of the profile, such as steps")
@@ -170,13 +172,13 @@ class UseTable(StrictTable):
 
 
 class LimitsTable(StrictTable):
-    """Section of a sizing file: how large the error may be."""
+    """Section of a sizing file: largest RMS error."""
 
     rms_error: Annotated[Text, Field(description="largest RMS torque error: '0.5 N m', or '5 %' of the largest torque")]
 
 
 class SizingPartsTable(StrictTable):
-    """Section of a sizing file: the parts to choose from, by their names in the catalogue."""
+    """Section of a sizing file: available parts, by their names in the catalogue."""
 
     valves: Annotated[_Names, Field(description="valves to choose from, of the kind that the scenario has")]
     bottles: Annotated[_Names, Field(description="bottles to choose from")]
@@ -185,14 +187,14 @@ class SizingPartsTable(StrictTable):
 
 
 class PressureTable(StrictTable):
-    """Supply pressures to choose from; both regulators have the same."""
+    """Section of a sizing file: range of supply pressures; both regulators have the same pressure."""
 
     lowest: Annotated[Text, Field(description="lowest supply pressure")] = "10 psi_g"
     highest: Annotated[Text, Field(description="highest supply pressure")] = "120 psi_g"
 
 
 class SizingFile(StrictTable):
-    """Layout of a sizing file: a design that follows a torque profile."""
+    """Layout of a sizing file: design of a device that follows a torque profile."""
 
     schema_version: SchemaVersion
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
@@ -223,11 +225,15 @@ class SizingFile(StrictTable):
 
 @dataclass(frozen=True, slots=True)
 class SizingProblem:
-    """Sizing problem in SI units: torque profile, motion, valve and limits.
+    """Sizing problem in SI units: torque profile, scenario, available parts and limits.
 
-    ``scenario`` follows the profile for ``simulated`` repetitions. ``repetitions`` is what one bottle has to last for,
-    with ``reserve`` [-] left. ``largest_error`` [N m] is the limit; pressures [Pa absolute]. ``gains`` are the paths of
-    the controller's gains; every combination of ``gain_factors`` on them is tried.
+    ``scenario``: scenario that follows the profile for ``simulated`` repetitions
+    ``repetitions``: number of repetitions that one bottle must supply
+    ``reserve``: fraction of the gas to be left in the bottle [-]
+    ``largest_error``: limit of the RMS error [N m]
+    ``lowest_pressure``, ``highest_pressure``: range of the supply pressure [Pa absolute]
+    ``gains``: paths of the controller's gains
+    ``gain_factors``: factors on the gains; every combination is tried
     """
 
     name: str
@@ -261,17 +267,20 @@ class SizingProblem:
 
     @property
     def carried(self) -> tuple[Part, ...]:
-        """The parts that are carried beside valve and bottle."""
+        """Parts carried in addition to valve and bottle."""
         return self.regulators if self.actuator is None else (*self.regulators, self.actuator)
 
     @property
     def hours(self) -> float:
-        """Time that the repetitions take without a pause [h]."""
+        """Duration of all repetitions without a pause [h]."""
         return self.repetitions * self.profile.period / _SECONDS_PER_HOUR
 
 
 def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProblem:
-    """Return the problem of a design file with a profile, which messages call ``file``; paths begin in ``folder``."""
+    """Return the sizing problem of a design file with a torque profile.
+
+    ``file`` is the name used in error messages; paths are relative to ``folder``.
+    """
     catalogue = load_catalogue(beside(document.catalogue, folder))
     profile = read_profile(document.profile, folder, file)
     scenario = _scenario(document, profile, folder, file)
@@ -322,7 +331,7 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
 
 
 def _scenario(document: SizingFile, profile: RequiredTorque, folder: Path, file: str) -> Scenario:
-    """Return the scenario with the profile as its reference, for a whole number of samples over all repetitions."""
+    """Return the scenario with the profile as its reference, for all repetitions in whole samples."""
     name = beside(document.scenario, folder)
     plain = load_scenario(name, document.overrides)
     plain.device.check_torque_constant("the size of a device")

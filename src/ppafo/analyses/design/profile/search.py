@@ -1,7 +1,7 @@
 """Search for the feasible supply pressures of a valve, their gas demand, and the limiting quantity.
 
-Each pressure is tried with many gains, and some openings, of one valve at once. Nothing is taken for
-granted about how the error depends on the pressure.
+Each pressure is tried in one batch with many gains, and with some openings, of one valve. The error is not assumed to
+be monotonic in the pressure.
 """
 
 from collections import Counter
@@ -73,11 +73,12 @@ Error and gas are nan where a run failed or oscillated.
 
 @final
 class Trials:
-    """Runs trials of a problem and counts the runs and their failures.
+    """Runner of the trials of a problem, which counts runs and failures.
 
-    ``gain_sets`` (sets, gains) has every combination of the gain factors, one for each gain. ``seeds`` name the streams
-    of noise that every trial meets, its error being the largest and its gas the mean, so that trials differ by what is
-    tried and not by luck; none where there is no noise.
+    ``gain_sets`` (sets, gains): every combination of the gain factors
+    ``seeds``: noise streams of every trial, the same for all; empty without noise
+
+    The error of a trial is the largest over the streams, its gas the mean.
     """
 
     def __init__(self, problem: SizingProblem, threads: int | None = None) -> None:
@@ -90,7 +91,10 @@ class Trials:
         self._threads = threads
 
     def run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> Trial:
-        """Return the trials of a valve at pressures [Pa absolute], with sets of gains and factors on its opening."""
+        """Return trials of a valve at pressures [Pa absolute].
+
+        Each trial has an index of a gain set in ``gains`` and a factor on the valve opening in ``opening`` [-].
+        """
         scenario, streams, count = self.problem.scenario, max(1, self.seeds.size), pressure.size
         columns = self.columns(valve, pressure, gains, opening)
         error, gas = np.empty((2, streams, count))
@@ -117,7 +121,8 @@ class Trials:
     def best(self, valve: Part, pressure: Floats, opening: float = 1.0) -> Trial:
         """Return for each pressure the trial with the best set of gains.
 
-        Of those that keep the error limit the one that uses least gas; where none does, the one with the minimum error.
+        Among sets that keep the error limit it is the one with the least gas; otherwise the one with the smallest
+        error.
         """
         sets = self.gain_sets.shape[0]
         pressures, gains = np.repeat(pressure, sets), np.tile(np.arange(sets), pressure.size)
@@ -132,8 +137,8 @@ class Trials:
     def columns(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> dict[str, Floats]:
         """Return the columns of trials in SI: figures of the parts, both supply pressures, gains.
 
-        The scenario's gains are those of its own device: with other parts, and at another pressure, they are the same
-        multiple of what the rules of ``control.torque_loop`` ask for.
+        The gains of the scenario fit its own device. For other parts and pressures they are scaled, so that the ratio
+        to the gains of the rules in ``control.torque_loop`` stays the same.
         """
         problem, count = self.problem, pressure.size
         columns = {path: np.full(count, number) for path, number in valve.model_numbers.items()}
@@ -149,19 +154,22 @@ class Trials:
         return columns
 
     def right_gain(self, columns: Mapping[str, Floats]) -> Any:
-        """Return the proportional gain [1/(N m)] that the rules ask for, with some numbers in place of the device's."""
+        """Return the proportional gain [1/(N m)] of the tuning rules.
+
+        ``columns`` replace numbers of the device by path.
+        """
         scenario = self.problem.scenario
         term = loop_terms(scenario.device, CONTROLLERS[scenario.controller.kind], IN_SCENARIO)[PROPORTIONAL_GAIN]
         return term.number(lambda path: columns[path] if path in columns else number_at(scenario, path))
 
 
 def highest_pressure(problem: SizingProblem, valve: Part) -> float:
-    """Return the highest pressure [Pa absolute] to try: the file's, or what the parts are made for."""
+    """Return the highest pressure [Pa absolute] to try: limit of the file, or rated pressure of the parts."""
     return min(problem.highest_pressure, rated_pressure(valve, *problem.carried))
 
 
 def try_pressures(trials: Trials, valve: Part) -> Trial:
-    """Return the best trials of a valve, pressure by pressure; the lowest that works is within a tenth of a psi."""
+    """Return the best trial of a valve at each pressure; the lowest feasible pressure is within 0.1 psi."""
     problem = trials.problem
     tried = trials.best(valve, np.linspace(problem.lowest_pressure, highest_pressure(problem, valve), GRID))
     if np.isnan(tried["error"]).all():
@@ -178,20 +186,21 @@ def try_pressures(trials: Trials, valve: Part) -> Trial:
 
 
 def works_in(problem: SizingProblem, tried: Trial) -> NDArray[np.bool_]:
-    """Return which trials keep the error limit and hold the least share of the peak."""
+    """Return a mask of the trials that keep the error limit and provide the required share of the peak torque."""
     return np.asarray((tried["error"] <= problem.largest_error) & (tried["pressure"] >= peak_pressure(problem)))
 
 
 def first_of(members: NDArray[np.bool_]) -> int | None:
-    """Return the place of the first that is true; None where none is."""
+    """Return the index of the first true element; None if all are false."""
     return int(members.argmax()) if members.any() else None
 
 
 def limit_of(trials: Trials, valve: Part, tried: Trial) -> Limit:
-    """Return what keeps a valve from a lower pressure, or from working at all.
+    """Return the quantity that keeps a valve from a lower pressure, or from working at all.
 
-    The torque ceiling where the lowest pressure is near the one that it alone demands. Else larger openings are tried,
-    half way between the two (between that one and the highest where none works): where one works, the flow limits.
+    The limit is the torque if the lowest feasible pressure is near ``ceiling_pressure``. Otherwise larger openings are
+    tried at the mean of these two pressures, or of ``ceiling_pressure`` and the highest pressure if none is feasible:
+    if a larger opening works, the limit is the flow, else the control.
     """
     problem = trials.problem
     first = first_of(works_in(problem, tried))
@@ -208,7 +217,7 @@ def limit_of(trials: Trials, valve: Part, tried: Trial) -> Limit:
 
 
 def ceiling_pressure(problem: SizingProblem) -> float:
-    """Return the pressure [Pa absolute] below which the cut crest alone breaks the error limit; equation (2)."""
+    """Return the pressure [Pa absolute] below which clipping of the peak exceeds the error limit; equation (2)."""
     from scipy.optimize import brentq
 
     atmosphere = problem.atmosphere
@@ -222,12 +231,12 @@ def ceiling_pressure(problem: SizingProblem) -> float:
 
 
 def peak_pressure(problem: SizingProblem) -> float:
-    """Return the pressure [Pa absolute] that holds the least share of the peak; equation (2)."""
+    """Return the pressure [Pa absolute] for the required share of the peak torque; equation (2)."""
     return problem.atmosphere + LEAST_PEAK * problem.profile.largest / problem.torque_constant
 
 
 def cut_error(problem: SizingProblem, pressure: float) -> float:
-    """Return the RMS error [N m] that is left if only the torque ceiling at a pressure [Pa] cuts the profile."""
+    """Return the RMS error [N m] of the profile clipped at the largest torque for a pressure [Pa absolute]."""
     # The end of a period is its start again and must count once.
     # Two thousand points: the crest of a push-off, a tenth of a stride, still has two hundred.
     time = np.linspace(0.0, problem.profile.period, 2001)[:-1]
@@ -242,9 +251,9 @@ def ceiling(problem: SizingProblem, pressure: float) -> float:
 
 
 def flow_margin(trials: Trials, valve: Part, pressure: float) -> float:
-    """Return by what fraction the opening might be smaller at a tenth more gauge pressure, with the best gains.
+    """Return the possible reduction of the opening [-] at a gauge pressure one tenth higher, with the best gains.
 
-    At the lowest pressure itself nothing might be smaller: that is what makes it the lowest.
+    At the lowest feasible pressure itself no reduction is possible.
     """
     atmosphere = trials.problem.atmosphere
     higher = np.array([atmosphere + MORE_PRESSURE * (pressure - atmosphere)])

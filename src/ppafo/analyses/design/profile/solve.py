@@ -31,7 +31,10 @@ from ppafo.walking.bottle.coupling import Schedule
 
 
 def size_for_profile(problem: SizingProblem, threads: int | None = None, report: Report = report_nothing) -> Sizing:
-    """Return the lowest pressure and smallest bottle of each valve for a profile; StudyError where all runs fail."""
+    """Return the lowest pressure and smallest bottle of each valve for a torque profile.
+
+    Raises StudyError if all runs fail.
+    """
     begun = time.perf_counter()
     trials = Trials(problem, threads)
     sized = []
@@ -61,14 +64,14 @@ def size_for_profile(problem: SizingProblem, threads: int | None = None, report:
 
 
 def smallest_bottle(bottles: Sequence[Part], gas: float) -> Part | None:
-    """Return the lightest full bottle that holds an amount of gas [kg]; None where none does."""
+    """Return the lightest full bottle that contains a mass of gas [kg]; None if there is none."""
     enough = [bottle for bottle in bottles if bottle.values["content"] >= gas]
     return min(enough, key=lambda bottle: bottle.full_mass, default=None)
 
 
 @in_units(lambda trials, _valve: trials.problem.scenario.device.shown)
 def _size_valve(trials: Trials, valve: Part) -> SizedValve:
-    """Return a valve at the pressure that needs the lightest bottle, or at which it comes nearest to the limit."""
+    """Return a valve sized at the pressure with the lightest bottle, or at the smallest error if no pressure works."""
     problem = trials.problem
     tried = try_pressures(trials, valve)
     works = works_in(problem, tried)
@@ -131,10 +134,10 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
 
 
 def _lasting_bottle(problem: SizingProblem, gas: float, in_all: float, pressure: float) -> tuple[Part | None, bool]:
-    """Return the lightest bottle that lasts, mass and heat together, and whether a lighter one only has the gas.
+    """Return the lightest bottle that lasts, and whether a lighter bottle with enough gas gets too cold.
 
-    The profile is repeated without a rest, ``gas`` [kg] each time and ``in_all`` [kg] with the reserve, behind a
-    regulator set to the ``pressure`` [Pa].
+    The profile is repeated without a pause and takes ``gas`` [kg] per repetition, ``in_all`` [kg] in total with the
+    reserve, downstream of a regulator set to ``pressure`` [Pa absolute].
     """
     if gas <= 0.0:
         return smallest_bottle(problem.bottles, in_all), False

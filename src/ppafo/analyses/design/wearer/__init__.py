@@ -1,1 +1,1 @@
-"""The lightest parts with which a wearer walks for some minutes on a bottle."""
+"""Lightest parts with which a wearer walks for a required time on one bottle."""

@@ -1,4 +1,4 @@
-"""Alternatives where no device meets the requirements: one is relaxed in each, and walked on the largest bottle."""
+"""Alternatives if no device meets the requirements: each relaxes one of them, confirmed by a walk on a bottle."""
 
 import itertools
 import math
@@ -38,7 +38,7 @@ _SHOWN_TORQUE = 100.0
 
 
 class _Candidate(NamedTuple):
-    """A pair of parts as it walked a few strides, and the requirements at the pressure of that walk."""
+    """Pair of parts after a few strides, and the requirements with the supply pressure of these strides."""
 
     requirements: DesignRequirements
     pair: WalkedDevice
@@ -47,7 +47,10 @@ class _Candidate(NamedTuple):
 def alternatives_to(
     requirements: DesignRequirements, tried: Sequence[WalkedDevice], shelf: AvailableParts, report: Report
 ) -> Iterator[Alternative]:
-    """Yield what would do instead, each as it walked on the largest bottle: who asks for exactly that gets it."""
+    """Yield alternatives to requirements that no device meets, each confirmed by a walk on the largest bottle.
+
+    A design for the relaxed requirements of an alternative finds the same device again.
+    """
     bottle = max(shelf.bottles, key=lambda bottle: bottle.values["content"])
     candidates = [_Candidate(requirements, pair) for pair in tried]
     candidates += _at_less_pressure(requirements, tried, report)
@@ -87,7 +90,7 @@ def alternatives_to(
 def _at_less_pressure(
     requirements: DesignRequirements, tried: Sequence[WalkedDevice], report: Report
 ) -> list[_Candidate]:
-    """Return the pairs that have the most torque for their gas, at pressures below the wanted one."""
+    """Return the pairs with the most torque per gas flow, walked at pressures below the required one."""
     thrifty = sorted((pair for pair in tried if pair.flow > 0.0), key=lambda pair: -pair.torque / pair.flow)
     # Actuators of the same numbers walk alike: one of them is enough.
     unlike = {(pair.valve.name, pair.torque, pair.flow): pair for pair in thrifty}
@@ -102,7 +105,10 @@ def _at_less_pressure(
 
 
 def _at_more_pressure(requirements: DesignRequirements, tried: Sequence[WalkedDevice]) -> Iterator[_Candidate]:
-    """Yield what does it at more pressure, the lowest first: of each kind of valve the strongest and the highest."""
+    """Yield pairs that meet the requirements at a higher pressure, the lowest pressure first.
+
+    For each kind of valve, the pair with the largest torque and the pair with the largest toe clearance are tried.
+    """
     best: list[WalkedDevice] = []
     for kind in dict.fromkeys(pair.valve.kind for pair in tried):
         of_kind = [pair for pair in tried if pair.valve.kind == kind]
@@ -117,7 +123,10 @@ def _at_more_pressure(requirements: DesignRequirements, tried: Sequence[WalkedDe
 
 
 def _thriftiest(able: Sequence[_Candidate], bottle: Part, shelf: AvailableParts) -> Alternative | None:
-    """Return what walks on a bottle with the least gas, of the first few the one whose toes stay as high as wanted."""
+    """Return the alternative with the least gas flow on a bottle; None if no candidate can walk on the bottle.
+
+    Among the first few candidates, one that keeps the required toe clearance on the bottle is preferred.
+    """
     first: Alternative | None = None
     for candidate in able[:_MOST_WALKED]:
         alternative = _as_walked(candidate, bottle, shelf)
@@ -130,7 +139,7 @@ def _thriftiest(able: Sequence[_Candidate], bottle: Part, shelf: AvailableParts)
 def _lasting(
     requirements: DesignRequirements, weak: Sequence[_Candidate], bottle: Part, shelf: AvailableParts
 ) -> Alternative | None:
-    """Return what walks on a bottle for all of the time, of pairs with the most torque first; None if none does."""
+    """Return the alternative with the most torque that walks for all of the time on a bottle; None if none does."""
     largest_flow = _USABLE * bottle.values["content"] / requirements.seconds
     for candidate in weak:
         if candidate.pair.flow > largest_flow:
@@ -144,11 +153,11 @@ def _lasting(
 
 
 def _as_walked(candidate: _Candidate, bottle: Part, shelf: AvailableParts) -> Alternative | None:
-    """Return a candidate as the alternative that its walk on a bottle confirms; None where that walk does not help.
+    """Return a candidate as an alternative, confirmed by a walk on a bottle; None if the walk does not provide help.
 
-    The rule: what is offered was walked, and walks again when it is asked for. So the requirements are lowered to what
-    the candidate showed, rounded down to what a command line says; the pair walks a few strides for these, then on the
-    bottle. What that walk has less of is offered as less, unless other strides would be walked for it.
+    The requirements are relaxed to the results of the candidate, rounded down to the digits of a command line. The pair
+    then walks a few strides for the relaxed requirements, and after that on the bottle. Results of this walk that are
+    lower relax the requirements further. An alternative that would lead to different strides is dropped.
     """
     lesser, pair = candidate
     if not lesser.is_reached_by(pair.torque):

@@ -1,4 +1,4 @@
-"""The device for a wearer in words, tables and a figure, or what would have to be given up."""
+"""Report of the device for a wearer, or of the alternatives if no device meets the requirements."""
 
 from functools import partial
 
@@ -45,7 +45,7 @@ _READING = (
 
 
 def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
-    """Return the device with its walk, or what to give up; it has not passed without a device."""
+    """Return the device with its walk, or the alternatives, as a finding; not passed without a device."""
     requirements, device = sizing.requirements, sizing.device
     rows = [
         (tried.valve.name, tried.actuator.name, tried.torque, tried.toes, tried.flow, tried.mass)

@@ -1,4 +1,4 @@
-"""Parts that a device for a wearer may be built of: a catalogue of one's own, filled up with the package's."""
+"""Parts available for a wearer's device: the user's catalogue, completed by the catalogue of the package."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,13 @@ from ppafo.parameters.parts.catalogue import rated_pressure
 
 @dataclass(frozen=True, slots=True)
 class AvailableParts:
-    """Parts available for a device, by group, the user's catalogue file, if any, and the name of a chosen bottle."""
+    """Parts available for a device.
+
+    ``groups``: parts by group and name
+    ``own_groups``: groups that come from the user's catalogue
+    ``file``: file of the user's catalogue, empty without one
+    ``chosen_bottle``: name of the bottle that the user chose, empty for the bottles of the catalogue
+    """
 
     groups: Mapping[str, Mapping[str, Part]]
     own_groups: frozenset[str]
@@ -21,24 +27,24 @@ class AvailableParts:
 
     @property
     def bottles(self) -> list[Part]:
-        """The bottles, lightest first."""
+        """Bottles, lightest first."""
         return sorted(self.groups["bottles"].values(), key=lambda bottle: bottle.full_mass)
 
     def part(self, group: str, usual: str) -> Part:
-        """Return the part of a group that is usual, else the lightest of one's own."""
+        """Return the part named ``usual`` of a group, else the lightest of the user's own parts."""
         parts = self.groups[group]
         return parts[usual] if usual in parts else min(parts.values(), key=lambda part: part.full_mass)
 
     def bottle_name(self, bottle: Part) -> str:
-        """Return what ``--bottle`` takes for a bottle."""
+        """Return the argument of ``--bottle`` for a bottle."""
         if self.chosen_bottle:
             return self.chosen_bottle
         return f"{self.file}/{bottle.name}" if "bottles" in self.own_groups else bottle.name
 
     def pairs(self, pressure: float) -> list[tuple[Part, Part]]:
-        """Return every valve with every actuator that may have a supply pressure [Pa absolute].
+        """Return every pair of valve and actuator that is rated for a supply pressure [Pa absolute].
 
-        A part without a largest pressure in the catalogue is not left out.
+        A part without a rated pressure in the catalogue is included.
         """
         return [
             (valve, actuator)
@@ -49,9 +55,9 @@ class AvailableParts:
 
 
 def shelf_of(catalogue: str | Path) -> AvailableParts:
-    """Return the parts of a catalogue, by name or file; what it has no group of is the package's.
+    """Return the parts of a catalogue, by name or file; missing groups are taken from the package's catalogue.
 
-    ParameterError where it cannot be read, StudyError where its valves have no walk.
+    Raises ParameterError if the catalogue cannot be read, StudyError if no walk is known for its valves.
     """
     own, usual = load_catalogue(catalogue).groups, load_catalogue().groups
     groups = {group: own[group] or parts for group, parts in usual.items()}

@@ -1,4 +1,4 @@
-"""Walks of pairs of parts on a bottle, and the lightest pair and bottle that last."""
+"""Walks on a bottle, and the lightest pair of parts with a bottle that lasts."""
 
 import math
 from collections.abc import Sequence
@@ -20,9 +20,9 @@ _ALLOWANCE = 1.15
 def lightest_on_bottle(
     requirements: DesignRequirements, tried: Sequence[WalkedDevice], shelf: AvailableParts, report: Report
 ) -> tuple[WalkedDevice, Part, WalkResult] | None:
-    """Return the lightest pair and bottle whose walk meets the requirements, with that walk; None if none does.
+    """Return the lightest pair and bottle whose walk meets the requirements, with that walk; None if there is none.
 
-    No pair that might last on a bottle is left out, so that an alternative is found again when it is requested.
+    Every pair that might last on a bottle is tried, so that a later design for an alternative finds its device again.
     """
     # Heaviest first: of pairs with the same overrides the lightest replaces the others.
     able = {pair.overrides: pair for pair in sorted(tried, key=lambda pair: -pair.mass) if pair.has(requirements)}
@@ -42,7 +42,7 @@ def lightest_on_bottle(
 
 
 def walk_on_bottle(pair: WalkedDevice, bottle: str, seconds: float) -> WalkResult | None:
-    """Walk for a time [s], or until the bottle ends it; None where it cannot feed the device at all."""
+    """Walk for a time [s] or until the bottle is exhausted; None if the bottle cannot supply the device."""
     try:
         return walk(load_walk(WALKS[pair.valve.kind], pair.overrides, bottle=bottle), minutes=seconds / 60.0)
     except ScenarioError:
@@ -50,22 +50,22 @@ def walk_on_bottle(pair: WalkedDevice, bottle: str, seconds: float) -> WalkResul
 
 
 def walking_time(walked: WalkResult | None) -> float:
-    """Return how long a walk on a bottle lasts [s], infinite where its bottle did not end it; 0 for none."""
+    """Return the duration of a walk on a bottle [s], infinite if the bottle did not end it; 0 without a walk."""
     if walked is None or walked.supply is None or not walked.status.is_completed:
         return 0.0
     return math.inf if walked.supply.ending.kind == WALKED else float(walked.recording.time[-1])
 
 
 def lasting_flow(pair: WalkedDevice, lasted: float, seconds: float) -> float:
-    """Return the flow [kg/s] above which no pair lasts on a bottle, with some allowance.
+    """Return the gas flow [kg/s] above which no pair lasts on a bottle, with some allowance.
 
-    It follows from one that ``lasted`` less than ``seconds`` [s] there.
+    The estimate rests on a pair that ``lasted`` less than ``seconds`` [s] on the same bottle.
     """
     return pair.flow * min(0.99, max(0.5, _ALLOWANCE * lasted / seconds))
 
 
 def keeps(walked: WalkResult, requirements: DesignRequirements) -> bool:
-    """Return whether the mean stride of a walk on a bottle reaches the torque, and has the clearance."""
+    """Return whether the mean stride of a walk on a bottle meets the required torque and toe clearance."""
     if not walked.averages or walked.tracking:
         return False
     is_reached = requirements.is_reached_by(float(walked.averages["torque"].mean.max()))

@@ -16,9 +16,12 @@ USABLE = 0.8
 
 @dataclass(frozen=True, slots=True)
 class Electrical:
-    """Mean powers [W] by consumer, and the battery: how many cells, their mass [kg], how long they last [s].
+    """Electrical energy of a walk and the battery.
 
-    ``is_whole`` is False where the catalogue states no power of the valve, which is then not among them.
+    ``powers``: mean power [W] by consumer
+    ``cell``: cell of the battery
+    ``cells``: number of cells
+    ``is_whole``: False if the catalogue states no power for the valve, which is then missing in ``powers``
     """
 
     powers: dict[str, float]
@@ -38,16 +41,16 @@ class Electrical:
 
     @property
     def lasts(self) -> float:
-        """Time [s] for which the battery lasts."""
+        """Operating time of the battery [s]."""
         return USABLE * self.cells * self.cell.values["energy"] / self.power
 
 
 def valve_power(valve: Part, command: Floats) -> Floats:
-    """Return the electrical power [W] of a valve, both of a pair, under a command (samples,) of -1 to 1, or to vent.
+    """Return the electrical power [W] of a valve under commands (samples,) of -1 to 1, or to vent.
 
-    One coil of a pair is energised while its chamber is filled, none while both vent. A spool takes the power of its
-    centre, and what its data sheet states at full stroke in proportion to the stroke beyond. Nothing where its
-    catalogue states no power.
+    For a pair of on/off valves, one coil is energised while its chamber is filled, none while both chambers vent. A
+    spool valve takes its power at the centre position, and beyond it the power of the data sheet at full stroke in
+    proportion to the stroke. The power is 0 if the catalogue states none.
     """
     # A command to vent is beyond 1 and no stroke.
     stroke = np.where(command > VENTS_ABOVE, 0.0, np.abs(command))
@@ -60,7 +63,10 @@ def valve_power(valve: Part, command: Floats) -> Floats:
 def electrical_of(
     recording: Recording, valve: Part, shut_off_power: float, processor: Part, cell: Part, seconds: float
 ) -> Electrical:
-    """Return the electrical side of a walk, with as many cells as a time [s] takes; means over the recorded walk."""
+    """Return the electrical energy of a walk as means over the recording.
+
+    The battery has as many cells as a walk of ``seconds`` [s] needs.
+    """
     time, power = recording.time, valve_power(valve, recording["command"])
     # Each sample holds until the next one, as the controller's outputs do.
     length = float(time[-1] - time[0])
@@ -76,7 +82,7 @@ def electrical_of(
 
 
 def electrical_sentences(electrical: Electrical) -> list[str]:
-    """Return powers, and mass and minutes of the battery."""
+    """Return sentences on the powers, and on mass and duration of the battery."""
     parts = ", ".join(
         f"{name} {power:.3g} W" if power >= 1.0 else f"{name} {1000.0 * power:.3g} mW"
         for name, power in electrical.powers.items()

@@ -1,4 +1,4 @@
-"""Design requirements of a wearer, the devices that were tried, and the result of each."""
+"""Design requirements of a wearer, tried devices, and the result of each."""
 
 import math
 import shlex
@@ -37,10 +37,15 @@ TORQUE, MASS, CLEARANCE = Kind("", "N m", "torque", ".3g"), Kind("", "kg", "part
 
 @dataclass(frozen=True, slots=True)
 class DesignRequirements:
-    """Design requirements: body mass [kg], stature [m] or None, torque [N m], supply [Pa absolute], time [s].
+    """Design requirements of a wearer.
 
-    ``toes`` is how far the toes clear the ground in mid-swing [m]; where it is None, ``usual_toes`` are wanted. ``gas``
-    is the species that feeds the device, empty for the species of the walk.
+    ``mass``: body mass [kg]
+    ``stature``: stature [m]; None for the stature at ``BODY_MASS_INDEX``
+    ``torque``: peak torque of push-off [N m]
+    ``pressure``: supply pressure [Pa absolute]
+    ``seconds``: walking time on one bottle [s]
+    ``toes``: toe clearance in mid-swing [m]; None for ``usual_toes``
+    ``gas``: gas species of the supply; empty for the species of the walk
     """
 
     mass: float
@@ -54,16 +59,16 @@ class DesignRequirements:
 
     @property
     def height(self) -> float:
-        """Stature [m]; unless one is given, of a wearer with ``BODY_MASS_INDEX``."""
+        """Stature [m]; by default the stature of a wearer with ``BODY_MASS_INDEX``."""
         return math.sqrt(self.mass / BODY_MASS_INDEX) if self.stature is None else self.stature
 
     @property
     def clearance(self) -> float:
-        """Clearance of the toes [m]."""
+        """Required toe clearance [m]."""
         return self.usual_toes if self.toes is None else self.toes
 
     def at_gauge(self, share: float) -> "DesignRequirements":
-        """Return the requirements at a share of their gauge pressure, rounded to 0.1 psi, 0.01 bar or 1 kPa."""
+        """Return the requirements at a fraction of their gauge pressure, rounded to 0.1 psi, 0.01 bar or 1 kPa."""
         unit = shown_unit("Pa_d")
         step = to_si(10.0 ** round(math.log10(from_si(0.1 * PASCALS_PER_PSI, unit, "Pa_d"))), unit, "Pa_d")
         return replace(
@@ -72,7 +77,7 @@ class DesignRequirements:
         )
 
     def is_reached_by(self, torque: float) -> bool:
-        """Tell whether a peak torque of the mean stride [N m] is the wanted one, but for what a stride differs."""
+        """Return whether a peak torque of the mean stride [N m] suffices, within the variation of strides."""
         return torque >= REACHED * self.torque
 
     def text(self) -> str:
@@ -83,7 +88,7 @@ class DesignRequirements:
 
 
 def check_requirements(requirements: DesignRequirements) -> None:
-    """Raise StudyError for requirements outside the ranges in which a device can be sized, naming the argument."""
+    """Raise StudyError, naming the argument, for requirements outside the ranges for which devices are sized."""
     low, high = STATURES
     mass = next(quantity for quantity in WEARER if quantity.name == "body_mass")
     weight, height, toes = requirements.mass, requirements.height, requirements.toes
@@ -111,15 +116,18 @@ def check_requirements(requirements: DesignRequirements) -> None:
 
 
 def shown_clearance(toes: float) -> float:
-    """Return a clearance [m] rounded down to the tenth of a millimetre that is shown, which a few strides then have."""
+    """Return a toe clearance [m] rounded down to 0.1 mm, as displayed."""
     return math.floor(1.0e4 * toes) / 1.0e4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkedDevice:
-    """Valve, actuator and overrides of a walk; peak torque of the mean stride [N m], mean flow of gas [kg/s].
+    """Valve and actuator after a few strides of walking.
 
-    ``toes`` is the lowest height of the toes over the ground in mid-swing [m]; below 0 they would drag.
+    ``overrides``: overrides of the walk
+    ``torque``: peak torque of the mean stride [N m]
+    ``flow``: mean gas flow [kg/s]
+    ``toes``: lowest toe height above the ground in mid-swing [m]; below 0 the toes would drag
     """
 
     valve: Part
@@ -135,15 +143,19 @@ class WalkedDevice:
         return self.valve.full_mass + self.actuator.full_mass
 
     def has(self, requirements: DesignRequirements) -> bool:
-        """Tell whether a few strides have the torque and the clearance that are required."""
+        """Return whether a few strides have the required torque and toe clearance."""
         return requirements.is_reached_by(self.torque) and self.toes >= requirements.clearance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SizedDevice:
-    """A device that was walked with on its bottle for the time that is wanted, how long it lasts, what it takes.
+    """Device whose walk on a bottle lasts for the required time.
 
-    ``bottle_name`` is what ``--bottle`` takes for the bottle.
+    ``bottle_name``: argument of ``--bottle`` for the bottle
+    ``walked``: walk on the bottle
+    ``life``: walking time on the bottle
+    ``electrical``: electrical energy of the walk, and the battery
+    ``masses``: masses of the parts
     """
 
     tried: WalkedDevice
@@ -161,12 +173,12 @@ class SizedDevice:
 
     @property
     def toes(self) -> float:
-        """Lowest toes over the ground in mid-swing [m], of the mean stride on the bottle."""
+        """Lowest toe height above the ground in mid-swing [m], of the mean stride on the bottle."""
         return self.walked.metrics["lowest_toes"].value
 
     @property
     def command(self) -> str:
-        """The command that walks with it."""
+        """Command line that repeats the walk with this device."""
         minutes = float(self.walked.recording.time[-1]) / 60.0
         words = ("ppafo", "walk", WALKS[self.tried.valve.kind], "--bottle", self.bottle_name)
         sets = (word for text in self.tried.overrides for word in ("--set", text))
@@ -175,14 +187,14 @@ class SizedDevice:
 
 @dataclass(frozen=True, slots=True)
 class Alternative:
-    """Requirements that can be met in place of those given, with the parts that met them in a walk."""
+    """Relaxed requirements, with the parts that met them in a walk on a bottle."""
 
     requirements: DesignRequirements
     tried: WalkedDevice
     bottle: Part
 
     def text(self, asked: DesignRequirements) -> str:
-        """Return the alternative in full: first what it changes of the given requirements, then its parts."""
+        """Return the alternative in full: relaxed requirements first, then its parts."""
         changes = [
             *(["less torque"] if self.requirements.torque < asked.torque else []),
             *(["lower toes"] if self.requirements.clearance < asked.clearance else []),
@@ -196,9 +208,11 @@ class Alternative:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WearerSizing:
-    """Requirements and every device tried; ``device`` is None if none meets them, ``instead`` has the alternatives.
+    """Requirements, every device tried, and the sized device.
 
-    ``healthy_toes`` is the clearance of the toes in the healthy gait [m].
+    ``healthy_toes``: toe clearance of the healthy gait [m]
+    ``device``: lightest device that meets the requirements; None if there is none
+    ``instead``: alternatives if there is no device
     """
 
     requirements: DesignRequirements
@@ -209,7 +223,7 @@ class WearerSizing:
 
     @property
     def parts(self) -> list[Part]:
-        """The parts that the device is made of, of those with figures to check."""
+        """Parts of the device that have figures to check."""
         device = self.device
         if device is None:
             return []
@@ -217,11 +231,11 @@ class WearerSizing:
 
     @property
     def doubtful(self) -> list[tuple[Part, str]]:
-        """Figures of these parts that are quoted or assumed."""
+        """Quoted or assumed figures of the parts of the device."""
         return [(part, name) for part in self.parts for name in part.doubtful]
 
     def json_document(self) -> dict[str, Any]:
-        """Return the device and all that was tried as plain data in SI."""
+        """Return the device and all tried pairs as plain data in SI."""
         requirements, device = self.requirements, self.device
         return {
             "format": "ppafo wearer sizing",

@@ -1,8 +1,8 @@
-"""Sizing for a wearer: the lightest parts whose walk on the bottle meets the requirements.
+"""Sizing for a wearer: the lightest parts whose walk on a bottle meets the requirements.
 
-Every pair of valve and actuator walks a few strides; those with the torque whose toes clear the ground walk on bottles,
-lightest first, until one lasts. That walk, whole, is the suggestion; where none does, walks say what would have to be
-given up.
+Every pair of valve and actuator walks a few strides. Pairs with the required torque and toe clearance then walk on
+bottles, lightest first, until one lasts; this complete walk is the suggestion. If none lasts, further walks find
+alternatives.
 """
 
 from dataclasses import replace
@@ -44,11 +44,12 @@ def size_for_wearer(
     catalogue: str | Path = DEFAULT,
     bottle: str | Path | None = None,
 ) -> WearerSizing:
-    """Return the lightest device that meets the requirements, or the alternatives; ``catalogue`` is a name or a file.
+    """Return the lightest device that meets the requirements, or the alternatives.
 
-    ``bottle``, a name or a file, takes the place of those of the catalogue; the device is fed with its gas. ``report``
-    receives a line for each walk. Raises StudyError for impossible requirements, ParameterError for a bad catalogue or
-    bottle.
+    ``catalogue`` is a name or a file. ``bottle``, a name or a file, replaces the bottles of the catalogue, and its gas
+    feeds the device. ``report`` receives a line for each walk.
+
+    Raises StudyError for impossible requirements, ParameterError for an invalid catalogue or bottle.
     """
     check_requirements(requirements)
     shelf, walking = shelf_of(catalogue), load_walk(next(iter(WALKS.values())), of_wearer(requirements))
@@ -80,7 +81,7 @@ def size_for_wearer(
 def _device(
     pair: WalkedDevice, bottle: Part, walked: WalkResult, requirements: DesignRequirements, shelf: AvailableParts
 ) -> SizedDevice:
-    """Return the device of a pair and a bottle: with regulators, shut-off valve, processor and battery."""
+    """Return the device of a pair and a bottle, with regulators, shut-off valve, processor and battery."""
     life = endurance_of_walk(walked)
     assert life is not None, "a walk on a bottle that has a torque took gas"
     processor, cell = shelf.part("processors", _PROCESSOR), shelf.part("batteries", _CELL)

@@ -1,7 +1,7 @@
-"""A few strides with a valve and an actuator at a constant supply: which torque, clearance and gas they have.
+"""A few strides with a valve and an actuator at a constant supply: torque, toe clearance and gas flow.
 
-Of a torque controller the lowest torque is requested that gives the one wanted; it lifts the foot earlier and harder
-where the toes would not clear the ground.
+A torque controller receives the lowest requested torque that provides the required one. It lifts the foot earlier and
+harder if the toes would not clear the ground.
 """
 
 from ppafo.analyses.design.wearer.requirements import WALKS, DesignRequirements, WalkedDevice
@@ -34,14 +34,15 @@ SHUT_OFF_PARTS = {quantity.name: quantity.default or 0.0 for quantity in SHUT_OF
 
 
 def of_wearer(requirements: DesignRequirements) -> tuple[str, ...]:
-    """Return the overrides of a walk that give it the wearer of the requirements."""
+    """Return the overrides that give a walk the wearer of the requirements."""
     return f"wearer.body_mass={requirements.mass:.6g} kg", f"wearer.stature={requirements.height:.6g} m"
 
 
 def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -> list[WalkedDevice]:
-    """Return a few strides with a pair of parts that have the torque and the clearance, else those that come nearest.
+    """Return strides of a pair of parts that meet the required torque and toe clearance, else the nearest ones.
 
-    Nearest are the most torque, and the highest toes with enough of it: one or two, none where no walk has help.
+    Nearest are the strides with the most torque, and the strides with the highest toes and enough torque: one or two
+    results, none if no walk provides help.
     """
     common = _common_overrides(requirements, valve, actuator)
     strides: list[WalkedDevice] = []
@@ -81,7 +82,7 @@ def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -
 
 
 def _common_overrides(requirements: DesignRequirements, valve: Part, actuator: Part) -> tuple[str, ...]:
-    """Return the overrides of all walks with a pair: wearer, supply, numbers of the parts, shut-off valve."""
+    """Return the overrides common to all walks with a pair: wearer, supply, figures of the parts, shut-off valve."""
     dorsiflexion = STANDARD_ATMOSPHERE + _DORSIFLEXION * (requirements.pressure - STANDARD_ATMOSPHERE)
     units = {quantity.name: quantity.unit for quantity in (*ORIFICE, *VALVES[valve.kind].quantities, *ACTUATOR)}
     numbers = {**valve.model_numbers, **{f"actuator.{name}": actuator.values[name] for name in _OF_ACTUATOR}}
@@ -96,7 +97,7 @@ def _common_overrides(requirements: DesignRequirements, valve: Part, actuator: P
 
 
 def _strides_of(valve: Part, actuator: Part, overrides: tuple[str, ...]) -> WalkedDevice | None:
-    """Return a few strides with some overrides; None where they lack help, or the torque loop oscillates."""
+    """Return a few strides with given overrides; None if they provide no help or the torque loop oscillates."""
     result = walk(load_walk(WALKS[valve.kind], overrides), minutes=_MINUTES)
     if not result.status.is_completed or not result.is_helped or not result.averages or result.tracking:
         return None
