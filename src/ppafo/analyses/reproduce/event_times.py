@@ -29,7 +29,7 @@ SEED = 20110501
 
 
 def uneven_task_sequence(cadence: float) -> TaskSequence:
-    """Strides whose times vary as people's do, about a cadence [1/s] of steps."""
+    """Return a task sequence whose stride times vary as in healthy walking, about a cadence of steps [1/s]."""
     generator = np.random.default_rng(SEED)
     paces = cadence / (1.0 + VARIATION * np.clip(generator.standard_normal(UNEVEN_STRIDES), -2.0, 2.0))
     # Each stride is a segment of its own, since a segment has one pace.
@@ -39,7 +39,10 @@ def uneven_task_sequence(cadence: float) -> TaskSequence:
 
 
 def event_error(configuration: Scenario) -> float:
-    """RMS time error of the gait events of one walk over a task sequence [s]; SimulationError where it diverges."""
+    """Return the RMS time error [s] of the gait events of a walk over a task sequence.
+
+    Raises SimulationError if the walk diverges.
+    """
     sequence = task_sequence_of_walk(configuration)
     assert sequence is not None, "its strides are uneven"
     duration = min(float(sequence.duration), LONGEST)

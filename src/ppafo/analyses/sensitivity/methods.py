@@ -1,7 +1,7 @@
-"""The methods by which influence is measured: Sobol and Shapley, each with design and indices; the signed change.
+"""Methods of sensitivity analysis: Sobol and Shapley, each with design and indices; signed changes.
 
-A design is made of blocks that belong together: one base point of Sobol with its exchanged copies, one order of the
-values for Shapley. A block is the least that can be left out.
+A design consists of blocks: a base point of Sobol with its exchanged copies, or an order of the values for Shapley. A
+block is the smallest unit that can be left out.
 """
 
 import math
@@ -29,7 +29,7 @@ _NEAREST = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Indices:
-    """Indices by name, each (paths,), and the half width of the band around each one that has a band."""
+    """Sensitivity indices by name, each (paths,), and the half widths of their bands, where available."""
 
     values: Mapping[str, Floats]
     bands: Mapping[str, Floats]
@@ -37,9 +37,13 @@ class Indices:
 
 @dataclass(frozen=True, slots=True)
 class EvaluatedBlocks:
-    """Whole blocks of a design: shares and inputs [SI] (rows, paths), values (rows,), and the numbers of the blocks.
+    """Complete blocks of a design with the values of a metric.
 
-    ``ends`` (2, paths) [SI] are the 5 and the 95 % quantile of each input, nan of the noise; ``seed`` made the design.
+    ``fractions``, ``inputs`` (rows, paths): fractions in (0, 1) and inputs [SI]
+    ``values`` (rows,): values of the metric [SI]
+    ``blocks``: numbers of the blocks
+    ``ends`` (2, paths): 5 and 95 % quantile of each input [SI], nan for noise
+    ``seed``: random seed of the design
     """
 
     fractions: Floats
@@ -52,13 +56,16 @@ class EvaluatedBlocks:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """A design and its evaluation.
+    """Method of sensitivity analysis: design and evaluation.
 
-    ``shown`` are the indices that are drawn, the first of which ranks. ``takes_dependent`` tells whether they mean
-    something where values are correlated. There are ``fewest`` to ``most`` blocks, called by ``sizes_label`` and each
-    by ``block_label``; ``block_rows`` says how many runs belong together for a number of values. ``design`` takes an
-    uncertainty, blocks and a seed and returns fractions in (0, 1), shape (blocks * block_rows, paths), block after
-    block; each row is a draw of the values. ``indices`` returns the indices of whole blocks with bands of a confidence.
+    ``shown``: names of the plotted indices; the first one determines the ranking
+    ``takes_dependent``: True if the indices are meaningful for correlated values
+    ``fewest``, ``most``: limits of the number of blocks
+    ``sizes_label``, ``block_label``: names of the blocks, and of one block
+    ``block_rows``: number of runs of a block for a number of values
+    ``design``: function of uncertainty, number of blocks and seed; returns fractions in (0, 1), shape (blocks *
+        block_rows, paths), block after block
+    ``indices``: function of complete blocks and confidence; returns the indices with bands
     """
 
     name: str
@@ -74,7 +81,7 @@ class Method:
 
 
 def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
-    """Return fractions in (0, 1) for a power of 2 of blocks; block b is of scramble b % SCRAMBLES."""
+    """Return fractions in (0, 1) for a power of 2 of blocks; block b belongs to scramble b % SCRAMBLES."""
     if blocks & (blocks - 1):
         raise StudyError(f"samples = {blocks}: Sobol indices need a power of 2, such as {1 << blocks.bit_length()}")
     from scipy.stats import qmc
@@ -94,7 +101,7 @@ def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
 
 
 def _sobol_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
-    """Return ``first`` and ``total`` with bands."""
+    """Return the indices ``first`` and ``total`` with bands."""
     # Points of one scramble depend on each other, scrambles do not: those are left out in turn.
     table = evaluated.values.reshape(evaluated.blocks.size, -1)
     scramble = evaluated.blocks % SCRAMBLES
@@ -168,7 +175,7 @@ def _shapley_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
 
 
 def _shapley_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
-    """Return ``shapley`` with bands, by the delta method over the orders."""
+    """Return the index ``shapley`` with bands by the delta method over the orders."""
     from scipy.special import stdtrit
 
     blocks, count = evaluated.blocks.size, evaluated.fractions.shape[1]
@@ -187,7 +194,7 @@ def _shapley_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
 
 
 def _orders(count: int, blocks: int, seed: int) -> NDArray[np.intp]:
-    """Return the order of the values in each block (blocks, count); the first ones are the same for more blocks."""
+    """Return the order of the values in each block (blocks, count); a larger number of blocks keeps the first ones."""
     ranks = np.random.default_rng([seed, 2]).random((blocks, count))
     return np.argsort(ranks, axis=1)
 
@@ -215,13 +222,14 @@ METHODS = {method.name: method for method in (SOBOL, SHAPLEY)}
 
 
 def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floats]:
-    """Return the change of the metric (paths,) from the 5 to the 95 % quantile of each value, and its half band.
+    """Return the change of the metric (paths,) from the 5 to the 95 % quantile of each value, and the half band.
 
-    In the unit of the metric, above 0 where the metric grows with the value; nan for the noise. It is the difference of
-    two means of the metric, given that the value is at one or the other end and with all others as drawn, so that
-    correlated ones go along. Each mean is read from a parabola through the runs nearest to the end (Cleveland, 1979,
-    without weights). The bands come from the spread between as many parts of the blocks as there are scrambles and from
-    how far a parabola is off: by at most twice the difference from the change that the nearer half of those runs gives.
+    The change has the unit of the metric and is positive if the metric grows with the value; it is nan for noise. It is
+    the difference between two conditional means of the metric, with the value at either quantile and all other values
+    as drawn, so that correlated values change too. Each mean is the value of a parabola fitted to the nearest runs
+    (Cleveland, 1979, without weights). The bands add two errors: the spread between parts of the blocks, one part for
+    each scramble, and twice the difference from the change with the nearer half of these runs, as the error of the
+    parabola.
     """
     own = np.unique(evaluated.blocks % SCRAMBLES, return_inverse=True)[1]
     part = np.repeat(own, evaluated.values.size // evaluated.blocks.size)
@@ -245,9 +253,9 @@ def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floa
 
 
 def _levels(values: Floats, inputs: Floats, end: float, part: NDArray[np.intp], nearest: float) -> Floats:
-    """Return the mean of the metric where a value is at an end: from all parts, then without each (parts + 1,).
+    """Return the mean of the metric with a value at an end: from all parts, then without each part (parts + 1,).
 
-    It is read from the fraction of the runs that is ``nearest`` to the end.
+    ``nearest`` is the fraction of the runs, nearest to the end, to which the parabola is fitted.
     """
     count = int(part.max()) + 1
     if math.isnan(end):
