@@ -1,14 +1,14 @@
-"""Every error that ppafo raises on purpose: one tree, one clear line each."""
+"""Exceptions raised intentionally by ppafo: one class tree, one-line messages."""
 
 import contextlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 
 class PpafoError(Exception):
-    """Something a user can put right; the message is one line that says what and how.
+    """Error that a user can correct; the message states the fault and the remedy in one line.
 
-    ``parts`` are its statements one by one, where there are several; ``argument`` is the one of the call that is at
-    fault, where the message does not say so itself.
+    ``parts`` are the separate statements of a message with several. ``argument`` is the faulty argument of the call, if
+    the message itself does not name it.
     """
 
     parts: tuple[str, ...] = ()
@@ -16,50 +16,50 @@ class PpafoError(Exception):
 
 
 class ArgumentError(PpafoError):
-    """An argument of a function or of a command is not usable; the message names it and says what it takes."""
+    """Unusable argument of a function or command; the message names the argument and describes the accepted values."""
 
 
 class UnitError(PpafoError):
-    """A text is not a quantity, or its unit does not fit; the reader of a file adds the file and the key."""
+    """Text that is not a quantity, or has an unsuitable unit; the file reader adds the file and the key."""
 
 
 class ParameterError(PpafoError):
-    """A parameter set, a value or an override is not usable."""
+    """Unusable parameter set, value or override."""
 
 
 class DataError(PpafoError):
-    """A recording or result file cannot be read or written."""
+    """Recording or result file that cannot be read or written."""
 
 
 class ScenarioError(PpafoError):
-    """A scenario file or object asks for something that is not possible."""
+    """Scenario file or object that asks for something impossible."""
 
 
 class SimulationError(PpafoError):
-    """A run could not be carried out, for example because no model could be compiled."""
+    """Run that could not be carried out, for example because no model could be compiled."""
 
 
 class ProgramError(SimulationError):
-    """A law, valve, profile or meter cannot be compiled; the message begins with its file and line where it has one."""
+    """Controller, valve, profile or meter that cannot be compiled; the message starts with file and line if known."""
 
 
 class KindError(PpafoError):
-    """A controller, valve, profile or metric of another package cannot be used."""
+    """Unusable controller, valve, profile or metric of another package."""
 
 
 class StudyError(PpafoError):
-    """A study file asks for something that is not possible, or its results belong to another study."""
+    """Study file that asks for something impossible, or results that belong to another study."""
 
 
 class IdentificationError(PpafoError):
-    """A recording does not allow the requested estimate."""
+    """Recording that does not allow the requested estimate."""
 
 
 @contextlib.contextmanager
 def at_fault(argument: str) -> Iterator[None]:
-    """Note on an error raised within a ``with`` block the argument that is at fault; an outer block has the last word.
+    """Record the faulty argument on an error raised within a ``with`` block; an outer block overrides an inner one.
 
-    The door of the function that was called puts its name before the message.
+    The argument check of the called function puts this name before the message.
     """
     try:
         yield
@@ -70,7 +70,7 @@ def at_fault(argument: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def refused_as(kind: Callable[[str], PpafoError], place: object, *caught: type[Exception]) -> Iterator[None]:
-    """Raise what is caught inside as another error, after the place that it is about: a file, a key, an option."""
+    """Convert exceptions of a ``with`` block to another error, prefixed by ``place``: a file, a key, an option."""
     try:
         yield
     except caught as error:
@@ -78,9 +78,9 @@ def refused_as(kind: Callable[[str], PpafoError], place: object, *caught: type[E
 
 
 def check_all(chains: Iterable[Sequence[Callable[[], None]]]) -> None:
-    """Call all checks; raise one PpafoError, of the class of the first, that says everything that they found.
+    """Call all checks; raise one PpafoError, of the class of the first fault, with the messages of all faults.
 
-    A check of a chain rests on those before it: it is not called where one of them failed.
+    Each check of a chain relies on the previous ones and is skipped once one of them has failed.
     """
     found: list[PpafoError] = []
     for chain in chains:
@@ -92,7 +92,7 @@ def check_all(chains: Iterable[Sequence[Callable[[], None]]]) -> None:
 
 @contextlib.contextmanager
 def noted_in(found: list[PpafoError]) -> Iterator[None]:
-    """Add what is raised within a ``with`` block to a list, for ``raise_noted``, and go on behind the block."""
+    """Append an error raised within a ``with`` block to a list, for ``raise_noted``, and continue after the block."""
     try:
         yield
     except PpafoError as error:
@@ -100,7 +100,7 @@ def noted_in(found: list[PpafoError]) -> Iterator[None]:
 
 
 def raise_noted(found: Sequence[PpafoError]) -> None:
-    """Raise one PpafoError, of the class of the first, that says everything that was noted, each thing once."""
+    """Raise one PpafoError, of the class of the first error, with all messages in the list, each once."""
     parts = tuple(dict.fromkeys(part for error in found for part in error.parts or (str(error),)))
     if len(parts) == 1:
         # One alone keeps its traceback and its class.

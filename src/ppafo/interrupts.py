@@ -1,8 +1,8 @@
-"""Early end of the work: Ctrl-C, a request to end, or a terminal that closes, handled alike.
+"""Early termination: Ctrl-C, a termination request and a closed terminal are handled alike.
 
-Each raises KeyboardInterrupt where the main thread is, and is remembered: a finaliser drops the exception, so does
-compiled code that hands none on, and a library may catch it. Work that goes in blocks reads the memory between two of
-them.
+Each signal raises KeyboardInterrupt in the main thread and is recorded. The record is needed because the exception is
+lost in finalisers, in compiled code that does not propagate it, and in libraries that catch it. Work in blocks checks
+the record between two blocks.
 """
 
 import signal
@@ -18,7 +18,7 @@ _received: list[int] = []
 
 
 def listen() -> None:
-    """Let the signals end this process by KeyboardInterrupt; one that whoever started it lets be ignored stays so."""
+    """Make termination signals raise KeyboardInterrupt; signals that the parent process ignores stay ignored."""
     for name in SIGNALS:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler, end):
@@ -28,7 +28,7 @@ def listen() -> None:
 
 
 def listen_no_more() -> None:
-    """Let the signals do nothing any more: what was to be done is done, and the process ends at once."""
+    """Ignore further termination signals: the work is done, and the process is about to end."""
     for name in SIGNALS:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is _interrupt:
@@ -36,12 +36,12 @@ def listen_no_more() -> None:
 
 
 def is_interrupted() -> bool:
-    """Tell whether a signal came, whatever became of its KeyboardInterrupt."""
+    """Return True if a signal arrived, even if its KeyboardInterrupt was lost."""
     return bool(_received)
 
 
 def check() -> None:
-    """Raise KeyboardInterrupt where a signal came; for every thread, between two blocks of work."""
+    """Raise KeyboardInterrupt if a signal arrived; callable in any thread, between two blocks of work."""
     if _received:
         raise KeyboardInterrupt
 
@@ -52,12 +52,12 @@ def _interrupt(number: int, _frame: FrameType | None) -> None:
 
 
 def _without_dropped_interrupts(dropped: Any) -> None:
-    """Say nothing of an interrupt that was dropped: it is remembered."""
+    """Suppress the report of a dropped KeyboardInterrupt, since the signal is recorded; report other exceptions."""
     if not issubclass(dropped.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(dropped)
 
 
 def _without_interrupts(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
-    """Say nothing of an interrupt that Cython prints itself before it drops it, as in SciPy's Sobol sequence."""
+    """Suppress the report of a KeyboardInterrupt dropped by Cython code, as in SciPy's Sobol sequence."""
     if not issubclass(kind, KeyboardInterrupt):
         sys.__excepthook__(kind, error, traceback)

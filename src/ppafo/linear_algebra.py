@@ -1,6 +1,6 @@
-"""Threads of the libraries of linear algebra: one for the small matrices of a fit, a search or a study.
+"""Thread limit of linear algebra libraries: one thread for the small matrices of a fit, a search or a study.
 
-Where every processor runs models, several threads of a small product would only wait for each other.
+If every processor runs models, several threads for one small product would only wait for each other.
 """
 
 from collections.abc import Callable
@@ -14,10 +14,10 @@ Result = TypeVar("Result")
 
 
 def on_one_thread(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """Return a function that does the same while each library of linear algebra (BLAS) that is loaded has one thread.
+    """Return a function that runs with a single thread in each loaded linear algebra library (BLAS).
 
-    The limit is the whole process's, and is as before once the function returns or raises. Runs of the engine have
-    threads of their own, which stay.
+    The limit applies to the whole process and is restored when the function returns or raises. Runs of the engine have
+    their own threads, which are not limited.
     """
 
     @wraps(function)

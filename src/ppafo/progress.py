@@ -1,4 +1,4 @@
-"""Progress of long work: one report for all kinds of it, and the line that shows it."""
+"""Progress of long tasks: one common report, and the display in a terminal line."""
 
 import time
 from collections.abc import Callable
@@ -13,10 +13,10 @@ _BETWEEN_LINES = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Progress of a task: its name, the fraction done, and the time it took.
+    """Progress of a task: activity, number of items done and in total, and elapsed time [s].
 
-    ``total`` is 0 where nobody knows it. Of ``done``, ``earlier`` were there at the start and ``failed`` failed;
-    ``elapsed`` are the seconds since the start.
+    ``total`` is 0 if unknown. Of the ``done`` items, ``earlier`` were done before the start and ``failed`` failed.
+    ``elapsed`` is the time since the start [s].
     """
 
     activity: str = ""
@@ -28,7 +28,7 @@ class Progress:
     noun: str = "runs"
 
     def line(self) -> str:
-        """Return the state in words."""
+        """Return the progress as text."""
         words = [f"{self.activity} ..."] if self.activity and not self.total else [self.activity] * bool(self.activity)
         if self.total:
             words.append(f"{self.done:,} of {self.total:,} {self.noun} ({100.0 * self.done / self.total:.0f} %)")
@@ -46,12 +46,12 @@ Report = Callable[[Progress], None]
 
 
 def report_nothing(_progress: Progress) -> None:
-    """Watch nothing: where no progress was requested."""
+    """Ignore the report, if no progress was requested."""
 
 
 @final
 class ProgressLine:
-    """Shows progress on a stream: in one line of a terminal, or now and then in a line of its own."""
+    """Display of progress on a stream: one updated line in a terminal, else a new line now and then."""
 
     def __init__(self, stream: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
         self._stream, self._clock = stream, clock
@@ -59,7 +59,7 @@ class ProgressLine:
         self._open = False
 
     def __call__(self, progress: Progress) -> None:
-        """Show the state; KeyboardInterrupt where a signal to end came meanwhile."""
+        """Display the progress; KeyboardInterrupt if a termination signal has arrived."""
         interrupts.check()
         if self._stream.isatty():
             self._stream.write(f"\r\x1b[Kppafo: {progress.line()}")
@@ -75,14 +75,14 @@ class ProgressLine:
         self._stream.flush()
 
     def close(self) -> None:
-        """End the line of a terminal, so that what comes next begins on one of its own."""
+        """End the terminal line, so that later output starts on a new line."""
         if self._open:
             self._stream.write("\n")
             self._open = False
 
 
 def time_text(seconds: float) -> str:
-    """Return a time in the two units that matter: 42 s, 3 min 10 s, 5 h 20 min."""
+    """Return a time [s] as text in its two largest units: 42 s, 3 min 10 s, 5 h 20 min."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

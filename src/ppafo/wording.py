@@ -1,4 +1,4 @@
-"""Words of a message: the nearest name, counts, lists of names, texts of other programs on one line."""
+"""Wording of messages: nearest name, counts, lists of names, and one-line text from other programs."""
 
 import difflib
 import re
@@ -9,12 +9,12 @@ LONGEST_SHOWN = 40
 
 
 def count_of(number: int, noun: str) -> str:
-    """Return a number with its noun, ``1 decay`` or ``3 decays``."""
+    """Return a number with its noun in singular or plural: ``1 decay`` or ``3 decays``."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def said_missing(names: Sequence[str]) -> str:
-    """Return a statement that all of these are missing: ``'a', 'b' and 'c' are missing``."""
+    """Return a statement on missing items: ``'a', 'b' and 'c' are missing``."""
     quoted = [f"'{name}'" for name in names]
     listed = " and ".join(filter(None, (", ".join(quoted[:-1]), quoted[-1])))
     return f"{listed} is missing" if len(quoted) == 1 else f"{listed} are missing"
@@ -31,10 +31,9 @@ _SPELT_OTHERWISE = {"kvs": "kv", "qnn": "qn", "nominal_flow": "qn", "flow_coeffi
 
 
 def nearest_name(name: str, allowed: Iterable[str]) -> str:
-    """Return a hint such as ``, did you mean 'angle'?``, or an empty text where no allowed name is near.
+    """Return a hint such as ``, did you mean 'angle'?``; empty if no allowed name is near.
 
-    One that is far from all in letters may be
-    short for one: its first word, or another.
+    A text that resembles no allowed name may be one word of a name: its first, or any other.
     """
     word, known = str(name), list(allowed)
     before, dot, last = word.rpartition(".")
@@ -61,13 +60,13 @@ def _likeness(name: str, word: str) -> float:
 
 
 def _letters_shared(name: str, word: str) -> int:
-    """Number of letters with which both begin."""
+    """Return the length of the common prefix of two names."""
     pairs = enumerate(zip(name, word, strict=False))
     return next((number for number, (own, other) in pairs if own != other), min(len(name), len(word)))
 
 
 def first_twice(names: Iterable[str]) -> str | None:
-    """Return the first name that was there before, None where all differ; quick for any number of names."""
+    """Return the first repeated name; None if all differ. Runs in linear time."""
     seen: set[str] = set()
     for name in names:
         if name in seen:
@@ -77,12 +76,12 @@ def first_twice(names: Iterable[str]) -> str | None:
 
 
 def one_line(text: object) -> str:
-    """Return a text for a message: on one line, with a mark for whatever cannot be printed."""
+    """Return a text for a message: on one line, with a mark for each unprintable character."""
     words = " ".join(str(text).split())
     return "".join(character if character.isprintable() else "\N{REPLACEMENT CHARACTER}" for character in words)
 
 
 def reason(error: OSError | ValueError) -> str:
-    """Return why a file could not be read or written, as the end of a sentence."""
+    """Return the reason of a failed file access, as the end of a sentence."""
     text = error.strerror if isinstance(error, OSError) and error.strerror else one_line(error)
     return text[:1].lower() + text[1:]

@@ -1,4 +1,4 @@
-"""Figures of what a result folder holds, drawn anew without running anything."""
+"""Figures redrawn from the files of a result folder, without a new run."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +24,7 @@ _NAMED = 6
 
 
 def names_in(folder: Path) -> list[str]:
-    """Return the names of what is in the folder, in order."""
+    """Return the sorted names of the files and folders in a folder."""
     if not folder.is_dir():
         raise DataError(f"{folder}: is not a folder")
     try:
@@ -34,7 +34,10 @@ def names_in(folder: Path) -> list[str]:
 
 
 def draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
-    """Return figures by the stem of their files: of a run, a walk, a study or recordings of the rig; none of others."""
+    """Return the figures of a result folder by the stem of their file names.
+
+    A folder of a run, a walk, a study or rig recordings has figures; the result is empty for other folders.
+    """
     if RUN_FILE in names:
         return {_FIGURE: read_result(folder).plot()}
     if MANIFEST in names:
@@ -57,7 +60,7 @@ def draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
 
 
 def _document(file: Path) -> dict[str, Any]:
-    """Return the names and values of a JSON file."""
+    """Return the content of a JSON file that contains an object."""
     document = read_json(file)
     if not isinstance(document, dict):
         raise DataError(f"{file}: is not a table of names and values")
@@ -65,7 +68,10 @@ def _document(file: Path) -> dict[str, Any]:
 
 
 def what_is_there(folder: Path, names: list[str]) -> tuple[str, dict[str, Any]]:
-    """Say which figures a folder of ppafo has and which file to open; DataError where the folder is another."""
+    """Return a sentence on the figures and the main file of a result folder, with the same as plain data.
+
+    Raises DataError for any other folder.
+    """
     if MARK not in names:
         raise DataError(f"{folder}: is not a result folder of ppafo")
     command = marking_command(folder)

@@ -1,4 +1,4 @@
-"""Arguments: one signature makes the words of a command line and checks the calls in Python."""
+"""Arguments: one signature defines both the command line and the checks of Python calls."""
 
 from ppafo.arguments.door import checked as checked
 from ppafo.arguments.words import Angle as Angle

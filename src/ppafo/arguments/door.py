@@ -1,7 +1,8 @@
-"""The door of every public function: what a call gives is checked by the signature that makes the command line too.
+"""Argument checks of every public function, from the signature that also defines its command line.
 
-``@checked`` reads the annotations at the first call. A value that does not fit is an ArgumentError that names the
-argument, says what it takes and quotes the value; so are words that Python itself would answer with a TypeError.
+``@checked`` reads the annotations at the first call. An unsuitable value raises an ArgumentError that names the
+argument, describes the accepted values and quotes the value. Wrong or missing arguments, for which Python raises a
+TypeError, do the same.
 """
 
 import contextlib
@@ -23,7 +24,7 @@ _EMPTY = inspect.Parameter.empty
 
 
 class _Parameter(NamedTuple):
-    """A parameter: its default, ``inspect.Parameter.empty`` without one, and what it takes."""
+    """Parameter of a checked function: its default (``inspect.Parameter.empty`` for none) and its accepted values."""
 
     default: Any
     taken: Taken
@@ -35,9 +36,10 @@ _reader: ContextVar[_Reader] = ContextVar("_reader", default="caller")
 
 @contextlib.contextmanager
 def read_by(reader: _Reader) -> Iterator[None]:
-    """Write errors in a ``with`` block for a reader: the caller in Python, a function of the package, a command line.
+    """Word errors within a ``with`` block for their reader: Python caller, function of the package, or command line.
 
-    A caller knows arguments and a command line options; a function has arguments that whoever called it never gave.
+    A caller knows arguments, a command line user knows options. A function of the package passes arguments that its
+    caller never gave.
     """
     token = _reader.set(reader)
     try:
@@ -47,9 +49,9 @@ def read_by(reader: _Reader) -> Iterator[None]:
 
 
 def argument_text(name: str, value: str = "", option: str = "") -> str:
-    """Return an argument as who called writes it, and a value with it.
+    """Return an argument, optionally with its value, as written by the caller.
 
-    On the command line that is an ``option``, by default the name with dashes: ``--peak-flow '4 g/s'``.
+    On the command line this is the ``option``, by default the name with dashes: ``--peak-flow '4 g/s'``.
 
     >>> argument_text("peak_flow"), argument_text("peak_flow", "4 g/s")
     ('peak_flow', "peak_flow='4 g/s'")
@@ -61,11 +63,11 @@ def argument_text(name: str, value: str = "", option: str = "") -> str:
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """Return a function with the door before it."""
+    """Return a function that checks and converts its arguments before the call."""
 
     @functools.cache
     def signature() -> tuple[Mapping[str, _Parameter], tuple[str, ...]]:
-        """Return the parameters by name, and the names of those that a call may give by position."""
+        """Return the parameters by name, and the names of those that may be passed by position."""
         parameters = annotated_parameters(function)
         return (
             {name: _Parameter(each.default, taken(each.annotation)) for name, each in parameters.items()},
@@ -97,7 +99,7 @@ def _values(
     positional: Sequence[Any],
     by_name: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Return the arguments of a call by name, each as the function takes it."""
+    """Return the converted arguments of a call by name."""
     if len(positional) > len(places):
         left = [name for name in parameters if name not in places]
         now = list(map(shown, positional[: len(places)]))
@@ -128,7 +130,7 @@ def _values(
 
 
 def _takes(parameter: _Parameter, value: Any) -> bool:
-    """Tell whether a parameter takes a value."""
+    """Return True if a parameter accepts a value."""
     try:
         parameter.taken.take("", value)
     except ArgumentError:

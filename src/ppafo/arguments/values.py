@@ -1,4 +1,4 @@
-"""Conversion of a Python argument by the annotation that also makes it an argument of a command."""
+"""Conversion of Python arguments, by the annotations that also define the arguments of a command."""
 
 import builtins
 import dataclasses
@@ -21,32 +21,32 @@ _SEVERAL = ", or several"
 
 
 class _NotLoaded:
-    """A class that an annotation names and its module does not load: its objects are known by the name of theirs.
+    """Placeholder for a class named in an annotation whose module is not imported; its objects are recognised by name.
 
-    Help of a command loads no such module; who passes an object of the class has loaded it.
+    The help of a command needs no import of the class; a caller that passes an object has imported it already.
     """
 
     def __class_getitem__(cls, _parameters: Any) -> type:
-        """Return the class itself: what it is made of is not asked."""
+        """Return the class itself: type parameters are ignored."""
         return cls
 
 
 class _AnnotationNames(dict[str, Any]):
-    """The names of an annotation: those of its module, of Python, and classes that are not loaded."""
+    """Namespace of an annotation: names of its module and of Python, and placeholders for classes not imported."""
 
     def __contains__(self, name: object) -> bool:
-        """Return True: an unknown name stands for a class that is not loaded."""
+        """Return True: an unknown name stands for a class not imported."""
         return True
 
     def __missing__(self, name: str) -> Any:
-        """Return a name of Python, or a class in the place of one that is not loaded."""
+        """Return a Python builtin, or a placeholder for a class not imported."""
         return getattr(builtins, name) if hasattr(builtins, name) else type(name, (_NotLoaded,), {})
 
 
 def annotated_parameters(function: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
-    """Return the parameters by name, each with what its annotation says; a class not loaded is a ``_NotLoaded``.
+    """Return the parameters by name with evaluated annotations; a class not imported becomes a ``_NotLoaded``.
 
-    A parameter without an annotation has the empty one of ``inspect``, as a function of somebody else may.
+    A parameter of a user function without annotation keeps the empty one of ``inspect``.
     """
     said = _annotations(function)
     # As the function was written: a reader of help may be shown another signature.
@@ -55,13 +55,13 @@ def annotated_parameters(function: Callable[..., Any]) -> Mapping[str, inspect.P
 
 
 def _annotations(function: Callable[..., Any]) -> Mapping[str, Any]:
-    """Return the annotations of a function by name; a class that is not loaded is a ``_NotLoaded``."""
+    """Return the evaluated annotations of a function by name; a class not imported becomes a ``_NotLoaded``."""
     names = _AnnotationNames(vars(sys.modules[function.__module__]))
     return typing.get_type_hints(function, localns=names, include_extras=True)
 
 
 class _Shown(NamedTuple):
-    """A type or a default as help shows it: a text without quotation marks."""
+    """Type or default as displayed by help: a text without quotation marks."""
 
     text: str
 
@@ -71,9 +71,9 @@ class _Shown(NamedTuple):
 
 
 def show_plainly(value: Any) -> None:
-    """Give a function, or the fields of a dataclass, the signature that help shows: plain types, functions by name.
+    """Set the signature displayed by help for a function or a dataclass: plain types, and functions by name.
 
-    The annotations themselves, of which the door and the command line are made, stay.
+    The annotations themselves, from which argument checks and command lines are built, remain unchanged.
     """
     function = vars(value)["__init__"] if dataclasses.is_dataclass(value) else value
     if not inspect.isfunction(function):
@@ -95,7 +95,7 @@ def show_plainly(value: Any) -> None:
 
 
 def _type_text(annotation: Any) -> str:
-    """Return an annotation as people write it: ``Scenario | str | Path``, without modules and what ``Word`` says."""
+    """Return an annotation as plain text, ``Scenario | str | Path``, without module names and ``Word``."""
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is Annotated:
         return _type_text(inner[0])
@@ -117,9 +117,9 @@ _NAMES: Mapping[Any, str] = {types.NoneType: "None", ...: "..."}
 
 
 class Taken(NamedTuple):
-    """Values that a parameter takes: what a message calls them, and what turns one into the value of the function.
+    """Accepted values of a parameter: their description in messages, and their conversion to the function's value.
 
-    ``take`` gets the name that the value has in a message, and the value; ArgumentError for one that does not fit.
+    ``take`` is called with the name of the value in messages and the value; it raises ArgumentError if unsuitable.
     """
 
     what: str
@@ -128,7 +128,7 @@ class Taken(NamedTuple):
 
 
 def shown(value: Any) -> str:
-    """Return a value as a message has it: short, on one line."""
+    """Return a value as quoted in a message: short, on one line."""
     if isinstance(value, str | bytes | int | float | complex | Path | list | tuple | dict | set | None):
         text = one_line(repr(value) if isinstance(value, str | Path) else reprlib.repr(value))
         return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
@@ -136,7 +136,7 @@ def shown(value: Any) -> str:
 
 
 def taken(annotation: Any) -> Taken:
-    """Return what a parameter with an annotation takes."""
+    """Return the accepted values of a parameter with an annotation."""
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is Annotated:
         # Python flattens nested annotations with the outermost last: that one has the last word.
@@ -173,13 +173,13 @@ def _is_iterable(kind: Any) -> bool:
 
 
 def _is_instance(kind: type, value: Any) -> bool:
-    """Tell whether a value is of a class, which may be one that is not loaded."""
+    """Return True if a value is an instance of a class, which may be a placeholder for one not imported."""
     is_named = issubclass(kind, _NotLoaded) and any(base.__name__ == kind.__name__ for base in type(value).__mro__)
     return is_named or isinstance(value, kind)
 
 
 def _that_is(is_taken: bool, value: Any) -> Any:
-    """Return a value that is taken; ValueError for another."""
+    """Return the value if ``is_taken`` accepts it; ValueError otherwise."""
     if not is_taken:
         raise ValueError
     return value
@@ -198,7 +198,7 @@ def _one(what: str, take: Callable[[Any], Any]) -> Taken:
 
 
 def _several(element: Taken) -> Taken:
-    """Return what takes one or several: one alone stands for a list of one, an iterator is gone through once."""
+    """Return the converter of one or several values to a tuple; a single value counts as a list of one."""
 
     def take(name: str, value: Any) -> Any:
         # A table of pandas or xarray has keys as a dictionary has: it would be gone through by names of columns.
@@ -210,7 +210,7 @@ def _several(element: Taken) -> Taken:
 
 
 def _mapping(element: Taken) -> Taken:
-    """Return what takes a dictionary by names; a copy, in which each value is as it is taken."""
+    """Return the converter of a dictionary with text keys; it returns a copy with each value converted."""
 
     def take(name: str, value: Any) -> dict[str, Any]:
         if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
@@ -221,7 +221,7 @@ def _mapping(element: Taken) -> Taken:
 
 
 def _either(kinds: list[Taken], allows_none: bool) -> Taken:
-    """Return what takes the first of several kinds that fits."""
+    """Return the converter that applies the first suitable one of several converters."""
     if len(kinds) == 1:
         return kinds[0]._replace(allows_none=allows_none)
     alone = _in_words([kind.what for kind in kinds if not kind.what.endswith(_SEVERAL)])
@@ -245,13 +245,13 @@ def _either(kinds: list[Taken], allows_none: bool) -> Taken:
 
 
 def _at_hand(what: str, value: Any) -> str:
-    """Return which attribute of a value, such as a result, is what a parameter takes; an empty text where none is."""
+    """Return a hint at the attribute of a value, such as a result, that the parameter accepts; empty if none."""
     names = [name for name in ("recording", "scenario") if f"a {name.capitalize()}" in what and hasattr(value, name)]
     return f"; its '.{names[0]}' is one" if names else ""
 
 
 def _in_words(kinds: list[str]) -> str:
-    """Return names of kinds of values as one of them: ``a name, a path or a Recording``; an empty text without any."""
+    """Return a list of value descriptions as text: ``a name, a path or a Recording``; empty for no descriptions."""
     *others, last = dict.fromkeys(kinds) or [""]
     what = f"{', '.join(others)} or {last}" if others else last
     # A text and a path are one way to name something.
@@ -259,7 +259,7 @@ def _in_words(kinds: list[str]) -> str:
 
 
 def _taken_path(value: Any) -> Path:
-    """Return a path; a text is left to what takes names, which stands before it wherever both are taken."""
+    """Return a Path; a text is left to the converter of names, which precedes this one wherever both are accepted."""
     path = Path(taken_text(os.fspath(value)))
     if "\0" in str(path):
         raise ValueError

@@ -1,8 +1,8 @@
-"""Types of arguments: what each is called in the help, how its text is read, and which Python values it takes.
+"""Argument types: name in the help, conversion from text, and accepted Python values.
 
-A function annotates its parameters with them: ``mass: Mass | None = None`` is the option ``--mass MASS``, whose text is
-read with its unit, and in Python a number in SI or such a text. ``Word`` says the rest; the help of a parameter is its
-line in the docstring. Nothing heavy is loaded for them.
+Functions annotate their parameters with these types: ``mass: Mass | None = None`` is the option ``--mass MASS``,
+converted from text with a unit, and in Python a number in SI or such a text. ``Word`` defines all else; the help of a
+parameter is its line in the docstring. The module imports nothing that is slow to load.
 """
 
 import math
@@ -42,13 +42,12 @@ _MAXIMUM_DIGITS, _ABOVE_ALL, _MAXIMUM_LEVELS = 40, 10**40, 60
 class Word:
     """Text form of a parameter: how a command shows and parses it, and the values that a Python call may give.
 
-    ``metavar`` is its name in the help, ``read`` turns the text into the value. ``take`` turns a Python value into the
-    one that the function gets, with a ValueError for any other, and ``what`` names the values that it takes; without it
-    the type of the annotation decides. ``option`` is its name where that is not the name of the parameter, and makes an
-    option of a parameter that Python takes by position. ``help`` is the default help text of the option.
-    ``const`` is what an option without its value stands for, ``off`` the option that switches a flag off.
-    ``is_repeated`` is said of several values whose type is not a sequence alone; ``takes_all`` where ``take`` gets all
-    of them at once.
+    ``metavar`` is the name in the help. ``read`` converts the text to the value. ``take`` converts a Python value, with
+    a ValueError for an unsuitable one, and ``what`` describes the accepted values; without ``take`` the annotated type
+    decides. ``option`` is the name of the option if different from the parameter; it also makes an option of a
+    parameter that Python passes by position. ``help`` is the default help text. ``const`` is the value of an option
+    given without a value. ``off`` is the option that clears a flag. ``is_repeated`` marks several values whose type is
+    not just a sequence. With ``takes_all``, ``take`` is called once with all values.
     """
 
     metavar: str = ""
@@ -64,12 +63,12 @@ class Word:
 
 
 def whole_number(text: str) -> int:
-    """Return a whole number from 0 on; ArgumentError for any other text."""
+    """Return a whole number, 0 or more; ArgumentError for any other text."""
     return _number_from(text, 0)
 
 
 def counting_number(text: str) -> int:
-    """Return a whole number from 1 on; ArgumentError for any other text."""
+    """Return a whole number, 1 or more; ArgumentError for any other text."""
     return _number_from(text, 1)
 
 
@@ -104,18 +103,18 @@ def fraction(text: str) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _NumberRange:
-    """Numbers from ``lowest`` or ``above`` to ``highest``, in a unit."""
+    """Range of numbers from ``lowest`` (included) or ``above`` (excluded) to ``highest`` (included)."""
 
     lowest: float = -math.inf
     above: float = -math.inf
     highest: float = math.inf
 
     def __contains__(self, value: float) -> bool:
-        """Tell whether a number is in the range; nan never is."""
+        """Return True if a number is in the range; False for nan."""
         return self.lowest <= value <= self.highest and value > self.above
 
     def words(self, unit: str) -> str:
-        """Return the range in words, such as ``above 0 s, at most 3600 s``; an empty text where there is no end."""
+        """Return the range as text, such as ``above 0 s, at most 3600 s``; empty for an unlimited range."""
         of = f" {unit}".rstrip()
         ends = (
             (f"above {self.above:g}{of}", self.above > -math.inf),
@@ -131,7 +130,7 @@ FROM_ZERO = _NumberRange(lowest=0.0)
 
 
 class NumberWithUnit(float):
-    """A number in SI with the unit in which it was given, in which people are shown it again."""
+    """Number in SI that remembers the unit in which it was given, for display."""
 
     __slots__ = ("unit",)
     unit: str
@@ -143,12 +142,12 @@ class NumberWithUnit(float):
         return given
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return what a copy is made of."""
+        """Return the constructor and its arguments for copy and pickle."""
         return NumberWithUnit, (float(self), self.unit)
 
 
 def units_given(by_si_unit: Mapping[str, float | None]) -> dict[str, str]:
-    """Return the units of the numbers given with a unit, by unit in SI; a pressure also sets its differences."""
+    """Return the units in which numbers were given, by SI unit; a pressure unit also sets the unit of differences."""
     units: dict[str, str] = {}
     for si_unit, value in by_si_unit.items():
         if isinstance(value, NumberWithUnit) and value.unit != SI:
@@ -157,9 +156,9 @@ def units_given(by_si_unit: Mapping[str, float | None]) -> dict[str, str]:
 
 
 def quantity(si_unit: str, allowed: _NumberRange = ANY) -> Callable[[str], float]:
-    """Return what turns a text with a unit, such as ``10 min``, into a number in SI; ArgumentError for others.
+    """Return a converter of texts with a unit, such as ``10 min``, to numbers in SI; ArgumentError for other texts.
 
-    A number alone is refused with examples, and one outside the range.
+    A number without unit is refused with examples; a number outside the range is refused.
     """
 
     def value_of(text: str) -> float:
@@ -181,7 +180,7 @@ def quantity(si_unit: str, allowed: _NumberRange = ANY) -> Callable[[str], float
 
 
 def minutes(text: str) -> float:
-    """Return minutes from a number or a time with its unit; ArgumentError for any other text."""
+    """Return a time [min] from a number or a text with unit; ArgumentError for any other text."""
     try:
         value = float(text) if _NUMBER.fullmatch(text) else parse_quantity(text, "s") / 60.0
     except UnitError as error:
@@ -192,7 +191,7 @@ def minutes(text: str) -> float:
 
 
 def times(text: str) -> tuple[float, ...]:
-    """Return times [s] that are separated by commas; ArgumentError for any other text."""
+    """Return times [s] from a comma-separated list; ArgumentError for any other text."""
     try:
         found = tuple(float(number_text(part)) for part in text.split(","))
     except ValueError:
@@ -221,9 +220,9 @@ def point(text: str) -> float | str:
 
 
 def taken_text(value: Any) -> str:
-    """Return a text with something in it; ValueError for anything else.
+    """Return a text that is not empty; ValueError for anything else.
 
-    Of an enumeration or another subclass it is the text itself, whatever its ``str()`` says.
+    A member of a text enumeration or another subclass of str becomes its text content, not its ``str()``.
     """
     if not isinstance(value, str) or not value.strip() or "\0" in value:
         raise ValueError
@@ -231,9 +230,9 @@ def taken_text(value: Any) -> str:
 
 
 def _single(value: Any) -> Any:
-    """Python value of an array without axes, None of a masked one and of a time; any other value as it is.
+    """Return an array without axes as a Python value, None if masked or a time; any other value unchanged.
 
-    A time of NumPy would count as a whole number otherwise, and a masked value as the one that it hides.
+    Otherwise a NumPy time would count as a whole number, and a masked value as the hidden number.
     """
     if type(value) is float or getattr(value, "ndim", None) != 0 or not hasattr(value, "item"):
         return value
@@ -242,7 +241,7 @@ def _single(value: Any) -> Any:
 
 
 def taken_flag(value: Any) -> bool:
-    """Return True or False, also of NumPy; ValueError for anything else."""
+    """Return True or False, also from NumPy; ValueError for anything else."""
     flag = _single(value)
     if not isinstance(flag, bool):
         raise ValueError
@@ -250,7 +249,7 @@ def taken_flag(value: Any) -> bool:
 
 
 def taken_whole(least: int) -> Callable[[Any], int]:
-    """Return what takes a whole number from ``least`` on, also of NumPy; ValueError for anything else."""
+    """Return a converter of whole numbers not below ``least``, also from NumPy, with ValueError for others."""
 
     def take(value: Any) -> int:
         whole = _single(value)
@@ -262,7 +261,7 @@ def taken_whole(least: int) -> Callable[[Any], int]:
 
 
 def taken_number(allowed: _NumberRange = ANY, read: Callable[[str], float] | None = None) -> Callable[[Any], float]:
-    """Return what takes a finite number in a range, also of NumPy, or a text that ``read`` reads."""
+    """Return a converter of finite numbers in a range, also from NumPy, or of texts converted by ``read``."""
 
     def take(value: Any) -> float:
         if isinstance(value, str) and read is not None and not _NUMBER.fullmatch(value.strip()):
@@ -280,7 +279,8 @@ def taken_number(allowed: _NumberRange = ANY, read: Callable[[str], float] | Non
 def taken_overrides(value: Any) -> tuple[str, ...]:
     """Return overrides as texts ``PATH=VALUE``, from one, several, or a dictionary; ValueError for anything else.
 
-    A dictionary has paths, or tables of them, and texts, flags or numbers, which are in SI units.
+    The keys of a dictionary are paths or sections with nested dictionaries; values are texts, flags, or numbers in SI
+    units.
     """
     if isinstance(value, Mapping):
         return tuple(_overrides_of(value, ""))
@@ -313,9 +313,9 @@ def _overrides_of(table: Mapping[Any, Any], section: str) -> Iterator[str]:
 
 
 def taken_document(value: Any) -> dict[str, Any]:
-    """Return nested dictionaries as the plain data of a file, a copy; ValueError for anything but a dictionary.
+    """Return a copy of nested dictionaries as the plain data of a file; ValueError for anything but a dictionary.
 
-    Dictionaries of any class, lists and iterators, texts and numbers also of NumPy. ArgumentError for None.
+    Accepts mappings of any class, lists, iterators, texts and numbers, also from NumPy. Raises ArgumentError for None.
     """
     if not isinstance(value, Mapping):
         raise ValueError
@@ -370,7 +370,7 @@ def taken_point(value: Any) -> float | str:
 
 
 def _quantity_word(metavar: str, si_unit: str, allowed: _NumberRange = ANY) -> Word:
-    """Return the word of a quantity: a text with its unit, and in Python a number in SI as well."""
+    """Return the argument type of a quantity: a text with a unit, in Python also a number in SI."""
     read = quantity(si_unit, allowed)
     shown = {"Pa_a": "Pa (absolute)"}.get(si_unit, si_unit)
     ends = f", {allowed.words(shown)}," if allowed.words(shown) else ""
@@ -384,7 +384,7 @@ def _quantity_word(metavar: str, si_unit: str, allowed: _NumberRange = ANY) -> W
 
 
 def fraction_word(help_text: str = "") -> Word:
-    """Return the word of a fraction from 0 to 1."""
+    """Return the argument type of a fraction from 0 to 1."""
     return Word(
         "FRACTION",
         fraction,
@@ -395,7 +395,7 @@ def fraction_word(help_text: str = "") -> Word:
 
 
 def whole_word(least: int, help_text: str = "") -> Word:
-    """Return the word of a whole number from ``least`` on."""
+    """Return the argument type of a whole number not below ``least``."""
     read = whole_number if least == 0 else counting_number
     what = f"a whole number, {least} or more, of at most {_MAXIMUM_DIGITS} digits"
     return Word("N", read, taken_whole(least), what, help=help_text)

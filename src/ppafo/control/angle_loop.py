@@ -1,4 +1,4 @@
-"""Gains of laws that hold an angle, which follow the device: SIMC rules for two integrators (Skogestad 2003).
+"""Gains of angle controllers, derived from the device: SIMC rules for a double integrator (Skogestad 2003).
 
 What a torque T moves answers with the angle by I angle'' = T, two integrators more than ``torque_loop`` has. In a
 cascade the inner loop makes the torque, with the rules of ``torque_loop`` as late by 2 theta in all, and the outer one
@@ -34,38 +34,38 @@ LOAD_TIME = "time constant of the observed load"
 TORQUE_LAG = "time constant of the torque loop"
 TOLERANCE = "tolerance of the angle"
 REST_DISTANCE = "turn of a joint that shows motion"
-"""Names of the loop's numbers that the default of a setting may follow; the functions below compute them."""
+"""Names of the parameters of the loop from which a setting may take its default; the functions below compute them."""
 
 OUTER_TIMES_INNER = 8.0
 """1/(w theta): four times the delay of the inner loop, which is two dead times."""
 
 STIFFENED = 1.7
-"""Largest w over 1/(8 theta) where static friction asks for a stiffness."""
+"""Largest w divided by 1/(8 theta) where static friction requires a stiffness."""
 LOAD_PERIODS = 4.0
-"""Time constant of the observed load over 1/w: a quicker observer makes the loop swing."""
+"""Time constant of the load observer times w; a faster observer makes the loop oscillate."""
 LEAST_TOLERANCE = math.radians(0.5)
-"""rad: about the play of an orthosis on its wearer, whatever moves it."""
+"""Smallest tolerance [rad]: about the play of an orthosis on its wearer, for every drive."""
 STEPS_OF_TOLERANCE = 2.0
-"""Resolutions of the angle sensor that a tolerance is at least; and as many standard deviations of its noise, twice."""
+"""Smallest tolerance in resolutions of the angle sensor, or in doubled standard deviations of the sensor noise."""
 NOISE_IN_FILTER = 6.0
-"""Standard deviations of the angle's noise that the filter of its rate takes for a step."""
+"""Standard deviations of the angle noise that the rate filter counts as one resolution step."""
 NOISE_AT_REST = 7.0
-"""Standard deviations of the angle's noise that show motion: fewer come by chance several times a second."""
+"""Standard deviations of the angle noise that count as motion; fewer occur by chance several times a second."""
 REST_RATE = 0.02
 """Rate [rad/s] below which a joint counts as resting."""
 
 USUAL_SWING = 0.05
-"""rad: the swing at which dry friction counts as a damping."""
+"""Amplitude of oscillation [rad] for which the equivalent damping of dry friction is computed."""
 LEAST_DAMPING_RATIO = 0.01
 THIRD = 1.0 / 3.0
 
 
 class Joint(NamedTuple):
-    """Joint dynamics: inertia, friction and range of what turns, with the gas behind it.
+    """Joint dynamics for the gains of an angle controller: moving parts on the gas spring of the chambers.
 
-    Inertia [kg m^2], gas spring [N m/rad], viscous damping [N m s/rad], friction in motion and static friction [N m],
-    the way [rad] that it is to go at a time, largest torque of gravity [N m], and resolution and noise of the angle
-    sensor [rad].
+    ``inertia`` [kg m^2], gas ``stiffness`` [N m/rad], viscous ``damping`` [N m s/rad], kinetic ``friction`` [N m],
+    ``static_friction`` [N m], typical ``travel`` per move [rad], largest ``gravity`` torque [N m], ``resolution`` [rad]
+    and ``noise`` [rad] of the angle sensor.
     """
 
     inertia: float
@@ -80,13 +80,13 @@ class Joint(NamedTuple):
 
 
 def bandwidth(loop: TorqueLoop, joint: Joint) -> float:
-    """Bandwidth w [rad/s]: as the torque loop allows, or as quickly as the torque can change on the way."""
+    """Bandwidth w [rad/s], limited by the dead time of the torque loop and by the torque rate over the travel."""
     by_dead_time = 1.0 / (OUTER_TIMES_INNER * loop.dead_time)
     return min(by_dead_time, power(max(loop.rate, 1.0e-9) / (joint.inertia * joint.travel), THIRD))
 
 
 def angle_stiffness(loop: TorqueLoop, joint: Joint) -> float:
-    """Gain k_a = I w^2 [N m/rad], or what breaks static friction within the way: torque requested per angle error."""
+    """Gain k_a [N m/rad], requested torque per angle error: I w^2, or more where static friction requires it."""
     frequency = bandwidth(loop, joint)
     stiffest = max(frequency, STIFFENED / (OUTER_TIMES_INNER * loop.dead_time))
     breaking = joint.static_friction / max(joint.travel, LEAST_TOLERANCE)
@@ -94,42 +94,42 @@ def angle_stiffness(loop: TorqueLoop, joint: Joint) -> float:
 
 
 def stiffened(loop: TorqueLoop, joint: Joint) -> float:
-    """Bandwidth w = sqrt(k_a / I) [rad/s] with the stiffness that the joint has."""
+    """Bandwidth w = sqrt(k_a / I) [rad/s] for the gain k_a of ``angle_stiffness``."""
     return math.sqrt(angle_stiffness(loop, joint) / joint.inertia)
 
 
 def angle_damping(loop: TorqueLoop, joint: Joint) -> float:
-    """Gain d_a = 2 I w [N m s/rad]: torque requested per rate of that error, for two equal roots."""
+    """Gain d_a = 2 I w [N m s/rad], requested torque per rate of the angle error, for two equal roots."""
     return 2.0 * joint.inertia * stiffened(loop, joint)
 
 
 def load_time(loop: TorqueLoop, joint: Joint) -> float:
-    """Time constant [s] of the observed load, 4/w."""
+    """Time constant [s] of the load observer, 4/w."""
     return LOAD_PERIODS / stiffened(loop, joint)
 
 
 def torque_lag(loop: TorqueLoop, _joint: Joint) -> float:
-    """Time constant [s] of the torque loop with the gain 1/(2 R theta): 2 theta."""
+    """Time constant 2 theta [s] of the torque loop with the gain 1/(2 R theta)."""
     return 2.0 * loop.dead_time
 
 
 def tolerance(_loop: TorqueLoop, joint: Joint) -> float:
-    """Angle error [rad] within which nothing is learnt: 0.5 deg, or what the sensor cannot tell."""
+    """Angle error [rad] within which the load is not adapted: 0.5 deg, or the sensor resolution if coarser."""
     unseen = STEPS_OF_TOLERANCE * max(joint.resolution, 2.0 * joint.noise)
     return max(LEAST_TOLERANCE, unseen)
 
 
 def rest_distance(loop: TorqueLoop, joint: Joint) -> float:
-    """Turn [rad] that shows motion: more than a step of the sensor or its noise, and than ``REST_RATE`` in 2 theta."""
+    """Rotation [rad] that counts as motion: more than sensor resolution and noise, and ``REST_RATE`` times 2 theta."""
     unseen = 1.5 * joint.resolution + NOISE_AT_REST * joint.noise
     return max(REST_RATE * torque_lag(loop, joint), unseen)
 
 
 def rate_filter(loop: TorqueLoop, joint: Joint) -> float:
-    """Time constant [s] of the filter on the measured rate: as late as the torque loop, at most 0.1/w.
+    """Time constant [s] of the filter on the measured rate: the lag of the torque loop, at most 0.1/w.
 
-    A step of a coarse sensor may open the valve by half, and its noise by a tenth in the mean: for that the filter is
-    slower, up to 0.3/w.
+    One resolution step of a coarse sensor may open the valve by half, and the sensor noise by a tenth on average; the
+    time constant is raised up to 0.3/w to respect both limits.
     """
     per_angle = 2.0 * inner_gain(loop, joint) * angle_damping(loop, joint)
     frequency = stiffened(loop, joint)
@@ -138,35 +138,36 @@ def rate_filter(loop: TorqueLoop, joint: Joint) -> float:
 
 
 def inner_gain(loop: TorqueLoop, _joint: Joint) -> float:
-    """Command per torque error [1/(N m)], as in the torque loop: 1/(2 R theta)."""
+    """Gain 1/(2 R theta) [1/(N m)] of the inner torque loop: valve command per torque error."""
     return 0.5 / torque_in_dead_time(loop)
 
 
 def gravity(_loop: TorqueLoop, joint: Joint) -> float:
-    """Largest torque of gravity on the joint [N m], which a default may follow."""
+    """Largest gravity torque on the joint [N m], as a default for settings."""
     return joint.gravity
 
 
 def friction(_loop: TorqueLoop, joint: Joint) -> float:
-    """Torque of the joint's friction in motion [N m], which a default may follow."""
+    """Kinetic friction torque of the joint [N m], as a default for settings."""
     return joint.friction
 
 
 def static_friction(_loop: TorqueLoop, joint: Joint) -> float:
-    """Torque of the joint's static friction [N m], which a default may follow."""
+    """Static friction torque of the joint [N m], as a default for settings."""
     return joint.static_friction
 
 
 def inertia(_loop: TorqueLoop, joint: Joint) -> float:
-    """Inertia of the joint [kg m^2], which a default may follow."""
+    """Inertia of the joint [kg m^2], as a default for settings."""
     return joint.inertia
 
 
 def slow_loop(loop: TorqueLoop, joint: Joint) -> TorqueLoop:
-    """The loop [rad/s, s] that a law sees which opens the valve by the error of the angle: R/S, and what comes late.
+    """Integrator rate R/S [rad/s] and effective dead time [s] for a law that opens the valve by the angle error.
 
-    With its k_p = 1/(2 R theta) the rules keep half of the gain at which the mass on its gas spring begins to swing,
-    k_p R/S = d/I, for a damping d, viscous and of dry friction at a swing.
+    With the gain k_p = 1/(2 R theta) the rules keep half of the gain at which the mass on its gas spring becomes
+    unstable, k_p R/S = d/I. The damping d is viscous damping plus the equivalent damping of dry friction for an
+    oscillation.
     """
     frequency = math.sqrt(joint.stiffness / joint.inertia)
     dry = 4.0 * joint.friction / (math.pi * frequency * USUAL_SWING)

@@ -1,4 +1,4 @@
-"""The controllers and profiles that a scenario can name. To add one here: a module and one line."""
+"""Controllers and profiles that a scenario can name. To add one: a module, and one line in this table."""
 
 from ppafo.control import profiles
 from ppafo.control.kind import ControllerKind, ProfileKind

@@ -1,4 +1,4 @@
-"""Profiles of reference and prescribed angle: a level, ramp and hold (the paper's torque task), a sine, a table."""
+"""Profiles of a reference or a prescribed angle: constant, ramp and hold (torque task of the paper), sine, table."""
 
 import math
 from typing import Annotated, NamedTuple
@@ -20,7 +20,7 @@ def constant_value(profile: ConstantProfile, time: float) -> tuple[float, float,
 
 
 def constant_bounds(profile: ConstantProfile) -> tuple[float, float]:
-    """Lowest and highest value [N m or rad]: the level, twice."""
+    """Lowest and highest value [N m or rad], both equal to the level."""
     return profile.level, profile.level
 
 
@@ -37,7 +37,7 @@ CONSTANT = ProfileKind(
 
 
 class RampHold(NamedTuple):
-    """Level before the ramp and after it, start of the ramp and its length [s]."""
+    """Level before and after the ramp [N m or rad], start of the ramp [s] and duration of the ramp [s]."""
 
     start_level: Annotated[float, Number("", "level before the ramp", 0.0)]
     level: Annotated[float, Number("", "level of the hold")]
@@ -89,7 +89,7 @@ def sine_value(profile: Sine, time: float) -> tuple[float, float, float]:
 
 
 def sine_bounds(profile: Sine) -> tuple[float, float]:
-    """Lowest and highest sine_value [N m or rad]."""
+    """Lowest and highest value [N m or rad] of a sine."""
     swing = abs(profile.amplitude)
     return profile.level - swing, profile.level + swing
 
@@ -107,22 +107,23 @@ SINE = ProfileKind(
 
 
 KNOTS = 32
-"""Knots in the table; the first one is at time 0."""
+"""Number of knots in the table; the first knot is at time 0."""
 NEVER = 1.0e6
 """Time [s] of a knot that is not used."""
 
 
 class Knot(NamedTuple):
-    """Time [s] and value of a knot after the first one."""
+    """Time [s] and value of a knot; the first knot of a table is not of this class."""
 
     time: float
     value: float
 
 
 class TabulatedProfile(NamedTuple):
-    """Level that is added to all values, length of a repetition [s], value of the first knot, and the other knots.
+    """Offset added to all values, period of the repetition [s], value of the first knot at 0 s, and the other knots.
 
-    A knot at or after the end of a repetition is not used; from the last one a line leads to the first.
+    Knots at or after the end of the period are not used; the profile is linear from the last used knot to the first
+    one.
     """
 
     level: float
@@ -132,7 +133,7 @@ class TabulatedProfile(NamedTuple):
 
 
 class ProfileSegment(NamedTuple):
-    """A line between two knots: times [s] and values of its start and end."""
+    """Line segment between two knots: start and end times [s], and values at start and end."""
 
     start: float
     first: float
@@ -141,7 +142,7 @@ class ProfileSegment(NamedTuple):
 
 
 def next_segment(segment: ProfileSegment, place: float, time: float, value: float) -> ProfileSegment:
-    """The segment, or the next one, to the knot at ``time`` [s], where ``place`` [s] has passed its end."""
+    """Return the segment, or the next one up to the knot at ``time`` [s] if ``place`` [s] is past the segment's end."""
     passed = place >= segment.end
     return ProfileSegment(
         start=segment.end if passed else segment.start,
@@ -152,7 +153,7 @@ def next_segment(segment: ProfileSegment, place: float, time: float, value: floa
 
 
 def table_value(profile: TabulatedProfile, time: float) -> tuple[float, float, float]:
-    """Value, rate and second derivative (0 also at the corners) at a time [s] from 0 on."""
+    """Value, rate and second derivative (0 also at the corners) at a time [s] of 0 or later."""
     place = time - profile.period * float(int(time / profile.period))
     # Every knot is looked at: a search would branch, and 32 selects cost little in vector code.
     segment = ProfileSegment(start=0.0, first=profile.value_01, end=profile.knots[0].time, last=profile.knots[0].value)
@@ -167,13 +168,13 @@ def table_value(profile: TabulatedProfile, time: float) -> tuple[float, float, f
 
 
 def used_knots(profile: TabulatedProfile) -> list[tuple[float, float]]:
-    """Times [s] and values, without the level, of the knots that are used."""
+    """Times [s] and values, without the offset ``level``, of the used knots."""
     knots = [(0.0, profile.value_01), *((knot.time, knot.value) for knot in profile.knots)]
     return [knot for knot in knots if knot[0] < profile.period]
 
 
 def table_bounds(profile: TabulatedProfile) -> tuple[float, float]:
-    """The lowest and the highest value [N m or rad] of the knots that are used, with the level."""
+    """Lowest and highest value [N m or rad] of the used knots, with the offset ``level``."""
     lowest, highest = profile.value_01, profile.value_01
     for knot in profile.knots:
         is_used = knot.time < profile.period
@@ -183,7 +184,7 @@ def table_bounds(profile: TabulatedProfile) -> tuple[float, float]:
 
 
 class KnotWindow(NamedTuple):
-    """Four knots around a place, times [s] and values: the one before, both ends of the stretch, the one after."""
+    """Four consecutive knots, times [s] and values; the time of interest lies between ``start`` and ``end``."""
 
     earlier: Knot
     start: Knot
@@ -192,7 +193,7 @@ class KnotWindow(NamedTuple):
 
 
 def next_window(window: KnotWindow, place: float, knot: Knot) -> KnotWindow:
-    """The window, or the next one, after which ``knot`` comes, where ``place`` [s] has passed its end."""
+    """Return the window, shifted by one knot to include ``knot`` if ``place`` [s] is past the window's end."""
     passed = place >= window.end.time
     earlier, start, end, later = window.start, window.end, window.later, knot
     return KnotWindow(
@@ -206,7 +207,7 @@ def next_window(window: KnotWindow, place: float, knot: Knot) -> KnotWindow:
 
 
 def repeated_knot(profile: TabulatedProfile, before: Knot, knot: Knot) -> Knot:
-    """A knot; the first or second knot of the next repetition where this one has no more."""
+    """Return the knot, or the first or second knot of the next period if the knot lies after the end of the period."""
     is_used = knot.time < profile.period
     is_first = before.time < profile.period
     second_is_used = profile.knots[0].time < profile.period
@@ -220,7 +221,7 @@ def repeated_knot(profile: TabulatedProfile, before: Knot, knot: Knot) -> Knot:
 
 
 def window_at(profile: TabulatedProfile, place: float) -> KnotWindow:
-    """The knots about a place [s] of a repetition, whose end is later than the place."""
+    """Return the knots around a time [s] within one period; the time lies before the end of the window."""
     first = Knot(0.0, profile.value_01)
     second = repeated_knot(profile, first, profile.knots[0])
     third = repeated_knot(profile, second, profile.knots[1])
@@ -241,9 +242,10 @@ def window_at(profile: TabulatedProfile, place: float) -> KnotWindow:
 
 
 def smooth_value(profile: TabulatedProfile, time: float) -> tuple[float, float, float]:
-    """Value, rate and second derivative at a time [s] from 0 on, of cubic curves through the knots.
+    """Value, rate and second derivative of a cubic spline through the knots, at a time [s] of 0 or later.
 
-    Each has at its ends the slope of the parabola through a knot and its two neighbours, so that the rate has no jump.
+    The slope at a knot is the slope of the parabola through the knot and its two neighbours, so that the rate is
+    continuous.
     """
     place = time - profile.period * float(int(time / profile.period))
     at = window_at(profile, place)
@@ -263,13 +265,13 @@ def smooth_value(profile: TabulatedProfile, time: float) -> tuple[float, float, 
 
 
 def until_knot(profile: TabulatedProfile, time: float) -> float:
-    """Time [s] from one at 0 or later to the next knot, where the second derivative of the cubic curves jumps."""
+    """Time [s] from ``time`` (0 or later) to the next knot, where the second derivative of the cubic spline jumps."""
     place = time - profile.period * float(int(time / profile.period))
     return window_at(profile, place).end.time - place
 
 
 def smooth_bounds(profile: TabulatedProfile) -> tuple[float, float]:
-    """The lowest and the highest value [N m or rad] of the cubic curves, which may go beyond their knots."""
+    """Lowest and highest value [N m or rad] of the cubic spline, which may overshoot its knots."""
     lowest, highest = table_bounds(profile)
     knots = used_knots(profile)
     for (start, _), (end, last) in zip(knots, [*knots[1:], (profile.period, profile.value_01)], strict=True):
@@ -286,7 +288,7 @@ def smooth_bounds(profile: TabulatedProfile) -> tuple[float, float]:
 
 
 def turning_places(rate: float, bend: float, square: float) -> list[float]:
-    """Places at which ``rate + bend x + square x^2`` is 0."""
+    """Real roots x of ``rate + bend x + square x^2``."""
     inside = bend * bend - 4.0 * square * rate
     if inside < 0.0 or (bend == 0.0 and square == 0.0):
         return []
@@ -303,7 +305,7 @@ def _quantity(name: str) -> Quantity:
 
 
 _VALUES = tuple(f"value_{number:02}" for number in range(1, KNOTS + 1))
-"""Settings of the knots' values, relative to the level."""
+"""Settings for the values of the knots, relative to the level."""
 
 TABLE = ProfileKind(
     name="tabulated",

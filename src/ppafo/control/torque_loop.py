@@ -1,4 +1,4 @@
-"""Gains of a torque law that follow the device: SIMC rules for an integrator with dead time (Skogestad 2003).
+"""Gains of torque controllers, derived from the device: SIMC rules for an integrator with dead time (Skogestad 2003).
 
 A chamber whose volume stays integrates the flow of the valve, so that the torque of a device follows a command u as
 
@@ -35,45 +35,45 @@ RELEASE = "release of the torque loop"
 REACH = "torque reach of the device"
 LEARNING_GAIN = "learning gain of the torque loop"
 LEAD = "lead of the torque loop"
-"""Names of the loop's numbers that the default of a setting may follow; the functions below compute them."""
+"""Names of the parameters of the loop from which a setting may take its default; the functions below compute them."""
 
 LEAST_TORQUE = 5.0e-4
-"""N m: a valve that moves the torque by less in the dead time leaves the gains at those of this."""
+"""Smallest torque change within the dead time [N m] for which gains are computed; smaller ones use the same gains."""
 
 LARGEST_OPENING = 0.77
-"""Opening of the law with a dead zone where a chamber is slow: the rest is left to the pressure that falls."""
+"""Opening of the dead-zone law for a slow chamber; the rest of the torque change comes from the falling pressure."""
 
 DEAD_ZONE_SHARE, RELEASE_SHARE = 0.042, 0.0062
-"""Errors at which a law with a dead zone opens the valve and closes it again, over the reach [-].
+"""Errors at which a dead-zone law opens the valve and closes it again, divided by the torque range [-].
 
-They are 0.21 N m and 0.031 N m of the 5 N m that the paper's actuator reaches at 50 psi_g.
+Both are 0.21 N m and 0.031 N m for the 5 N m that the paper's actuator reaches at 50 psi_g.
 """
 
 USUAL_LEAD = 0.0185
-"""s: how much earlier than the dead time the learnt table is read, for the way from an error to the next stride's."""
+"""Lead of the learnt table in addition to the dead time [s], for the lag of the torque behind the command."""
 
 SAMPLES_LATE = 1.5
-"""Sample periods by which a sampled command is late: one to compute it, half of one for which it is held."""
+"""Delay of a sampled command in sample periods: one for the computation, half of one for the zero-order hold."""
 
 SHARPNESS = 1.0 / 128.0
-"""Opening [-] within which a dead band is passed through: a jump at 0 would let the valve chatter.
+"""Opening [-] within which the dead band is crossed: a jump at 0 would let the valve switch back and forth.
 
-A power of two, so that laws on whole numbers pass it within the same one.
+SHARPNESS is a power of two, so that laws in fixed point use the same value.
 """
 
 
 def beyond_dead_band(opening: float, dead_band: float) -> float:
-    """Command u [-] for an opening o from -1 to 1 that a law asks for, of a valve that opens beyond a dead band d [-]:
+    """Command u [-] for an opening o from -1 to 1, compensated for a valve dead band d [-]:
 
         u = (1 - d) o + d min(1, max(-1, o / SHARPNESS))
 
-    Every law that asks for openings between shut and open ends with it. With d = 0 the command is the opening.
+    Every law with continuous openings ends with this function. With d = 0 the command is the opening.
     """
     return (1.0 - dead_band) * opening + dead_band * max(-1.0, min(1.0, opening / SHARPNESS))
 
 
 def torque_in_dead_time(loop: TorqueLoop) -> float:
-    """R theta [N m]: what full opening adds before a law sees anything of it."""
+    """Torque change R theta [N m] at full opening within the dead time."""
     return max(loop.rate * loop.dead_time, LEAST_TORQUE)
 
 
@@ -83,47 +83,47 @@ def proportional_gain(loop: TorqueLoop) -> float:
 
 
 def integral_rate(loop: TorqueLoop) -> float:
-    """Integral action per proportional action, 1 / T_i = 1 / (8 theta) [1/s], at a dead time theta [s]."""
+    """Ratio of integral to proportional gain, 1 / T_i = 1 / (8 theta) [1/s], at a dead time theta [s]."""
     return 0.125 / loop.dead_time
 
 
 def integral_gain(loop: TorqueLoop, proportional: float) -> float:
-    """k_i = k_p / T_i [1/(N m s)] for a proportional gain k_p [1/(N m)], given or computed."""
+    """Integral gain k_i = k_p / T_i [1/(N m s)] for a proportional gain k_p [1/(N m)]."""
     return proportional * integral_rate(loop)
 
 
 def boundary_layer(loop: TorqueLoop) -> float:
-    """Half width of a boundary layer [N m] with the slope k_p inside it: 2 R theta."""
+    """Half width 2 R theta [N m] of a boundary layer, inside which the gain is k_p."""
     return 2.0 * torque_in_dead_time(loop)
 
 
 def convergence_rate(loop: TorqueLoop) -> float:
-    """Rate at which an error decays [1/s]: 1 / (2 theta), which is k_p R."""
+    """Decay rate of an error [1/s]: 1 / (2 theta), which is k_p R."""
     return 0.5 / loop.dead_time
 
 
 def dead_zone_opening(loop: TorqueLoop, dead_zone: float) -> float:
-    """Opening [-] of a law with a dead zone [N m]: with it the torque does not pass the zone in the dead time."""
+    """Opening [-] at which the torque does not cross the dead zone [N m] within the dead time."""
     return min(LARGEST_OPENING, dead_zone / torque_in_dead_time(loop))
 
 
 def whole_reach(reach: float) -> float:
-    """Torque reach of an actuator [N m], all of which a law may ask for."""
+    """Full torque range of an actuator [N m], as a default for settings."""
     return reach
 
 
 def dead_zone(reach: float) -> float:
-    """Error [N m] at which a law with a dead zone opens the valve, of an actuator with a torque reach [N m]."""
+    """Error [N m] at which a dead-zone law opens the valve, for the torque range ``reach`` of an actuator [N m]."""
     return DEAD_ZONE_SHARE * reach
 
 
 def release(reach: float) -> float:
-    """Error [N m] at which a law with a dead zone closes the valve again, of an actuator with a torque reach [N m]."""
+    """Error [N m] at which a dead-zone law closes the valve, for the torque range ``reach`` of an actuator [N m]."""
     return RELEASE_SHARE * reach
 
 
 def learning_gain(proportional: float) -> float:
-    """Command learnt per mean torque error of a stride [1/(N m)]: half the proportional gain [1/(N m)]."""
+    """Learning gain [1/(N m)], command per mean torque error of a stride: half the proportional gain [1/(N m)]."""
     return 0.5 * proportional
 
 
@@ -133,10 +133,10 @@ def torque_rate(loop: TorqueLoop) -> float:
 
 
 def dead_time(loop: TorqueLoop) -> float:
-    """Dead time theta [s] from a command to the torque that is measured."""
+    """Dead time theta [s] from a command to the measured torque."""
     return loop.dead_time
 
 
 def lead(loop: TorqueLoop) -> float:
-    """Time [s] by which a learnt table is read ahead: 18.5 ms and the dead time."""
+    """Lead [s] at which a learnt table is read: 18.5 ms plus the dead time."""
     return USUAL_LEAD + loop.dead_time

@@ -1,1 +1,1 @@
-"""Files that people write: TOML into plain data, and what is wrong with it into one line."""
+"""User-written files: TOML to plain data, and one-line messages on faults."""

@@ -1,4 +1,4 @@
-"""Plain data as JSON, in the one form that files and ``--json`` have, and back; data from elsewhere has a limit."""
+"""JSON text of plain data, as used in files and by ``--json``, and parsing with a limit on nesting."""
 
 import dataclasses
 import json
@@ -14,14 +14,14 @@ MAXIMUM_LEVELS = 50
 def json_text(document: Mapping[str, Any]) -> str:
     """Return the document as indented JSON without a final line break; ValueError for a number that is not finite.
 
-    A file name that is not UTF-8 is written by escapes, which give the same name when they are read.
+    Bytes of a file name that are not UTF-8 are escaped and restored on reading.
     """
     text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def plain(value: Any) -> Any:
-    """Return dicts, lists, texts and finite numbers; an infinite number becomes None, a controller its type's name."""
+    """Return dicts, lists, texts and finite numbers; infinity becomes None, a controller the name of its type."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         # Links are no part of what is run: what is not compared is not shown.
         shown = {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value) if field.compare}
@@ -44,7 +44,7 @@ def plain(value: Any) -> Any:
 
 
 def json_document(content: bytes) -> Any:
-    """Return what JSON in UTF-8 says, as plain data; ValueError where it is none, or nested too deeply."""
+    """Return the plain data of JSON text in UTF-8; ValueError for invalid or too deeply nested text."""
     try:
         document = json.loads(content.decode("utf-8"))
     except RecursionError as error:
@@ -55,7 +55,7 @@ def json_document(content: bytes) -> Any:
 
 
 def is_nested_too_deeply(document: Any) -> bool:
-    """Tell whether tables and lists lie in each other more than ``MAXIMUM_LEVELS`` deep, or in themselves."""
+    """Return True if tables and lists are nested deeper than ``MAXIMUM_LEVELS``, or contain themselves."""
     level: list[Any] = [document]
     for _ in range(MAXIMUM_LEVELS + 1):
         tables = [value for value in level if isinstance(value, Mapping | list | tuple)]

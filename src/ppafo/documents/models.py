@@ -1,4 +1,4 @@
-"""Parts of the layouts of files: strict tables, optional values, unions of kinds, and their JSON Schema."""
+"""Building blocks of file layouts: strict tables, optional values, unions of kinds, and their JSON Schema."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +15,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 class StrictTable(BaseModel):
-    """A table of a file: no other keys, no other types, finite numbers; made ready when it is read."""
+    """Table of a file that accepts only its declared keys and types and finite numbers; built at its first use."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
@@ -39,26 +39,26 @@ _CONFIG = ConfigDict(strict=True, extra="forbid", frozen=True, defer_build=True)
 
 
 def table(name: str, fields: dict[str, Any]) -> type[BaseModel]:
-    """Return the model of a table with these keys and no others."""
+    """Return the model of a table with exactly these keys."""
     model: type[BaseModel] = create_model(name, __config__=_CONFIG, **fields)
     return model
 
 
 def optional(annotation: Any, description: str) -> Any:
-    """Return the field of a value that a file may leave out."""
+    """Return the field of an optional value."""
     # A factory keeps 'null' out of the published schema.
     return annotation, Field(default_factory=lambda: None, description=description)
 
 
 def one_of(models: list[Any]) -> Any:
-    """Return the union of tables that are distinguished by their ``kind``."""
+    """Return the union of tables, distinguished by their ``kind``."""
     if len(models) == 1:
         return models[0]
     return Annotated[Union[tuple(models)], Field(discriminator="kind")]  # noqa: UP007
 
 
 def read_model(kind: TomlKind, model: type[Model], name_or_path: str | Path) -> tuple[Model, str]:
-    """Return a file by its name in the package or by its path, and what messages call it; the kind's error if wrong."""
+    """Load and validate a file by bundled name or path. Returns the model and the label used in messages."""
     file = label(str(name_or_path))
     return validate(model, kind.parse(kind.read(name_or_path), file), file, kind.error), file
 
@@ -70,9 +70,9 @@ def validate(
     refusal: type[PpafoError],
     whole: Callable[[], type[Model]] | None = None,
 ) -> Model:
-    """Return a document as its model; ``refusal`` with its problems where it has another layout.
+    """Return a document validated as a model; raises ``refusal`` with all problems if the layout differs.
 
-    Where ``model`` has only the kinds that are loaded, ``whole`` gives the one with all, of which messages speak.
+    If ``model`` contains only the loaded kinds, ``whole`` returns the model with all kinds, used for messages.
     """
     try:
         return model.model_validate(document)

@@ -1,4 +1,4 @@
-"""Problems of a document in words: key, value, what is allowed and the nearest name, in one line for all of them."""
+"""Problems of a document as one-line text: key, value, allowed values and nearest name."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -22,19 +22,19 @@ _MAXIMUM_HOMES = 3
 
 
 def is_gap(detail: ErrorDetails) -> bool:
-    """Tell whether a problem is only that something is not there yet."""
+    """Return True if a problem is only a missing key."""
     return detail["type"] in _GAPS
 
 
 def is_unknown_kind(detail: ErrorDetails) -> bool:
-    """Tell whether a problem is a kind that is not known; a table that has one kind only has it as a plain word."""
+    """Return True if a problem is an unknown kind; tables with a single kind report it as a wrong literal."""
     return detail["type"] == "union_tag_invalid" or (detail["type"] == "literal_error" and detail["loc"][-1] == "kind")
 
 
 def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
-    """Return what is wrong as one line: unknown keys first, which make others missing, then values, then all gaps.
+    """Return all problems as one line: unknown keys, which make others missing, then values, then missing keys.
 
-    Of the many reasons why a value is none of several types the first is said, and of many problems the first ones.
+    For a value that matches none of several types only the first reason is given. The number of problems is limited.
     """
     above = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
     # What is wrong with a table or list because of something in it is said there.
@@ -63,7 +63,7 @@ def quote(value: object) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Spot:
-    """Location of a problem in a file: dotted path, the model of its last key, and the type of its value."""
+    """Location of a problem in a file: dotted path, model of its last key, and type of its value."""
 
     path: str
     holder: Any
@@ -71,7 +71,7 @@ class _Spot:
 
 
 def _spot(model: Any, location: Iterable[int | str]) -> _Spot:
-    """Return the spot at a location; in a union pydantic puts the kind into it, where the file has no such key."""
+    """Return the spot at a pydantic location, which names the kind of a union as if it were a key."""
     keys: list[str] = []
     holder = wanted = model
     for part in map(str, location):
@@ -96,7 +96,7 @@ def _spot(model: Any, location: Iterable[int | str]) -> _Spot:
 
 
 def _kinds(node: Any) -> dict[str, Any]:
-    """Return the members of a union of kinds by kind, nothing for any other type."""
+    """Return the members of a union of kinds by kind; empty for any other type."""
     tables = [table for table in _models_in(node) if "kind" in table.model_fields]
     return {get_args(table.model_fields["kind"].annotation)[0]: table for table in tables}
 
@@ -106,7 +106,7 @@ def _is_model(node: Any) -> bool:
 
 
 def _unknown_key(spot: _Spot, model: type[BaseModel]) -> str:
-    """Say where a key belongs that is not known at its spot: in few other tables of the file, or a near name."""
+    """Return the message on an unknown key, with the tables that have such a key or the nearest allowed name."""
     allowed, key = list(spot.holder.model_fields), spot.path.rpartition(".")[2]
     homes: list[str] = []
     left: list[tuple[str, Any]] = [("", model)]
@@ -126,14 +126,14 @@ def _unknown_key(spot: _Spot, model: type[BaseModel]) -> str:
 
 
 def _models_in(node: Any) -> list[Any]:
-    """Return the tables that a value of some type can be; those in a list or under free names have no place to name."""
+    """Return the tables that a value of a type can be, except those in lists or under free names."""
     if get_origin(node) is Annotated:
         return _models_in(get_args(node)[0])
     return [member for member in get_args(node) if _is_model(member)] if get_origin(node) in (Union, UnionType) else []
 
 
 def _unknown_word(spot: _Spot, detail: ErrorDetails) -> str:
-    """Say which words may stand there; the kind of a table is one of them."""
+    """Return the message on an unknown word, with the allowed words; also for the kind of a table."""
     is_kind, context = detail["type"] == "union_tag_invalid", detail["ctx"]
     word = context["tag"] if is_kind else detail["input"]
     said = context["expected_tags"] if is_kind else context["expected"].replace(" or ", ",")
@@ -145,7 +145,7 @@ def _unknown_word(spot: _Spot, detail: ErrorDetails) -> str:
 
 
 def _wrong_name(spot: _Spot, detail: ErrorDetails) -> str:
-    """Say what a name or a quantity may consist of; pydantic marks a name that is the key of a table."""
+    """Return the message on an invalid name or quantity; pydantic marks a name that is the key of a table."""
     if detail["loc"][-1] == "[key]":
         table = one_line(".".join(map(str, detail["loc"][:-2])))
         return f"{table}: the name {quote(detail['input'])} must consist of letters, digits, '-' and '_'"
@@ -164,7 +164,7 @@ def _not_a_table(spot: _Spot, detail: ErrorDetails) -> str:
 
 
 def _any_other(spot: _Spot, detail: ErrorDetails) -> str:
-    """Say what pydantic says, in our words: "Input should be less than 5" becomes "must be less than 5"."""
+    """Return pydantic's message in ppafo's wording: "Input should be less than 5" becomes "must be less than 5"."""
     if detail["type"] == "string_type":
         return f"{spot.path} = {quote(detail['input'])} must be a text in quotation marks"
     _, wanted, must = detail["msg"].partition(" should ")

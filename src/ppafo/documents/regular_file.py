@@ -1,4 +1,4 @@
-"""The bytes of a file, and only of a file: devices never end, and a named pipe waits for a writer for ever."""
+"""Reading of regular files only: devices never end, and opening a named pipe would block."""
 
 import codecs
 import stat
@@ -9,7 +9,7 @@ MAXIMUM_BYTES_TYPED = 1_000_000
 
 
 def read_regular_file(path: Path, maximum: int | None = None) -> bytes:
-    """Return the content of a regular file, refused above ``maximum`` bytes; any OSError has its reason as text."""
+    """Return the content of a regular file of at most ``maximum`` bytes; an OSError has its reason as text."""
     status = path.stat()
     if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(None, "it is a directory, not a file")
@@ -31,9 +31,9 @@ _TWO_CHARACTERS = 4
 
 
 def decoded(content: bytes) -> str:
-    """Return the text of a file in UTF-8 or UTF-16, each with its byte-order mark or without.
+    """Return the text of a file in UTF-8 or UTF-16, with or without byte-order mark.
 
-    UnicodeDecodeError where it is neither. Spreadsheets and loggers on Windows write UTF-16.
+    Raises UnicodeDecodeError for other encodings. Spreadsheets and loggers on Windows write UTF-16.
     """
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return content.decode("utf-16")

@@ -1,4 +1,4 @@
-"""Reading of TOML files, by name or path; every mistake is one clear line."""
+"""Reading of TOML files by name or path; each fault gives a one-line message."""
 
 import copy
 import os
@@ -29,16 +29,16 @@ _TOO_DEEP = f"has tables nested deeper than {MAXIMUM_LEVELS} levels; a few are e
 
 
 def beside(name: str, folder: Path, known: Collection[str] = ()) -> str:
-    """Return a name of the package as it is, and a path relative to the file that names it as one from here."""
+    """Return a bundled name unchanged, and a path relative to ``folder`` relative to the working directory."""
     is_path = name not in known and (Path(name).suffix == ".toml" or "/" in name)
     return str(folder / name) if is_path else name
 
 
 @dataclass(frozen=True, slots=True)
 class TomlKind:
-    """A kind of file: what messages call it, its name for ``--schema``, the files of the package, the error raised.
+    """Kind of file: noun for messages, name for ``--schema``, folder of the bundled files, and error raised.
 
-    ``made`` says behind "give a .toml file" where one comes from, where a command makes it.
+    ``made`` is added in messages after "give a .toml file": the command that creates such a file, if there is one.
     """
 
     noun: str
@@ -48,12 +48,12 @@ class TomlKind:
     made: str = ""
 
     def names(self) -> tuple[str, ...]:
-        """Return the names of the files that come with the package."""
+        """Return the names of the bundled files."""
         names = (Path(file.name) for file in self.shipped.iterdir())
         return tuple(sorted(name.stem for name in names if name.suffix == _SUFFIX))
 
     def read(self, name_or_path: str | Path) -> bytes:
-        """Return the content of a file of the package, by its name, or of any other, by its path."""
+        """Return the content of a bundled file by its name, or of any other file by its path."""
         name, path = str(name_or_path), Path(name_or_path)
         if name in self.names():
             return (self.shipped / (name + _SUFFIX)).read_bytes()
@@ -72,11 +72,11 @@ class TomlKind:
             raise self.error(f"{label(name)}: cannot be read: {reason(error)}{self._remedy(name)}") from error
 
     def _remedy(self, file: str) -> str:
-        """Return what to give in place of a file of another kind, such as a recording; empty for a .toml file."""
+        """Return advice for a file of another kind, such as a recording; empty for a .toml file."""
         return "" if Path(file).suffix in ("", _SUFFIX) else f"; give a .toml file{self.made}"
 
     def parse(self, content: bytes, file: str) -> dict[str, Any]:
-        """Return the document in the bytes of a file; ``file`` is what messages call it."""
+        """Return the document in the bytes of a file; ``file`` is the label used in messages."""
         try:
             text = decoded(content)
         except UnicodeDecodeError as error:
@@ -100,19 +100,19 @@ class TomlKind:
         return document
 
     def check_depth(self, document: Mapping[str, Any], file: str) -> None:
-        """Refuse tables that lie in each other too deep; ``file`` is what messages call the document."""
+        """Refuse a document with tables nested too deeply; ``file`` is its label in messages."""
         if is_nested_too_deeply(document):
             raise self.error(f"{file}: {_TOO_DEEP}")
 
 
 @lru_cache(maxsize=16)
 def _document(text: str) -> dict[str, Any]:
-    """Return the document of a text, not to be changed: one run reads the same set several times."""
+    """Return the document of a text, not to be modified: it is cached, since a run reads the same set several times."""
     return tomllib.loads(text, parse_float=_float)
 
 
 def _float(text: str) -> float:
-    """Return the number of a text; one so small that it would be 0 is refused, as in quantities."""
+    """Return the number of a text; refuses a nonzero number so small that it would become 0, as in quantities."""
     value = float(text)
     if value == 0.0 and text.lower().partition("e")[0].strip("+-0_."):
         raise tomllib.TOMLDecodeError(f"{one_line(text)} is below the smallest 64-bit number and would become 0")
@@ -120,6 +120,6 @@ def _float(text: str) -> float:
 
 
 def label(file: str) -> str:
-    """Return what messages call a file: its name on one line, without its middle where it is very long."""
+    """Return the label of a file for messages: its name on one line, shortened in the middle if very long."""
     name = one_line(file)
     return name if len(name) <= _LONGEST_LABEL else f"{name[:_KEPT_AT_EACH_END]}...{name[-_KEPT_AT_EACH_END:]}"

@@ -1,4 +1,4 @@
-"""Gaits: one periodic stride of a wearer, built in, imported from recordings, or read from a gait file."""
+"""Gaits: one periodic stride of a wearer, built in, imported from recordings, or loaded from a gait file."""
 
 from ppafo.gait.document import NORMATIVE, list_gaits, load_gait
 from ppafo.gait.gait import CURVES, Gait, GaitCurve, at_speed, series_of, speed_range, walk_recording

@@ -56,7 +56,7 @@ _FINE = np.linspace(0.0, 1.0, 1000, endpoint=False)
 
 
 def check_side(walk: MeanStride, usual: Gait) -> None:
-    """Raise DataError for an ankle that moves half a stride from where its shank does; ``usual`` is a healthy gait."""
+    """Raise DataError if the ankle is half a stride out of phase with its shank; ``usual`` is a healthy gait."""
     if not STANCE_FRACTION[0] <= walk.stance_share <= STANCE_FRACTION[1]:
         # Nothing has a place in such a stride, which is refused by itself.
         return
@@ -71,7 +71,7 @@ def check_side(walk: MeanStride, usual: Gait) -> None:
 
 
 def _lag(walk: MeanStride, usual: Gait, name: str) -> tuple[float, float, float]:
-    """Return by how many strides a curve is behind the usual one, and the correlations there and without a shift."""
+    """Return the delay of a curve relative to the usual one [strides], and correlations with and without this delay."""
     # Stance on stance and swing on swing: a toe-off that comes early or late is no delay.
     at = np.interp(_FINE, (0.0, walk.stance_share, 1.0), (0.0, usual.stance_share, 1.0))
     lags, expected = (
@@ -85,14 +85,14 @@ def _lag(walk: MeanStride, usual: Gait, name: str) -> tuple[float, float, float]
 
 
 def _smooth(values: Floats, name: str) -> Floats:
-    """Return a curve of 101 samples by its series, at 1000 phases."""
+    """Return a curve of 101 samples, smoothed by its Fourier series, at 1000 phases."""
     return fit_curve(values, HARMONICS[name])[0].values_at(_FINE)
 
 
 def delay_remarks(walk: MeanStride) -> list[str]:
-    """Return the curves of a mean stride that are on another clock than the force, or the shank, with their delays.
+    """Return remarks on curves of a mean stride that are delayed relative to the force or, without force, to the shank.
 
-    Curves of one file are on one clock, so that nothing is said of them.
+    Curves from the same file as the reference share its clock and are not remarked.
     """
     share = walk.stance_share
     # Of the shank the largest lean backwards, which is its minimum.
@@ -123,7 +123,7 @@ def delay_remarks(walk: MeanStride) -> list[str]:
 
 
 def _peak(values: Floats, share: float) -> float:
-    """Return the strides from toe-off to the largest of 1000 values about it."""
+    """Return the time from toe-off to the largest of 1000 values near toe-off [strides]."""
     # Phases are periodic: counted from toe-off, from the lower limit on.
     low, high = _ABOUT_TOE_OFF
     after = (_FINE - share - low) % 1.0 + low
@@ -131,14 +131,14 @@ def _peak(values: Floats, share: float) -> float:
 
 
 def _end(values: Floats) -> float:
-    """Return the phase at which a load falls below half its largest value of the push-off, 1 where it does not."""
+    """Return the phase at which a load falls below half of its push-off peak [strides], or 1 if it does not."""
     first = int(np.argmax(np.where(_FINE > _PUSH_OFF_FROM, values, -np.inf)))
     fallen = np.flatnonzero(values[first:] < 0.5 * values[first])
     return float(_FINE[first + fallen[0]]) if fallen.size else 1.0
 
 
 def size_remarks(walk: MeanStride) -> list[str]:
-    """Return the curves of a mean stride that are larger or smaller than the others let expect, with the numbers."""
+    """Return remarks on curves whose size does not match the other curves of the mean stride, with the numbers."""
     said = []
     for name, usual in (("shank_angle", USUAL_SHANK), ("ankle_angle", USUAL_ANKLE)):
         turns = float(np.ptp(np.degrees(walk.curves[name])))

@@ -1,4 +1,4 @@
-"""Gait files: their layout, how one becomes a ``Gait``, and a gait as the text of one."""
+"""Gait files: layout, conversion to a ``Gait``, and conversion of a gait to the text of a file."""
 
 import functools
 import json
@@ -93,9 +93,9 @@ def gait_file() -> type[BaseModel]:
 
 
 def gait_of(document: dict[str, Any], file: str) -> Gait:
-    """Return the gait in the document of a gait file; ``file`` is its name in messages.
+    """Return the gait in a parsed gait file; ``file`` is its name in messages.
 
-    DataError where it is not a gait.
+    Raises DataError if the document is not a valid gait.
     """
     validate(gait_file(), document, file, DataError)
     numbers = {path: _number(document, path, file) for path in _LIMITS}
@@ -172,7 +172,7 @@ _FILE = TomlKind(
 
 
 def list_gaits() -> tuple[str, ...]:
-    """Return the names of the gaits that come with the package.
+    """Return the names of the gaits included in the package.
 
     >>> import ppafo
     >>> ppafo.list_gaits()
@@ -196,7 +196,7 @@ def load_gait(gait: str | Path = NORMATIVE) -> Gait:
 
 
 def parse_gait(content: bytes, file: str) -> Gait:
-    """Return the gait in the bytes of a gait file; ``file`` is its name in messages. DataError where unreadable."""
+    """Return the gait in the content of a gait file; ``file`` names it in messages. Raises DataError if invalid."""
     gait = gait_of(_FILE.parse(content, label(file)), label(file))
     # A file that is well formed may still have a reversed sign or a wrong zero.
     check_gait(gait, label(file))
@@ -211,7 +211,7 @@ _DIGITS = 12
 
 
 def gait_toml(gait: Gait) -> str:
-    """Return the text of a gait file; reading it back gives the same gait, to rounding of the angles."""
+    """Return a gait as the text of a gait file; reading the file gives the same gait, with angles rounded."""
     lines = ["schema_version = 1"]
     texts = {"name": gait.name, "title": gait.title, "origin": gait.origin, "source": gait.source, "notes": gait.notes}
     lines += [f"{key} = {_text(value)}" for key, value in texts.items() if value]
@@ -235,12 +235,12 @@ def gait_toml(gait: Gait) -> str:
 
 
 def _number_text(value: float, si_unit: str) -> str:
-    """Return a coefficient in the unit in which its curve is written."""
+    """Return a coefficient [SI] as text, in the unit used for its curve in a gait file."""
     unit = WRITTEN_UNITS.get(si_unit, si_unit)
     return repr(float(f"{from_si(value, plain_unit(unit), plain_unit(si_unit)):.{_DIGITS}g}"))
 
 
 def _text(text: str) -> str:
-    """Return a basic string of TOML; what JSON escapes is escaped in the same way there, but for DEL."""
+    """Return a text as a TOML basic string; JSON uses the same escapes, except for DEL."""
     # TOML forbids DEL in a string, which JSON allows.
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

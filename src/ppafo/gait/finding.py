@@ -1,6 +1,6 @@
-"""A gait as a finding: its numbers, its curves, and for an imported one what was made of the recording.
+"""Report of a gait: numbers, curves, and for an imported gait the strides and remarks of the import.
 
-The figure has the curves over the stride, in the units of the field, with band, events and single strides.
+The figure shows the curves over the stride in the units of the field, with deviation band, events and single strides.
 """
 
 from dataclasses import dataclass
@@ -48,13 +48,13 @@ _CAPTION = "The curves over the stride: mean, standard deviation between strides
 
 @dataclass(frozen=True, slots=True)
 class GaitFound:
-    """A gait, and for an imported one what was made of the recording."""
+    """A gait and, if it was imported, the result of the import."""
 
     gait: Gait
     imported: ImportedGait | None = None
 
     def json_document(self) -> dict[str, Any]:
-        """Return numbers and curves, and the strides of an import, as plain data in SI."""
+        """Return numbers and curves, and the strides of an import, as plain data in SI units."""
         gait, imported = self.gait, self.imported
         document: dict[str, Any] = {
             **{name: getattr(gait, name) for name in _PLAIN},
@@ -96,7 +96,7 @@ _HEAD = ("curve", "lowest", "highest", "unit", "between strides", "series error 
 
 
 def gait_finding(gait: Gait, imported: ImportedGait | None = None) -> Finding[GaitFound]:
-    """Report of a gait as ``ppafo gait`` prints it; the gait file is among its files."""
+    """Return the report of a gait as printed by ``ppafo gait``; the gait file is one of its files."""
     speed = f", {gait.walking_speed:.3g} m/s" if gait.walking_speed is not None else ""
     stance = f"{100.0 * gait.stance_share:.1f} %{_plus_minus(100.0 * gait.stance_share_deviation)}"
     return Finding(
@@ -171,7 +171,7 @@ _PANELS: dict[str, Kind] = {
 
 
 def _panel(gait: Gait, name: str, imported: ImportedGait | None, is_first: bool) -> Panel:
-    """Return a curve of a gait over the stride, with the strides behind it where it was just imported."""
+    """Return the panel of one curve over the stride, with the single strides in the background after an import."""
     sign = clinical_angle if name == "ankle_angle" else np.asarray
     curve, percent, toe_off = gait.curves[name], 100.0 * PHASES, 100.0 * gait.stance_share
     series = sign(curve.values_at(PHASES))
@@ -197,7 +197,7 @@ def _panel(gait: Gait, name: str, imported: ImportedGait | None, is_first: bool)
         marks.append(Mark("line", percent, series, label="series", colour=BLACK, style=dashed))
 
     def name_events(axes: "Axes") -> None:
-        """Write where the shank's curve is not: low at heel strike, high at toe-off."""
+        """Label the events where the shank's curve leaves space: low at heel strike, high at toe-off."""
         axes.set_xlim(0.0, 100.0)
         for at, height, text in ((0.0, 0.05, "heel strike"), (toe_off, 0.85, "toe-off")) if is_first else ():
             place, offset = ("data", "axes fraction"), "offset points"

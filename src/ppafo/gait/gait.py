@@ -48,12 +48,12 @@ KNEE = ("knee_forward", "knee_up")
 
 
 def clinical_angle(angle: Floats) -> Floats:
-    """Return an ankle angle theta [rad] as people read it [rad]: 0 at neutral, dorsiflexion positive."""
+    """Return an ankle angle theta [rad] in the clinical convention [rad]: 0 at neutral, dorsiflexion positive."""
     return 0.5 * math.pi - angle
 
 
 def plain_unit(unit: str) -> str:
-    """Return the unit of a curve as ``ppafo.units`` writes it: a plain number has none."""
+    """Return the unit of a curve as ``ppafo.units`` writes it: empty for a dimensionless number."""
     return unit.removeprefix("-")
 
 
@@ -61,7 +61,8 @@ def plain_unit(unit: str) -> str:
 class GaitCurve:
     """Periodic curve: coefficients of its Fourier series in SI units, and the variation between strides.
 
-    ``deviation`` is the standard deviation between strides, root mean square over the stride; 0 where it is not known.
+    ``mean`` is the constant term, ``cosines`` and ``sines`` are the coefficients of the harmonics. ``deviation`` is the
+    standard deviation between strides, as root mean square over the stride; 0 if unknown.
     """
 
     mean: float
@@ -75,7 +76,7 @@ class GaitCurve:
 
     @property
     def harmonics(self) -> int:
-        """Number of harmonics."""
+        """Number of harmonics of the series."""
         return len(self.cosines)
 
     def value(self, phase: float) -> float:
@@ -83,20 +84,20 @@ class GaitCurve:
         return float(self.values_at(phase))
 
     def derivative(self, stride_time: float) -> "GaitCurve":
-        """Return the derivative by time for a stride of this time [s]; how much strides differ in it is not known."""
+        """Return the time derivative for a stride time [s]; its deviation between strides is unknown and set to 0."""
         angular = 2.0 * np.pi / stride_time * (1.0 + np.arange(self.harmonics))
         cosines, sines = angular * np.array(self.sines), -angular * np.array(self.cosines)
         return GaitCurve(0.0, tuple(cosines.tolist()), tuple(sines.tolist()))
 
     def scale(self, factor: float) -> "GaitCurve":
-        """Return the curve times a factor [-], with its deviation between strides."""
+        """Return the curve multiplied by a factor [-], including its deviation between strides."""
         cosines, sines = (tuple(factor * value for value in values) for values in (self.cosines, self.sines))
         return replace(
             self, mean=factor * self.mean, cosines=cosines, sines=sines, deviation=abs(factor) * self.deviation
         )
 
     def values_at(self, phases: "ArrayLike") -> Floats:
-        """Return the values at many phases [strides]."""
+        """Return the values at an array of phases [strides]."""
         first_sine, first_cosine = sine_and_cosine(np.asarray(phases, dtype=np.float64))
         sine, cosine = first_sine, first_cosine
         # The mean in the shape of the phases, a number or an array.
@@ -110,12 +111,12 @@ class GaitCurve:
 
 @dataclass(frozen=True, slots=True)
 class Gait:
-    """Stride of one wearer, as curves over the phase; None for a curve that was not recorded.
+    """Stride of one wearer, as curves over the phase; a curve that was not recorded is None.
 
-    ``body_mass`` [kg], ``stature`` [m] of the subject, None where not known, ``stride_time`` [s], ``stance_share``
-    (share of the stride until toe-off), ``walking_speed`` [m/s], None where nobody recorded it. The two deviations are
-    between strides, 0 where not known. ``recorded_speed`` is the speed at which the curves were recorded, where it is
-    another than ``walking_speed``.
+    ``body_mass`` [kg] and ``stature`` [m] (None if unknown) are of the subject. ``stride_time`` is in [s],
+    ``stance_share`` is the fraction of the stride until toe-off [-], and ``walking_speed`` is in [m/s], None if it was
+    not recorded. ``stride_time_deviation`` [s] and ``stance_share_deviation`` [-] are standard deviations between
+    strides, 0 if unknown. ``recorded_speed`` [m/s] is the speed of the recording, if it differs from ``walking_speed``.
     """
 
     name: str
@@ -149,11 +150,11 @@ class Gait:
 
     @property
     def curves(self) -> dict[str, GaitCurve]:
-        """The curves that there are, by name, in the order of ``CURVES``."""
+        """Available curves by name, in the order of ``CURVES``."""
         return {name: curve for name in CURVES if (curve := getattr(self, name)) is not None}
 
     def curve(self, name: str) -> GaitCurve:
-        """Return a curve by its name; DataError where this gait does not have it."""
+        """Return a curve by name; raises DataError if this gait does not contain the curve."""
         curves = self.curves
         if name not in curves:
             hint = nearest_name(name, curves)
@@ -162,7 +163,7 @@ class Gait:
 
 
 def series_of(gait: Gait, name: str) -> Series:
-    """The first harmonics of a curve [SI] as the engine has them; a curve that was not measured is 0."""
+    """Return the first harmonics of a curve [SI] as used by the engine; a curve that was not measured is 0."""
     curve = gait.curves.get(name)
     # A curve that was not measured is 0: no moment, no force, a knee at rest.
     if curve is None:
@@ -188,16 +189,16 @@ HARMONICS: dict[str, int] = {
 
 @dataclass(frozen=True, slots=True)
 class FitError:
-    """Error of the series: root mean square and largest, in the unit of the curve."""
+    """Error of a Fourier series: root mean square and largest absolute value, in the unit of the curve."""
 
     root_mean_square: float
     largest: float
 
 
 def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[GaitCurve, FitError]:
-    """Return the series through values at even phases from 0 to 1, both ends counted, and its errors.
+    """Return the Fourier series fitted to values at equally spaced phases from 0 to 1, ends included, and its error.
 
-    All in the unit of ``values`` [SI]. DataError where there are too few values.
+    Series and error are in the unit of ``values`` [SI]. Raises DataError if there are too few values.
     """
     if values.size < 2 * harmonics + 2:
         raise DataError(f"{values.size} samples are too few for {harmonics} harmonics")
@@ -223,9 +224,10 @@ J Phys Ther Sci 29:819 (62 m/min)."""
 
 
 def speed_range(gait: Gait) -> tuple[float, float]:
-    """Return the lowest and highest speed [m/s] to which a gait may be scaled: 20 % about the recorded one.
+    """Return the lowest and highest speed [m/s] to which a gait may be scaled: within 20 % of the recorded speed.
 
-    Downwards it ends at 1.03 m/s too, for a gait that was recorded faster. DataError for a gait without a speed.
+    For a gait recorded at more than 1.03 m/s, the lowest speed is at least 1.03 m/s. Raises DataError for a gait
+    without a speed.
     """
     recorded = _recorded_speed(gait)
     lowest = (1.0 - LARGEST_CHANGE) * recorded
@@ -233,12 +235,12 @@ def speed_range(gait: Gait) -> tuple[float, float]:
 
 
 def at_speed(gait: Gait, speed: float) -> Gait:
-    """Return the gait at a walking speed [m/s]: stride time goes with speed to the power of -1/2.
+    """Return the gait at a walking speed [m/s]; the stride time is proportional to speed to the power -1/2.
 
-    This is a constant walk ratio, step length over cadence (Sekiya and Nagasaki 1998, Gait Posture 7:225). Amplitudes,
-    moments per mass, force in body weights and stance fraction stay as recorded, so only a small change is allowed. So
-    does the motion of the knee about its mean speed; its acceleration goes with 1/T^2. DataError for a speed out of
-    range.
+    This is a constant walk ratio, step length divided by cadence (Sekiya and Nagasaki 1998, Gait Posture 7:225).
+    Amplitudes, moments per mass, force in body weights and stance fraction stay as recorded, so only a small change of
+    speed is allowed. The motion of the knee relative to its mean speed is kept too, so its acceleration is proportional
+    to 1/T^2. Raises DataError for a speed out of range.
     """
     recorded = _recorded_speed(gait)
     low, high = speed_range(gait)
@@ -276,9 +278,9 @@ _MAXIMUM_STRIDES = 100_000
 
 
 def walk_recording(gait: Gait, strides: int) -> Recording:
-    """Return a number of equal strides, marked synthetic; SI units, package signs.
+    """Return a recording of several equal strides, marked as synthetic; SI units, package signs.
 
-    DataError for a number that is not plausible.
+    Raises DataError for an implausible number of strides.
     """
     if not 1 <= strides <= _MAXIMUM_STRIDES:
         raise DataError(f"the number of strides must be from 1 to {_MAXIMUM_STRIDES}, not {strides}")

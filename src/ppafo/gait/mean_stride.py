@@ -1,4 +1,4 @@
-"""Mean stride of a recording or a gait file, as the checks of plausibility take it."""
+"""Mean stride of a recording or a gait file, as input of the plausibility checks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ SignSource = Literal["map", "columns", "gait_file"]
 
 @dataclass(frozen=True, slots=True)
 class MeanStride:
-    """The stride that is checked: mean curves (101 samples, SI) by name, stance fraction [-] and stride time [s]."""
+    """Stride to be checked: mean curves (101 samples, SI) by name, stance fraction [-] and stride time [s]."""
 
     file: Mapping[str, str]
     curves: Mapping[str, Floats]
@@ -24,7 +24,7 @@ class MeanStride:
 
 
 def other_sign(signs_from: SignSource, key: str, turned: str = "the other sign") -> str:
-    """Remedy for a curve with the other sign: its key in a gait map, or the file."""
+    """Return the remedy for a curve with a wrong sign: the key in a gait map, or a correction of the file."""
     return {
         "map": f"change {key} in the gait map",
         "columns": f"correct it in the file, or change {key} in a gait map",

@@ -1,7 +1,8 @@
-"""Plausibility of a stride: limits wide enough for impaired walking that exclude the impossible.
+"""Plausibility of a stride: limits wide enough for impaired walking that exclude impossible values.
 
-Each refusal names file, curve, number and limits, and the remedy for what is wrong with units, signs and sides. A sign
-is refused only where the other one fits clearly better: impaired walking breaks every rule of healthy walking a little.
+Each error names file, curve, number and limits, and a remedy for mistakes in units, signs and sides. A sign is rejected
+only if the opposite sign fits clearly better, because impaired walking often breaks the rules of healthy walking
+slightly.
 """
 
 from functools import partial
@@ -20,14 +21,14 @@ STRIDE_TIME = (0.5, 3.0)
 
 
 def check_gait(gait: Gait, file: str) -> None:
-    """Raise DataError for a gait file whose stride is not plausible, as ``check_plausible`` does."""
+    """Raise DataError for a gait file with an implausible stride; the checks are the ones of ``check_plausible``."""
     percent = np.linspace(0.0, 1.0, 101)
     curves = {name: curve.values_at(percent) for name, curve in gait.curves.items()}
     check_plausible(MeanStride(dict.fromkeys(curves, file), curves, gait.stance_share, gait.stride_time, "gait_file"))
 
 
 def check_plausible(walk: MeanStride) -> None:
-    """Raise DataError for a mean stride that is not plausible; names file, curve, number, limits and remedy of all."""
+    """Raise DataError for an implausible mean stride; the message names file, curve, number, limits and remedy."""
     # A check in a chain is made only where those before it pass: a wrong unit would be refused again as a wrong sign.
     chains = (
         (check_stride_time,),
@@ -42,7 +43,7 @@ def check_plausible(walk: MeanStride) -> None:
 
 
 def check_stride_time(walk: MeanStride) -> None:
-    """Raise DataError for a stride time that no walk has."""
+    """Raise DataError for a stride time that is implausible for walking."""
     low, high = STRIDE_TIME
     if not low <= walk.stride_time <= high:
         raise DataError(
@@ -52,7 +53,7 @@ def check_stride_time(walk: MeanStride) -> None:
 
 
 def check_stance(walk: MeanStride) -> None:
-    """Raise DataError for a stance that no walk has."""
+    """Raise DataError for a stance fraction that is implausible for walking."""
     low, high = STANCE_FRACTION
     if low <= walk.stance_share <= high:
         return
@@ -87,7 +88,7 @@ _FOOT_ALONE = 0.05
 
 
 def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
-    """Raise DataError for a vertical force [body weights] whose unit or sign leaves no heel strike to find."""
+    """Raise DataError for a vertical force [body weights] whose unit or sign prevents the detection of heel strikes."""
     # One contact in a long record is less than 2 % of it.
     loaded = force[np.abs(force) > _ON_GROUND]
     # Percentiles, since a single spike has no sign to judge.
@@ -108,7 +109,7 @@ def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
 
 
 def check_moment(walk: MeanStride) -> None:
-    """Raise DataError for an ankle moment, where there is one, that no leg has."""
+    """Raise DataError for an implausible ankle moment; a stride without a moment passes."""
     if "ankle_moment" not in walk.curves:
         return
     moment = walk.curves["ankle_moment"]
@@ -131,7 +132,7 @@ _UNCLEAR_MOMENT = 0.5
 
 
 def moment_remarks(moment: Floats) -> list[str]:
-    """Return a remark on an ankle moment [N m/kg] whose sign its curve hardly shows."""
+    """Return a remark on an ankle moment [N m/kg] whose sign cannot be verified from its curve."""
     down, up = float(np.max(moment)), float(-np.min(moment))
     if up <= _UNCLEAR_MOMENT * down:
         return []
@@ -142,7 +143,7 @@ def moment_remarks(moment: Floats) -> list[str]:
 
 
 def check_moment_time(walk: MeanStride) -> None:
-    """Raise DataError for an ankle moment, where there is one, that works while the foot is off the ground."""
+    """Raise DataError for an ankle moment that acts while the foot is off the ground; a stride without one passes."""
     if "ankle_moment" not in walk.curves:
         return
     moment = walk.curves["ankle_moment"]
@@ -166,7 +167,7 @@ _OTHER_TIME: dict[SignSource, str] = {
 
 
 def check_force(walk: MeanStride) -> None:
-    """Raise DataError for a vertical force, where there is one, that no walk has."""
+    """Raise DataError for a vertical force that is implausible for walking; a stride without a force passes."""
     if "vertical_force" not in walk.curves:
         return
     force = walk.curves["vertical_force"]
@@ -181,7 +182,7 @@ def check_force(walk: MeanStride) -> None:
 
 
 def force_remarks(force: Floats) -> list[str]:
-    """Remark on an unusual mean of a vertical force [body weights] over a stride, both ends counted."""
+    """Return a remark on an unusual mean of the vertical force [body weights] over a stride, ends included."""
     # Both ends are one phase, which must not count twice.
     mean, (low, high) = float(np.mean(force[:-1])), USUAL_FORCE_MEAN
     if low <= mean <= high:

@@ -1,4 +1,4 @@
-"""Plausibility of shank and ankle angles: range, zero, and sign by the foot that stands in mid-stance."""
+"""Plausibility of shank and ankle angles: range, zero, and sign, checked by the standing foot in mid-stance."""
 
 import numpy as np
 
@@ -29,7 +29,7 @@ foot further than 20: a shoe with a heel of 6 cm on a foot of 17 cm from heel to
 
 
 def check_shank(walk: MeanStride) -> None:
-    """Raise DataError for a shank angle that no leg has."""
+    """Raise DataError for a shank angle that no leg can have."""
     phi = np.degrees(walk.curves["shank_angle"])
     where = f"{walk.file['shank_angle']}: shank_angle"
     # The range is free of the zero, so that a wrong unit shows before a wrong zero.
@@ -51,7 +51,7 @@ def check_shank(walk: MeanStride) -> None:
 
 
 def check_angle_range(where: str, travel: float, limits: tuple[float, float], is_whole: bool = False) -> None:
-    """Raise DataError for an angle over a range [deg] that no leg has; over a ``is_whole`` record it may be larger."""
+    """Raise DataError for an angle with an implausible range [deg]; a whole record has no upper limit."""
     low, high = limits
     if low <= travel and (is_whole or travel <= high):
         return
@@ -66,13 +66,13 @@ def check_angle_range(where: str, travel: float, limits: tuple[float, float], is
 
 
 def check_ankle_range(walk: MeanStride) -> None:
-    """Raise DataError for an ankle angle over a range that no leg has."""
+    """Raise DataError for an ankle angle with an implausible range."""
     travel = float(np.ptp(np.degrees(walk.curves["ankle_angle"])))
     check_angle_range(f"{walk.file['ankle_angle']}: ankle_angle", travel, ANKLE_RANGE)
 
 
 def check_ankle(walk: MeanStride) -> None:
-    """Raise DataError for an ankle angle that no leg has with this shank."""
+    """Raise DataError for an ankle angle that is implausible together with the shank angle."""
     theta = np.degrees(walk.curves["ankle_angle"])
     where = f"{walk.file['ankle_angle']}: ankle_angle"
     turned, reversed_turned = standing_turns(walk.curves["shank_angle"], walk.curves["ankle_angle"])
@@ -91,7 +91,7 @@ def check_ankle(walk: MeanStride) -> None:
 
 
 def standing_tilt(shank: Floats, ankle: Floats) -> float:
-    """Return the mean tilt [deg] of the foot from 15 to 40 % of the stride, above 0 with the toes down.
+    """Return the mean tilt [deg] of the foot from 15 to 40 % of the stride, positive with the toes down.
 
     ``shank`` and ``ankle`` are curves [rad] of 101 samples in the signs of the package.
     """
@@ -101,9 +101,10 @@ def standing_tilt(shank: Floats, ankle: Floats) -> float:
 
 
 def standing_turns(shank: Floats, ankle: Floats) -> tuple[float, float]:
-    """Turning of the foot [deg, RMS] from 15 to 40 % of the stride, as it is and with the ankle reversed.
+    """Return the rotation of the foot [deg, RMS] from 15 to 40 % of the stride, as given and with the ankle reversed.
 
-    ``shank`` and ``ankle`` are curves [rad] of 101 samples in the signs of the package; a foot that stands turns by 0.
+    ``shank`` and ``ankle`` are curves [rad] of 101 samples in the signs of the package. A foot flat on the ground has a
+    rotation of 0.
     """
     # A flat foot stands still while the shank leans: the ankle then follows the shank, with the sign as it is or
     # reversed.
@@ -112,7 +113,7 @@ def standing_turns(shank: Floats, ankle: Floats) -> tuple[float, float]:
 
 
 def sign_remarks(shank: Floats, ankle: Floats) -> list[str]:
-    """Return a remark on an ankle whose sign the standing foot does not show."""
+    """Return a remark on an ankle angle whose sign cannot be verified while the foot stands."""
     turned, reversed_turned = standing_turns(shank, ankle)
     if CLEARLY_BETTER * turned <= reversed_turned:
         return []
@@ -123,7 +124,7 @@ def sign_remarks(shank: Floats, ankle: Floats) -> list[str]:
 
 
 def zero_remarks(tilt: float, correction: str) -> list[str]:
-    """Return a remark on the zero of an ankle whose standing foot is tilted [deg]."""
+    """Return a remark on the zero of an ankle angle if the standing foot appears tilted [deg]."""
     if abs(tilt) <= REMARKED_TILT:
         return []
     way = "toes down" if tilt > 0.0 else "toes up"
@@ -135,7 +136,7 @@ def zero_remarks(tilt: float, correction: str) -> list[str]:
 
 
 def gait_file_remarks(gait: Gait) -> list[str]:
-    """Return a remark on the ankle's zero in a finished gait, with the new mean of its series."""
+    """Return a remark on the ankle zero of a finished gait, with the corrected mean of its series."""
     percent = np.linspace(0.0, 1.0, 101)
     tilt = standing_tilt(gait.shank_angle.values_at(percent), gait.ankle_angle.values_at(percent))
     mean = float(np.degrees(gait.ankle_angle.mean)) - tilt

@@ -1,4 +1,4 @@
-"""Plausibility of knee accelerations: range, mean and sign, and how the knee turns about the ankle that stands."""
+"""Plausibility of knee accelerations: range, mean, sign, and rotation of the knee about the standing ankle."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -29,7 +29,11 @@ Factors = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class _Mistake:
-    """A possible mistake, its remedy in words, and the corrected curves as fractions of the given (forward, up)."""
+    """Possible mistake in the knee accelerations: description, remedy, and correction.
+
+    ``forward`` and ``up`` are the coefficients with which each corrected curve is computed from the given (forward,
+    up).
+    """
 
     words: str
     remedy: str
@@ -41,7 +45,7 @@ _G = STANDARD_GRAVITY
 
 
 def _too_small(factor: float, words: str) -> tuple[_Mistake, ...]:
-    """Return numbers that are too small by a factor; knee_up alone is too small over the flat foot to be recognised."""
+    """Return the mistakes of values too small by a factor; for knee_up alone, the mistake cannot be recognised."""
     return (
         _Mistake(f"are {words}", f"multiply both by {factor:g}", (factor, 0.0), (0.0, factor)),
         _Mistake(f"differ, knee_forward is {words}", f"multiply it by {factor:g}", (factor, 0.0), (0.0, 1.0)),
@@ -49,7 +53,10 @@ def _too_small(factor: float, words: str) -> tuple[_Mistake, ...]:
 
 
 def _too_large(factor: float) -> tuple[_Mistake, ...]:
-    """Return numbers that are too large by a factor; one alone is first, since knee_up divided is as good as none."""
+    """Return the mistakes of values too large by a factor, first for one curve alone.
+
+    The order matters because a knee_up divided by the factor fits almost as well as none.
+    """
     words, fraction = f"{factor:g} times too large", 1.0 / factor
     return (
         _Mistake(f"differ, knee_forward is {words}", f"divide it by {factor:g}", (fraction, 0.0), (0.0, 1.0)),
@@ -79,13 +86,13 @@ _WHERE: dict[SignSource, str] = {
 
 
 def turning_remarks(walk: MeanStride) -> list[str]:
-    """Return a remark where a mistake would explain a part of how the knee misses the standing ankle."""
+    """Return a remark if a mistake would partly explain the misfit of the knee to a rotation about the ankle."""
     found = _mistaken_turning(walk)
     return [] if found is None else [f"{found[0]}, which may be the walk itself"]
 
 
 def _mistaken_turning(walk: MeanStride) -> tuple[str, str, float] | None:
-    """Return a mistake that would explain the knee's turning, its remedy, and the fraction [-] of the misfit left."""
+    """Return the mistake that explains the knee's misfit, its remedy, and the remaining fraction of the misfit [-]."""
     if any(name not in walk.curves for name in KNEE):
         return None
     expected = turning_about_ankle(walk.curves["shank_angle"], walk.stride_time)
@@ -108,9 +115,9 @@ def _mistaken_turning(walk: MeanStride) -> tuple[str, str, float] | None:
 
 
 def turning_about_ankle(shank: Floats, stride_time: float) -> Floats:
-    """Return forward and up acceleration (2 x samples) of a knee over a resting ankle, per shank length [1/s^2].
+    """Return the acceleration (2 x samples: forward, up) of a knee above a resting ankle, per shank length [1/s^2].
 
-    ``shank`` is phi [rad] at 101 phases; the ankle stands at (L sin phi, -L cos phi) from the knee.
+    ``shank`` is phi [rad] at 101 phases; relative to the knee the ankle is at (L sin phi, -L cos phi).
     """
     curve, _ = fit_curve(shank, HARMONICS["shank_angle"])
     percent = np.linspace(0.0, 1.0, shank.size)[FOOT_FLAT]
@@ -124,7 +131,7 @@ def turning_about_ankle(shank: Floats, stride_time: float) -> Floats:
 
 
 def _misfit(measured: Floats, expected: Floats) -> float:
-    """Return the misfit of the best shank as a fraction of its turning; infinite for a shank at rest."""
+    """Return the misfit for the best shank length relative to the expected acceleration [-]; infinite at rest."""
     square = float(np.sum(expected**2))
     if square == 0.0:
         return float("inf")
@@ -148,7 +155,7 @@ _PARTS = {"knee_forward": ((-0.3, 0.0), (0.3, 0.6)), "knee_up": ((0.0, 0.3), (0.
 
 
 def check_knee(walk: MeanStride) -> None:
-    """Raise DataError for knee accelerations, where there are some, that no leg has."""
+    """Raise DataError for knee accelerations that no leg can have; a stride without accelerations passes."""
     there = [name for name in KNEE if name in walk.curves]
     if len(there) == 1:
         (missing,) = set(KNEE) - set(there)
@@ -162,7 +169,7 @@ def check_knee(walk: MeanStride) -> None:
 
 
 def check_knee_means(walk: MeanStride) -> None:
-    """Raise DataError for accelerations of the knee, where there are some, that do not average to 0 over a stride."""
+    """Raise DataError for knee accelerations that do not average to 0 over a stride; a stride without any passes."""
     # Without the last sample, which is the first phase again.
     means = {name: float(np.mean(walk.curves[name][:-1])) for name in KNEE if name in walk.curves}
     raise_noted(

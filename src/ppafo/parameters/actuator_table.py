@@ -1,6 +1,6 @@
-"""The curves of a measured actuator, from the volumes in its file: splines over the angle, straight over the pressure.
+"""Curves of a measured actuator, fitted to the volumes in its file: cubic splines in the angle, linear in the pressure.
 
-``model/actuators/table.py`` has what they are in a run.
+``model/actuators/table.py`` evaluates these curves in a run.
 """
 
 import math
@@ -30,15 +30,15 @@ _ROUNDING = 1.0e-9
 
 
 def read_actuator_table(path: Path) -> Table:
-    """Return the curves of a measured actuator from its file; ParameterError, with the file, for one without curves."""
+    """Return the curves of a measured actuator from its file; ParameterError names the file if they cannot be built."""
     return table_of(read_measured_volumes(path), label(str(path)))
 
 
 def table_of(measured: MeasuredVolumes, file: str) -> Table:
-    """Return the curves through measured volumes; ``file`` is what messages call them.
+    """Return the curves through measured volumes; ``file`` is the label used in messages.
 
-    Where a curve between the angles would be negative or fall with the pressure, the volumes are moved within their
-    last digit, as little as possible. ParameterError where that is not enough.
+    If a curve would be negative between the angles or fall with the pressure, the volumes are moved within their last
+    digit, as little as possible. Raises ParameterError if moves within the last digit are not enough.
     """
     angles = measured.angles
     shares = (angles - angles[0]) / (angles[-1] - angles[0])
@@ -64,7 +64,7 @@ def table_of(measured: MeasuredVolumes, file: str) -> Table:
 
 
 def largest_move(path: Path) -> tuple[float, float]:
-    """Largest move of a volume of a file within its last digit [m^3], and that digit [m^3]; 0 for exact curves."""
+    """Return the largest move of a volume of a file [m^3] and its last digit [m^3]; the move is 0 for exact curves."""
     measured = read_measured_volumes(path)
     shares = (measured.angles - measured.angles[0]) / (measured.angles[-1] - measured.angles[0])
     _, first = within_resolution(measured.volume_1, shares, measured.resolution_1)
@@ -75,11 +75,11 @@ def largest_move(path: Path) -> tuple[float, float]:
 
 
 def within_resolution(volume: Floats, shares: Floats, resolution: float) -> tuple[Floats, float]:
-    """Volumes [m^3] (angles, pressures) whose curves are those of a chamber, and how far one is moved at most [m^3].
+    """Volumes [m^3] (angles, pressures) with admissible chamber curves, and the largest move of a volume [m^3].
 
-    The curves are 0 or more, grow with the pressure, and at the highest pressure their numbers grow with the angle.
-    The largest move is the least one, by linear programming; nothing is moved where more than half of the last digit
-    ``resolution`` [m^3] would be needed.
+    Admissible curves are 0 or more, grow with the pressure and, at the highest pressure, grow from angle to angle.
+    Linear programming minimises the largest move. No volume is moved if more than half of the last digit ``resolution``
+    [m^3] would be needed.
     """
     bends = shares[2:-2]
     spline = _basis(_CHECKED_SHARES, bends)[:, : shares.size] @ np.linalg.inv(_basis(shares, bends)[:, : shares.size])
@@ -116,14 +116,14 @@ def within_resolution(volume: Floats, shares: Floats, resolution: float) -> tupl
 
 
 def measured_pressures(table: Table) -> tuple[float, float]:
-    """Return the lowest and the highest pressure measured [Pa, gauge]; infinite where one pressure stands for all."""
+    """Return the lowest and the highest measured pressure [Pa, gauge]; infinite if the file has only one pressure."""
     rises = [rise for rise in table.chamber_1.rises if rise.lower < _UNREACHED]
     lowest = min((rise.lower for rise in rises), default=-math.inf)
     return lowest, max((rise.lower + rise.length for rise in rises), default=math.inf)
 
 
 def _chamber(volume: Floats, pressures: Floats, shares: Floats) -> TabulatedChamber:
-    """Return a chamber from its volumes [m^3] (angles, pressures) at gauge pressures [Pa] and shares of the range."""
+    """Return a chamber from volumes [m^3] (angles, pressures), gauge pressures [Pa] and fractions of the range."""
     rises = [
         Rise(float(lower), float(upper - lower), _curve(volume[:, index + 1] - volume[:, index], shares))
         for index, (lower, upper) in enumerate(pairwise(pressures))
@@ -133,23 +133,23 @@ def _chamber(volume: Floats, pressures: Floats, shares: Floats) -> TabulatedCham
 
 
 def _curve(values: Floats, shares: Floats) -> Curve:
-    """Return the spline through values (angles,) that is one cubic over its first two and last two stretches."""
+    """Return the cubic spline through values (angles,) with not-a-knot end conditions."""
     coefficients = np.linalg.solve(_basis(shares, shares[2:-2])[:, : values.size], values).tolist()
     powers, bends = coefficients[:_POWERS], coefficients[_POWERS:]
     return Curve((*powers, *[0.0] * (_POWERS - len(powers))), (*bends, *[0.0] * (BENDS - len(bends))))
 
 
 def _basis(shares: Floats, bends: Floats) -> Floats:
-    """Return what the coefficients of a curve stand before, (shares, coefficients).
+    """Return the design matrix of a spline, of shape (shares, coefficients).
 
-    These are the powers of the share, and the cube of what it is beyond each bend.
+    The columns are the powers of the fraction of the angle range, then the cubes of its excess above each knot.
     """
     powers = shares[:, None] ** np.arange(_POWERS)
     return np.hstack([powers, np.maximum(shares[:, None] - bends, 0.0) ** 3])
 
 
 def _check_curves(chamber: TabulatedChamber, bends: Floats, angles: Floats, name: str, file: str) -> None:
-    """Refuse a chamber of which a curve swings so far between the angles that it is negative."""
+    """Raise ParameterError if a curve of a chamber becomes negative between the measured angles."""
     basis, curves = _basis(_CHECKED_SHARES, bends), (chamber.lowest, *(rise.gain for rise in chamber.rises))
     found = [basis @ np.array([*curve.powers, *curve.bends[: bends.size]]) for curve in curves]
     # Twice what is left as it is: there the same numbers are summed in another order.

@@ -1,4 +1,4 @@
-"""Construction of a device in SI units from a parameter set, which must be complete and consistent by then."""
+"""Construction of a device in SI units from a complete and consistent parameter set."""
 
 import math
 import operator
@@ -56,9 +56,9 @@ _FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 
 
 def build_device(parameter_set: ParameterSet, valve: str | None = None, links: Graph | None = None) -> Device:
-    """Return the device with one of the set's valves (default: the set's own choice), in SI units.
+    """Return the device in SI units with one of the set's valves (default: the set's default valve).
 
-    ``links`` are the set's unless given.
+    ``links`` replaces the links of the set, if given.
     """
     name = chosen_valve(parameter_set, valve)
     links = links_of_set(parameter_set) if links is None else links
@@ -127,7 +127,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
 
 
 def growth_and_problem(device: Device) -> tuple[Any, Problem]:
-    """Return how chamber 1 of an actuator grows on average [m^3/rad], and where it does not; in columns too."""
+    """Return the mean volume change of chamber 1 with angle [m^3/rad], and the problem if not positive; elementwise."""
     # That of a vane is a number of its set, which is above 0.
     growth = device.actuator.displacement_per_radian if device.actuator.kind == VANE else shape_and_growth(device)[1]
 
@@ -162,7 +162,7 @@ def _actuator(parameter_set: ParameterSet, read: Reader) -> Actuator:
 
 
 def actuator_problem(actuator: Actuator) -> str:
-    """Return what of the numbers of an actuator does not fit together, in words; empty where all of it does."""
+    """Return a message on actuator numbers that contradict each other; empty if consistent."""
     stops = Range(
         angle_min=actuator.angle_min,
         angle_max=actuator.angle_max,
@@ -183,7 +183,7 @@ def actuator_problem(actuator: Actuator) -> str:
 
 
 def beyond_pressures(device: Device) -> Problem:
-    """Return where the supply is beyond the pressures at which a table was measured, in columns too."""
+    """Return the problem of a supply outside the pressures at which a table was measured; elementwise."""
     table, supply = device.actuator.table, device.supply
     if table is None:
         lowest, highest = -math.inf, math.inf
@@ -208,9 +208,9 @@ def beyond_pressures(device: Device) -> Problem:
 
 
 def _reader(parameter_set: ParameterSet) -> Reader:
-    """Return what reads a section in SI, checked against declared units and ranges; what it leaves out has its default.
+    """Return a reader of a section: values in SI, checked against declared units and ranges, defaults for missing ones.
 
-    A number without a default must be there.
+    A number without a default must be present.
     """
     declared = parameter_set.declarations()
     atmosphere = atmospheric_pressure(parameter_set)
@@ -237,14 +237,14 @@ def _orifice(parameter_set: ParameterSet, read: Reader, section: str) -> Orifice
 
 
 def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:
-    """Return the names by which an orifice is given in both forms at once, none where it is in one or in neither."""
+    """Return the names of the orifice numbers if they mix both forms; empty if they use one form or none."""
     paths = [f"{section}.{name}" for form in FORMS["valve"] for name in sorted(form)]
     stated = [path for path in paths if path in parameter_set.numbers]
     return tuple(path.rpartition(".")[2] for path in stated) if in_two_forms(stated) else ()
 
 
 def _uses_sonic_form(parameter_set: ParameterSet, section: str) -> bool:
-    """Tell which form an orifice is given in; both at once would contradict each other."""
+    """Return True for an orifice in the form of ISO 6358; ParameterError for an orifice in both forms."""
     both = both_forms(parameter_set, section)
     if both:
         wanted = either(f"{section}.{both[0]}")
@@ -253,7 +253,7 @@ def _uses_sonic_form(parameter_set: ParameterSet, section: str) -> bool:
 
 
 def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:
-    """Return the paths that a device with a valve of the set needs, and that the set has no value at."""
+    """Return the paths of the values that a device with this valve needs and the set lacks."""
     needed = [
         f"{name}.{member.name}"
         for name in _FLAT_SECTIONS
@@ -272,7 +272,7 @@ def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:
 
 
 def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:
-    """Rules between two numbers: path, relation, path of the other, and whether it holds (in columns, for each run)."""
+    """Rules between two numbers: path, relation, path of the other, and True if it holds (elementwise over runs)."""
     actuator, friction, supply = device.actuator, device.friction, device.supply
     # Of two supplies on either side of the atmosphere both would turn the joint one way.
     pressures = supply.pressure, supply.dorsiflexion_pressure

@@ -1,7 +1,7 @@
-"""Every value that a parameter set can hold: section, name, SI unit, range and meaning.
+"""All numbers that a parameter set may contain: section, name, SI unit, range and meaning.
 
-The schema, the conversion to SI, the messages and the table of ``ppafo sets show`` all read this list. Pressures are
-``Pa_a`` (a level, absolute in SI). Limits are wide: they exclude slips of the pen and what no solver could handle.
+The schema, the conversion to SI, the messages and the table of ``ppafo sets show`` use this list. A pressure level is
+in ``Pa_a``, absolute. The limits are wide: they exclude typing errors and numbers that no solver could handle.
 """
 
 import functools
@@ -75,32 +75,32 @@ _ALTERNATIVE_UNITS = {"N m s/rad": ("N m s",)}
 
 
 def alternatives(quantity: Quantity) -> tuple[str, ...]:
-    """Return the SI units in which a value may be given; 1/rad is often left out of a damping, as in the paper."""
+    """Return the SI units in which a value may be given: a damping also without 1/rad, as in the paper."""
     return (quantity.unit, *_ALTERNATIVE_UNITS.get(quantity.unit, ()))
 
 
 def is_within(value: float, quantity: Quantity) -> bool:
-    """Tell whether an SI value keeps the limits of its declaration."""
+    """Return True if an SI value is within its declared limits."""
     above = value >= quantity.minimum if quantity.minimum_allowed else value > quantity.minimum
     return above and value <= quantity.maximum
 
 
 def actuator_quantities(kind: str) -> tuple[Quantity, ...]:
-    """Return what a set says of an actuator of a kind, beside its leak; the vane's is ``ACTUATOR``."""
+    """Return the quantities that a set may state for a kind of actuator, leak excluded; ``ACTUATOR`` for the vane."""
     if kind == VANE.name:
         return ACTUATOR
     return (*ACTUATORS[kind].quantities, *(quantity for quantity in ACTUATOR if quantity.name not in _OF_A_VANE))
 
 
 def members(section: str, actuator_kind: str) -> tuple[Quantity, ...]:
-    """Return the numbers of a section of ``SECTIONS``, with an actuator of a kind."""
+    """Return the numbers of a section of ``SECTIONS``, for a kind of actuator."""
     return actuator_quantities(actuator_kind) if section == "actuator" else SECTIONS[section]
 
 
 def quantities(
     valve_kinds: Mapping[str, str], actuator_kind: str = VANE.name, species: str = ""
 ) -> Mapping[str, Quantity]:
-    """Return every number's declaration by path, for a set with such valves, by name, such an actuator and a gas."""
+    """Return the declarations of all numbers by path, for the valves of a set by name, its actuator and its gas."""
     # Effects are part of the key: another package's may be loaded between two calls.
     return _by_path(tuple(valve_kinds.items()), actuator_kind, species, device_effects())
 
@@ -121,7 +121,7 @@ def _by_path(
 
 
 def fits(unit: str, si_unit: str) -> bool:
-    """Tell whether a unit converts to an SI unit."""
+    """Return True if a unit converts to an SI unit."""
     try:
         to_si(1.0, unit, si_unit)
     except UnitError:
@@ -130,9 +130,9 @@ def fits(unit: str, si_unit: str) -> bool:
 
 
 def limits_text(quantity: Quantity, given: str = "") -> str:
-    """Return the limits of a declaration as a message states them: ``at least 0 cm^3 and at most 1000 cm^3``.
+    """Return declared limits as text for a message: ``at least 0 cm^3 and at most 1000 cm^3``.
 
-    They are in the unit in which a value was ``given``, where that is known and fits, else in the one that is shown.
+    The limits are in the unit ``given`` by the user if it is known and fits, else in the display unit.
     """
     unit = given if given and fits(given, quantity.unit) else shown_unit(quantity.unit)
     # The limits of a pressure are absolute; in gauge they would move with the atmosphere.

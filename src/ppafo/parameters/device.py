@@ -1,4 +1,4 @@
-"""Device in SI units: plain frozen values with which the rest of the package computes."""
+"""Device in SI units, as immutable values used by all computations."""
 
 import math
 from collections.abc import Mapping
@@ -21,13 +21,13 @@ VANE = "vane"
 
 
 class _Holding(Protocol):
-    """A section of a device or scenario that shows numbers of its fields ``HELD``, mappings or objects, as its own."""
+    """Section of a device or scenario that exposes the numbers of its fields ``HELD`` as attributes."""
 
     HELD: ClassVar[tuple[str, ...]]
 
 
 def held_in(section: _Holding, name: str) -> str | None:
-    """Return which field of ``HELD`` has a number; None where none has it."""
+    """Return the field of ``HELD`` that contains a number; None if no field does."""
     for field_name in section.HELD:
         holder = getattr(section, field_name)
         if name in holder if isinstance(holder, Mapping) else hasattr(holder, name):
@@ -36,7 +36,7 @@ def held_in(section: _Holding, name: str) -> str | None:
 
 
 def held(section: _Holding, name: str) -> Any:
-    """Return a number of one of the fields of ``HELD``, for ``__getattr__``; AttributeError where none has it."""
+    """Return a number from the fields of ``HELD``, for ``__getattr__``; AttributeError if no field has it."""
     # A copy asks for names that begin so, and for the fields themselves, before there are any.
     if not name.startswith("_") and name not in section.HELD:
         field_name = held_in(section, name)
@@ -48,7 +48,7 @@ def held(section: _Holding, name: str) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Gas:
-    """A gas at one temperature: molar mass [kg/mol], heat capacity ratio [-], temperature [K]."""
+    """Gas at constant temperature: molar mass [kg/mol], heat capacity ratio [-], temperature [K]."""
 
     species: str
     molar_mass: Annotated[float, Number("kg/mol", "molar mass", minimum=1e-3, maximum=0.5)]
@@ -63,7 +63,7 @@ class Gas:
 
 @dataclass(frozen=True, slots=True)
 class Orifice:
-    """A restriction in the paper's form: area [m^2], discharge coefficient [-]; equations (6) and (7)."""
+    """Orifice in the paper's form: area [m^2], discharge coefficient [-]; equations (6) and (7)."""
 
     area: Annotated[float, Number("m^2", "area of the opening", minimum=0.0, maximum=1e-2)]
     discharge_coefficient: Annotated[
@@ -73,7 +73,7 @@ class Orifice:
 
 @dataclass(frozen=True, slots=True)
 class SonicOrifice:
-    """A restriction in the form of ISO 6358: sonic conductance [m^3/(s Pa)], critical pressure ratio [-]."""
+    """Orifice in the form of ISO 6358: sonic conductance [m^3/(s Pa)], critical pressure ratio [-]."""
 
     sonic_conductance: Annotated[
         float, Number("m^3/(s Pa)", "sonic conductance C of ISO 6358", minimum=0.0, maximum=1e-4)
@@ -86,9 +86,10 @@ class Actuator:
     """An actuator between two stops; chamber 1 grows with the angle. Equations (2), (4), (5).
 
     torque_constant [m^3], displacement_per_radian [m^3/rad], angle_min and angle_max [rad], dead_volume_1 and
-    dead_volume_2 [m^3], restitution of the stops [-], leak between the chambers. ``kind`` is its name in the
-    catalogue; one that is no vane has ``settings`` in SI, all of them present, one that was measured its ``table``, a
-    ``model.actuators.table.Table``, and the first two numbers are then means over the range.
+    dead_volume_2 [m^3], restitution of the stops [-], leak between the chambers. ``kind`` is the name in the catalogue
+    of actuators. ``settings`` are the complete settings [SI] of a kind other than the vane. ``table`` is the
+    ``model.actuators.table.Table`` of a measured actuator. For both of the latter, torque_constant and
+    displacement_per_radian are means over the angle range.
     """
 
     torque_constant: float
@@ -110,7 +111,7 @@ class Actuator:
 
     @property
     def has_one_chamber(self) -> bool:
-        """True where chamber 2 is nothing but the dead volume behind the second port of the valve."""
+        """True if chamber 2 consists only of the dead volume at the second port of the valve."""
         return ACTUATORS[self.kind].has_one_chamber(self.table)
 
 
@@ -127,7 +128,7 @@ class Friction:
 
 @dataclass(frozen=True, slots=True)
 class FootPlate:
-    """Foot plate: inertia about the ankle [kg m^2], largest gravity torque m g l [N m]; equation (1)."""
+    """Foot plate: inertia about the ankle [kg m^2], maximum gravity torque m g l [N m]; equation (1)."""
 
     inertia: Annotated[
         float, Number("kg m^2", "inertia about the ankle", minimum=0.0, maximum=1e3, minimum_allowed=False)
@@ -139,10 +140,10 @@ class FootPlate:
 
 @dataclass(frozen=True, slots=True)
 class Supply:
-    """Regulated pressures [Pa absolute]: to chamber 1, to chamber 2 (dorsiflexion), and the atmosphere.
+    """Supply pressures of chamber 1 and of chamber 2 (dorsiflexion), and atmospheric pressure, all [Pa absolute].
 
-    ``relieving`` is True where the regulators take gas back from a chamber above their pressure. A supply below the
-    atmosphere is a vacuum, into which the gas of a chamber goes.
+    ``relieving`` is True if the regulators vent a chamber whose pressure exceeds their set pressure. A supply below the
+    atmosphere is a vacuum and takes gas from the chamber.
     """
 
     pressure: Annotated[float, Number("Pa_a", "regulated pressure to chamber 1", minimum=1e3, maximum=1e8)]
@@ -154,26 +155,26 @@ class Supply:
 
     @property
     def has_one_pressure(self) -> bool:
-        """Tell whether both regulators are set to one pressure, so that they are changed together."""
+        """True if both regulators are set to the same pressure, so that they change together."""
         # Two texts of one pressure in two units differ in the last bits.
         return math.isclose(self.pressure, self.dorsiflexion_pressure, rel_tol=SAME_PRESSURE)
 
     @property
     def is_vacuum(self) -> bool:
-        """True where a supply is below the atmosphere; of an ensemble the first run says it for all."""
+        """True if a supply is below the atmosphere; in an ensemble the first run decides for all."""
         return min(first(self.pressure), first(self.dorsiflexion_pressure)) < first(self.atmospheric_pressure)
 
     @property
     def takes_back(self) -> bool:
-        """True where gas may flow from a chamber into its supply."""
+        """True if gas may flow from a chamber back into its supply."""
         return self.relieving or self.is_vacuum
 
 
 @dataclass(frozen=True, slots=True)
 class Valve:
-    """A valve: its kind in the catalogue, its orifice fully open, and its settings in SI, all of them present.
+    """Valve: kind in the catalogue, orifice when fully open, and complete settings in SI.
 
-    Their numbers are attributes: ``valve.area``, ``valve.dead_band``.
+    Settings and orifice numbers are attributes: ``valve.area``, ``valve.dead_band``.
     """
 
     kind: str
@@ -182,13 +183,13 @@ class Valve:
     HELD: ClassVar[tuple[str, ...]] = ("settings", "orifice")
 
     def __getattr__(self, name: str) -> Any:
-        """Return a setting, or a number of the orifice, by its name."""
+        """Return a setting or a number of the orifice by its name."""
         return held(self, name)
 
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """Computation of flow: pressure ratio [-] above which it is linear in the ratio, as in ISO 6358."""
+    """Flow computation: pressure ratio [-] above which the flow is linear in the ratio, as in ISO 6358."""
 
     linear_ratio: Annotated[
         float, Number("", "pressure ratio above which flow is linear", minimum=0.99, maximum=0.9999)
@@ -197,11 +198,11 @@ class Flow:
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """A complete device with the one valve that was chosen; everything that a run needs to know of the hardware.
+    """Complete device with its chosen valve: all hardware data of a run.
 
-    ``effects`` has the settings [SI] of effects by their names, of those that anything was said of; the others are off.
-    ``links`` say which of its numbers follow others that are varied; ``joint`` is what it turns, in words.
-    ``units`` are those, by unit in SI, in which the author of its parameter set writes.
+    ``effects`` has the settings [SI] of each mentioned effect by name; all other effects are off. ``links`` define the
+    numbers that follow others when these are varied. ``joint`` names the turned joint and its movements. ``units`` maps
+    each SI unit to the unit used by the author of the parameter set.
     """
 
     name: str
@@ -220,16 +221,16 @@ class Device:
 
     @property
     def shown(self) -> dict[str, str]:
-        """The units in which a person is shown its numbers, and the atmosphere from which gauge pressures count."""
+        """Display units of the device by SI unit, and the atmosphere as zero of gauge pressures."""
         return counted_from(self.units, first(self.supply.atmospheric_pressure))
 
     @property
     def has_torque_constant(self) -> bool:
-        """True where the torque is a constant times the difference of both pressures."""
+        """True if the torque is a constant times the pressure difference of the chambers."""
         return ACTUATORS[self.actuator.kind].model.has_torque_constant
 
     def check_pressurised(self, what: str, remedy: str = "") -> None:
-        """Raise ParameterError, with a remedy, where ``what`` needs supplies that are not below the atmosphere."""
+        """Raise ParameterError, with a remedy, if a supply is a vacuum, which ``what`` does not allow."""
         if self.supply.is_vacuum:
             pressures = self.supply.pressure, self.supply.dorsiflexion_pressure
             with shown_in(self.shown):
@@ -240,7 +241,7 @@ class Device:
             )
 
     def check_torque_constant(self, what: str) -> None:
-        """Raise ParameterError where ``what`` needs a torque that is a constant times the difference of pressures."""
+        """Raise ParameterError if the torque is not proportional to the pressure difference, as ``what`` needs."""
         if not self.has_torque_constant:
             raise ParameterError(
                 f"{what} needs a torque that is a constant times the difference of both pressures, as a vane has it; "

@@ -1,4 +1,4 @@
-"""Effects of a device: which are on, their settings, and the rows of numbers with which a program computes them."""
+"""Effects of a device: active effects, their settings, and the parameter rows used by a program."""
 
 from collections.abc import Iterable, Mapping
 from functools import cache
@@ -21,7 +21,7 @@ _NO_SECTIONS: Sections = {}
 
 
 def settings_of(device: Device, effect: Effect, others: Sections = _NO_SECTIONS) -> dict[str, Any]:
-    """Return the settings [SI] of an effect, arrays (runs,) where they vary; its defaults where nothing is said."""
+    """Return the settings [SI] of an effect, arrays (runs,) if varied; defaults for settings that are not given."""
     if effect.section in others or effect.always:
         section = others[effect.section] if effect.section in others else getattr(device, effect.section)
         return {quantity.name: getattr(section, quantity.name) for quantity in effect.quantities}
@@ -29,19 +29,19 @@ def settings_of(device: Device, effect: Effect, others: Sections = _NO_SECTIONS)
 
 
 def all_settings(device: Device) -> dict[str, dict[str, Any]]:
-    """Return the settings [SI] of all effects of devices that are loaded, by name."""
+    """Return the settings [SI] of all loaded effects of devices, by name."""
     return {effect.name: settings_of(device, effect) for effect in _effects(device) if effect.is_of_device}
 
 
 def number_under(node: Any, attributes: Iterable[str]) -> Any:
-    """Return the number to which attributes lead from a device, or from what has one; it may be an array (runs,)."""
+    """Return the number at a chain of attributes below a device or its owner; may be an array (runs,)."""
     for name in attributes:
         node = part_of(node, name)
     return node
 
 
 def part_of(node: Any, name: str) -> Any:
-    """Return an attribute or entry of a part of a device, or of what has one."""
+    """Return an attribute or entry of a part of a device, or of its owner."""
     # A device has settings of the effects that its set names; those of all others are their defaults.
     if name == SECTION and isinstance(node, Device):
         return all_settings(node)
@@ -49,7 +49,7 @@ def part_of(node: Any, name: str) -> Any:
 
 
 def effects_of(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Effect, ...]:
-    """Return the effects that are on, in the order in which they act; of columns the first run's."""
+    """Return the active effects in the order in which they act; in an ensemble the first run decides."""
     return tuple(
         effect
         for effect in _effects(device)
@@ -58,24 +58,24 @@ def effects_of(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Effect,
 
 
 def switches_of(device: Device) -> dict[Effect, Any]:
-    """Return for each effect of a device whether it is on; an array (runs,) where settings that switch it vary."""
+    """Return, for each effect of a device, True if active; an array (runs,) if the deciding settings vary."""
     settings = all_settings(device)
     return {effect: effect.is_on(settings[effect.name]) for effect in ordered_effects() if effect.is_of_device}
 
 
 def _effects(device: Device) -> tuple[Effect, ...]:
-    """Return the effects that may act, in their order: a device from another process may name what is not loaded."""
+    """Return all loaded effects in order, after loading the effects that the device names."""
     find_effects(f"{SECTION}.{name}" for name in device.effects)
     return ordered_effects()
 
 
 def effect_rows(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Any, ...]:
-    """Return the rows of the effects that are on; numbers are arrays (runs,) where settings or the device vary."""
+    """Return the parameter rows of the active effects; numbers are arrays (runs,) if settings or device vary."""
     return tuple(effect_row(effect, device, others) for effect in effects_of(device, others))
 
 
 def effect_row(effect: Effect, device: Device, others: Sections = _NO_SECTIONS) -> Any:
-    """Return the row of an effect for a device, whether it is on or not; numbers are arrays (runs,) where they vary."""
+    """Return the parameter row of an effect, active or not; numbers are arrays (runs,) if they vary."""
     settings, prepare = settings_of(device, effect, others), effect.prepare
     # Most effects compute with their settings as they are.
     if prepare is None:
@@ -95,7 +95,7 @@ def effect_row(effect: Effect, device: Device, others: Sections = _NO_SECTIONS) 
 
 
 def _number(device: Device, section: str, name: str) -> Any:
-    """Return a number of a device; a setting of the actuator's kind comes before a field of the same name."""
+    """Return a number of a device; a setting of the actuator's kind takes precedence over a field of the same name."""
     if section == "actuator" and name in device.actuator.settings:
         return device.actuator.settings[name]
     return getattr(getattr(device, section), name)
@@ -103,7 +103,7 @@ def _number(device: Device, section: str, name: str) -> Any:
 
 @cache
 def _names(actuator_kind: str) -> dict[str, tuple[str, ...]]:
-    """Return the numbers of a device that effects see, by section."""
+    """Return the names of the device numbers that effects may read, by section."""
     names = {
         section: tuple(quantity.name for quantity in members(section, actuator_kind)) for section in SEEN_BY_EFFECTS
     }

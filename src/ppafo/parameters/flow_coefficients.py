@@ -1,11 +1,11 @@
-"""Cv, Kv and nominal flow of data sheets as C and b of ISO 6358, by which a valve passes gas.
+"""Conversion of Cv, Kv and nominal flow from data sheets to C and b of ISO 6358.
 
 Nominal flow ``qn`` goes from p1 = 7 bar to p2 = 6 bar, absolute, in litres at ANR. By ISO 6358 it is ``C p1 s`` with
-``s = sqrt(1 - ((p2/p1 - b)/(1 - b))^2)``, 254.3 L/min per L/(s bar) at b = 0.3. A valve of Cv = 1 passes 984 L/min of
-it, by ``q = 22.48 Cv sqrt((p1 - p2) p2/(G T))`` of ANSI/(NFPA) T3.21.3 [ft^3/min, psi absolute, degrees Rankine, G = 1
-of air] at 20 degC. So C = 3.87 L/(s bar) per Cv; a Kv is 1.156 Cv.
+``s = sqrt(1 - ((p2/p1 - b)/(1 - b))^2)``, 254.3 L/min per L/(s bar) at b = 0.3. A valve of Cv = 1 passes 984 L/min at
+these pressures, by ``q = 22.48 Cv sqrt((p1 - p2) p2/(G T))`` of ANSI/(NFPA) T3.21.3 [ft^3/min, psi absolute, degrees
+Rankine, G = 1 for air] at 20 degC. Hence C = 3.87 L/(s bar) per Cv; a Kv is 1.156 Cv.
 
-The number of a liquid, 17.0 mm^2 of orifice per Cv, is no use for gas: choked flow would be 13 % too small.
+The conversion for liquids, 17.0 mm^2 of orifice per Cv, does not hold for gas: choked flow would be 13 % too small.
 """
 
 import math
@@ -38,7 +38,7 @@ def nominal_flow_of_cv(cv: float) -> float:
 
 
 def conductance_of(name: str, text: str) -> float | None:
-    """Return C [m^3/(s Pa)] of ``cv``, ``kv`` or ``qn`` as it is written, ``0.05 m^3/h``; None for what is none."""
+    """Return C [m^3/(s Pa)] for ``cv``, ``kv`` or ``qn`` given as text, ``0.05 m^3/h``; None for an invalid text."""
     try:
         value, unit = split_number(text)
         is_flow = bool(unit) and is_volume_flow(unit)

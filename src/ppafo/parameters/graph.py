@@ -1,7 +1,7 @@
-"""Settings are a graph: a number that nobody gives follows others. Links are declared once, one function resolves them.
+"""Graph of settings: numbers that follow others unless given. Links are declared once and resolved by one function.
 
-Every door takes its settings through here: overrides, columns of studies, tuned and fitted values, exported libraries
-and units, episodes of agents. So a setting means the same at all of them.
+Overrides, study columns, tuned and fitted values, exported libraries and FMUs, and episodes of agents all resolve
+their settings here, so that a setting has the same meaning in all of them.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -26,22 +26,22 @@ _COUNTS_FROM_ATMOSPHERE = ("supply.", "initial.", "reference.")
 
 
 def itself(number: Any) -> Any:
-    """Return the number that is followed, unchanged."""
+    """Return the source number unchanged."""
     return number
 
 
 def fill(row: type, numbers: Sequence[Any]) -> Any:
-    """A NamedTuple of a class with these numbers."""
+    """Return a row of a NamedTuple class with the given numbers."""
     return row(*numbers)
 
 
 @dataclass(frozen=True, slots=True)
 class LinkFunction:
-    """A function of other numbers, floats or arrays (runs,), which is one of floats that can be translated to C.
+    """Function of other numbers, floats or arrays (runs,); its scalar form can be translated to C.
 
-    The first sources fill ``rows``, NamedTuple classes that declare their numbers, one after the other, and are given
-    to it as these; the sources after them one by one. ``orifice`` is the section of the orifice, if
-    any, whose form decides what is followed, and ``in_other_form`` the term of its other form.
+    The first sources fill ``rows``, NamedTuple classes that declare their numbers, and each row is one argument. The
+    remaining sources are arguments one by one. ``orifice`` is the section of an orifice whose form selects the sources;
+    ``in_other_form`` is the function for its other form.
     """
 
     sources: tuple[str, ...]
@@ -51,18 +51,18 @@ class LinkFunction:
     in_other_form: "LinkFunction | None" = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copy and pickle with the recipe of the function, which may be one that no module has."""
+        """Pickle the recipe of the function, which need not be defined in a module."""
         return _term, (self.sources, recipe_of(self.function), self.rows, self.orifice, self.in_other_form)
 
     def number(self, present: Callable[[str], Any]) -> Any:
-        """Return what the function makes of what the sources are at ``present``."""
+        """Return the value of the function, with its sources read by ``present``."""
         numbers = [present(source) for source in self.sources]
         if self.function is itself:
             return numbers[0]
         return over_runs(lambda *numbers: self.function(*self.arguments(numbers)), *numbers)
 
     def arguments(self, numbers: Sequence[Any], filled: Callable[[type, Sequence[Any]], Any] = fill) -> list[Any]:
-        """Return the function's arguments from a number for each source; ``filled`` makes a row of its numbers."""
+        """Return the arguments of the function from the source numbers; ``filled`` builds a row from its numbers."""
         arguments: list[Any] = []
         rest = list(numbers)
         for row in self.rows:
@@ -78,9 +78,10 @@ def _term(sources: tuple[str, ...], recipe: Any, *others: Any) -> LinkFunction:
 
 @dataclass(frozen=True, slots=True)
 class LinkedDefault:
-    """Default of a number as a function of others, in SI units: the sum of terms and a gap.
+    """Default of a number as the sum of functions of other numbers and an offset ``gap``, in SI units.
 
-    ``when_set``: only where the first source is given itself, not where that one only follows another in its turn.
+    With ``when_set`` the link acts only if its first source is given directly, not if that source follows another
+    number.
     """
 
     terms: tuple[LinkFunction, ...]
@@ -89,23 +90,23 @@ class LinkedDefault:
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """Paths of the numbers that it follows."""
+        """Paths of the source numbers."""
         return tuple(source for term in self.terms for source in term.sources)
 
     @property
     def is_same(self) -> bool:
-        """Tell whether the number equals its source."""
+        """True if the number equals its single source."""
         return not self.gap and [term.function for term in self.terms] == [itself]
 
     def number(self, present: Callable[[str], Any]) -> Any:
-        """Return what follows from what the sources are at ``present``."""
+        """Return the number that follows from its sources, read by ``present``."""
         first, *others = (term.number(present) for term in self.terms)
         total = sum(others, first)
         return total + self.gap if self.gap else total
 
 
 def follows(source: str, gap: float = 0.0, when_set: bool = False) -> LinkedDefault:
-    """Return the link to one number, with what is added to it."""
+    """Return a link to one number plus an offset ``gap``."""
     return LinkedDefault((LinkFunction((source,)),), gap, when_set)
 
 
@@ -114,31 +115,31 @@ Graph = Mapping[str, tuple[LinkedDefault, ...]]
 
 
 def counts_from(path: str, atmosphere: float) -> float:
-    """Return from which pressure [Pa absolute] a gauge pressure at a path counts.
+    """Return the zero [Pa absolute] of a gauge pressure at a path.
 
-    Pressures of the supply, of the start and of a reference count from the atmosphere of the device; what a controller
-    or a sensor is set to knows no weather and counts from the standard atmosphere.
+    Pressures of supply, start and reference are relative to the atmosphere of the device. Pressures of controllers and
+    sensors are relative to the standard atmosphere, whatever the weather.
     """
     fixed = fixed_zero(path)
     return atmosphere if fixed is None else fixed
 
 
 def fixed_zero(path: str) -> float | None:
-    """Return the standard atmosphere [Pa] where a gauge pressure at a path counts from that, None from the device's."""
+    """Return the standard atmosphere [Pa] if gauge pressures at a path count from it, None if from the device's."""
     return None if path.startswith(_COUNTS_FROM_ATMOSPHERE) else STANDARD_ATMOSPHERE
 
 
 def gauge_link(path: str, value: float, unit: str) -> tuple[LinkedDefault, ...]:
-    """Return the link of a pressure level that is given in gauge to the atmosphere; none for any other number."""
+    """Return the link of a gauge pressure to the atmosphere; an empty tuple for any other number."""
     if not unit.endswith(_GAUGE) or path == ATMOSPHERE_PATH or not path.startswith(_COUNTS_FROM_ATMOSPHERE):
         return ()
     return (follows(ATMOSPHERE_PATH, to_si(value, unit, _LEVEL, 0.0)),)
 
 
 def acting(graph: Graph, set_paths: Collection[str], turned: Collection[str] = ()) -> dict[str, LinkedDefault]:
-    """Return the links by which numbers change where those at some paths are given, in the order to resolve them.
+    """Return the links that change a number when the numbers at ``set_paths`` are given, in the order of resolution.
 
-    Those at the paths of ``turned`` follow by other terms than before, whatever is given.
+    Numbers at the paths of ``turned`` have new terms and are recomputed in any case.
     """
     found: dict[str, LinkedDefault] = {}
     for path, links in graph.items():
@@ -157,9 +158,9 @@ def acting(graph: Graph, set_paths: Collection[str], turned: Collection[str] = (
 def resolved(
     graph: Graph, replaced: Mapping[str, Any], present: Mapping[str, Any], orifices: Collection[str] = ()
 ) -> dict[str, Any]:
-    """Return all numbers that are given, and all that follow them by links that still hold of those ``present``.
+    """Return all given numbers, and all numbers that follow them by links consistent with ``present``.
 
-    Some orifices, by their sections, take the form that they have not.
+    The ``orifices``, named by section, change to their other form.
     """
     held = holding(graph, present)
     links = in_other_forms(held, orifices)
@@ -171,14 +172,14 @@ def resolved(
 
 
 def paths_in(graph: Graph) -> set[str]:
-    """Return all paths that links name: what follows, and what is followed in either form of an orifice."""
+    """Return all paths named by links: followers and sources, the latter in both forms of an orifice."""
     terms = [term for links in graph.values() for link in links for term in link.terms]
     turned = [term.in_other_form for term in terms if term.in_other_form is not None]
     return {*graph, *(source for term in (*terms, *turned) for source in term.sources)}
 
 
 def in_other_forms(graph: Graph, orifices: Collection[str]) -> Graph:
-    """Return the links as they are where some orifices, by their sections, take the form that they have not."""
+    """Return the links after some orifices, named by section, have changed to their other form."""
     if not orifices:
         return graph
 
@@ -193,7 +194,7 @@ def in_other_forms(graph: Graph, orifices: Collection[str]) -> Graph:
 
 
 def left(graph: Graph, replaced: Collection[str]) -> dict[str, tuple[LinkedDefault, ...]]:
-    """Return the links that remain once numbers are given: links of what is given go, as do links that it replaces."""
+    """Return the links that remain after numbers are given: given numbers lose theirs, and ``when_set`` links win."""
     changed = acting(graph, replaced)
     return {
         path: (changed[path],) if path in changed and changed[path].when_set else links
@@ -203,12 +204,12 @@ def left(graph: Graph, replaced: Collection[str]) -> dict[str, tuple[LinkedDefau
 
 
 def outside(graph: Graph, *sections: str) -> dict[str, tuple[LinkedDefault, ...]]:
-    """Return the links of the numbers that are in none of some sections, such as ``controller``, which are left out."""
+    """Return the links of all numbers outside the given sections, such as ``controller``."""
     return {path: links for path, links in graph.items() if path.partition(".")[0] not in sections}
 
 
 def holding(graph: Graph, present: Mapping[str, Any]) -> dict[str, tuple[LinkedDefault, ...]]:
-    """Return the links that are still true of numbers which may have been changed by other means since."""
+    """Return the links that still hold for the numbers ``present``, which may have been changed independently."""
     links_held = {path: tuple(link for link in links if _holds(path, link, present)) for path, links in graph.items()}
     return {path: links for path, links in links_held.items() if links}
 

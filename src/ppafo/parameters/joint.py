@@ -1,4 +1,4 @@
-"""Joint that an actuator turns, in words: its name and its two directions."""
+"""Joint turned by an actuator: its name and the names of its two movements."""
 
 from dataclasses import dataclass
 
@@ -16,14 +16,14 @@ OPPOSITES |= {second: first for first, second in OPPOSITES.items()}
 
 @dataclass(frozen=True, slots=True)
 class JointNames:
-    """Joint that the actuator turns, in words: its name, the movement of a growing angle, and of a falling one."""
+    """Joint turned by the actuator: its name, and the movements of increasing and of decreasing angle."""
 
     name: str = "ankle"
     positive: str = "plantarflexion"
     negative: str = "dorsiflexion"
 
     def said(self, text: str) -> str:
-        """Return a text about an ankle as one about this joint."""
+        """Return a text about the ankle reworded for this joint."""
         words = zip(("ankle", "plantarflexion", "dorsiflexion"), (self.name, self.positive, self.negative), strict=True)
         for usual, own in words:
             text = text.replace(usual, own).replace(usual.capitalize(), own.capitalize())

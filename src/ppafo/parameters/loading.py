@@ -1,4 +1,4 @@
-"""The layout of a parameter set file, built from the declarations; from a name or file to a set, and back to a file."""
+"""Parameter set files: layout from the declarations, loading by name or path, and writing."""
 
 import functools
 import json
@@ -60,7 +60,7 @@ def _capital(kind: str) -> str:
 
 
 def _actuator_section(kind: str) -> Any:
-    """Return the section of an actuator of a kind; a vane needs no ``kind``: older sets have none."""
+    """Return the model of the actuator section for a kind; ``kind`` is optional for a vane, as in older sets."""
     described = ACTUATORS[kind].summary
     named = Field(kind, description=described) if kind == VANE else Field(description=described)
     leak = _section("Leak", declaration.ORIFICE)
@@ -75,7 +75,7 @@ def _actuator_section(kind: str) -> Any:
 
 
 def _sections() -> dict[str, Any]:
-    """Return the sections that hold values, each a model, all of them optional: a set may have gaps."""
+    """Return the models of all sections with values; all are optional, since a set may be incomplete."""
     valve_reports = _section("ReportedOfAValve", declaration.REPORTED_OF_A_VALVE)
     reported = {
         declaration.REPORTED_FORMULA: optional(TextEntry, "exponent inside C1, a formula in k"),
@@ -102,14 +102,14 @@ def _sections() -> dict[str, Any]:
 def parameter_file() -> type[BaseModel]:
     """Return the model of a parameter set file, for the valves, actuators and effects that are loaded.
 
-    A file that names none of a kind is compared with all of this package.
+    If a file names no valve, actuator or effect, all kinds of this package are used.
     """
     named = (VALVES.loaded_or_own(), ACTUATORS.loaded_or_own(), EFFECTS.loaded())
     return _parameter_file(tuple(kind for kinds in named for kind in kinds.items()))
 
 
 def whole_parameter_file() -> type[BaseModel]:
-    """Return the model of a parameter file that may have every valve, actuator and effect of this package."""
+    """Return the model of a parameter set file with every valve, actuator and effect of this package."""
     for kinds in _KINDS:
         kinds.load_own()
     return parameter_file()
@@ -233,16 +233,16 @@ def load_parameter_set(parameter_set: str | Path, *, plugins: Plugins = ()) -> P
 
 
 def set_or_load(parameter_set: ParameterSet | str | Path | None) -> ParameterSet | None:
-    """Return a parameter set as it is, or load it by name or path; None for None."""
+    """Return a ParameterSet unchanged, load one by name or path, and return None for None."""
     if parameter_set is None or isinstance(parameter_set, ParameterSet):
         return parameter_set
     return load_parameter_set(parameter_set)
 
 
 def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -> ParameterSet:
-    """Return the parameter set in the bytes of a TOML file; ``file`` is what messages call it.
+    """Return the parameter set in the bytes of a TOML file; ``file`` is the label used in messages.
 
-    Where its actuator has a file, that is looked for from ``folder``. ParameterError for one that is not usable.
+    The file of a measured actuator is searched relative to ``folder``. Raises ParameterError if the set is not usable.
     """
     document = _FILE.parse(content, file)
     # The valves, the actuator and the effects that a set names, other packages' too, are loaded before it is checked.
@@ -322,7 +322,7 @@ def _leaves(node: object, path: str) -> Iterator[tuple[str, object]]:
 
 
 def parameter_set_toml(parameter_set: ParameterSet) -> str:
-    """Return the TOML text of a set: head, citation, every value with its provenance, accepted contradictions."""
+    """Return the TOML text of a set: header, citation, all values with provenance, accepted contradictions."""
     head = {
         "name": parameter_set.name,
         "title": parameter_set.title,
@@ -359,7 +359,7 @@ def parameter_set_toml(parameter_set: ParameterSet) -> str:
 
 
 def _assignments(values: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a line of TOML for each value: a text, a number, a flag or a list of texts."""
+    """Yield one TOML line for each value: a text, a number, a flag or a list of texts."""
     for key, value in values.items():
         if isinstance(value, float):
             text = repr(float(value))

@@ -1,9 +1,9 @@
-"""The file of a measured actuator: one line for each angle and pressure, with the volumes of its chambers.
+"""File of a measured actuator: one line for each angle and pressure, with the chamber volumes.
 
-    angle [deg],pressure [kPa_g],volume_1 [mL],volume_2 [mL]
+angle [deg],pressure [kPa_g],volume_1 [mL],volume_2 [mL]
 
-Columns and lines may stand in any order, and a line that begins with # is a comment. Without a column ``volume_2`` the
-actuator has one chamber, and chamber 2 is nothing but its dead volume.
+Columns and lines may be in any order; a line that begins with # is a comment. Without a column ``volume_2`` the
+actuator has one chamber, and chamber 2 consists only of its dead volume.
 """
 
 import math
@@ -28,7 +28,7 @@ from ppafo.wording import nearest_name, one_line, reason, said_missing
 
 
 class VolumeColumn(NamedTuple):
-    """A column that the file may have: its SI unit, the size [SI] beyond which a number is a slip, a unit to write."""
+    """Column of the file: SI unit, magnitude [SI] above which a number is rejected, and an example of a unit."""
 
     unit: str
     largest: float
@@ -56,10 +56,10 @@ _LONGEST = 40
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredVolumes:
-    """Volumes of the chambers [m^3], each (angles, pressures), at every pair of an angle and a pressure.
+    """Measured chamber volumes [m^3], each of shape (angles, pressures).
 
-    ``angles`` [rad] and ``pressures`` [Pa, gauge] grow. ``volume_2`` is None of an actuator with one chamber.
-    ``resolution_1`` and ``resolution_2`` [m^3] are the steps in which the volumes were written.
+    ``angles`` [rad] and ``pressures`` [Pa, gauge] increase. ``volume_2`` is None for an actuator with one chamber.
+    ``resolution_1`` and ``resolution_2`` [m^3] are the rounding steps of the volumes.
     """
 
     angles: Floats
@@ -71,7 +71,7 @@ class MeasuredVolumes:
 
 
 def read_measured_volumes(path: Path) -> MeasuredVolumes:
-    """Return what the file of a measured actuator says; ParameterError, with file and line, for what cannot be used."""
+    """Return the content of the file of a measured actuator; ParameterError names file and line of a fault."""
     file = label(str(path))
     try:
         text = decoded(read_regular_file(path, MAXIMUM_BYTES_TYPED))
@@ -101,9 +101,9 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
 
 
 def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float]]:
-    """Return the columns of a file by name, each (lines,), and their steps in which they are written, in SI units.
+    """Return the columns of a file by name, each (lines,), and the rounding step of each column, in SI units.
 
-    Pressures are above the atmosphere.
+    Pressures are gauge pressures.
     """
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
     if not lines:
@@ -135,7 +135,7 @@ def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float]]
 
 
 def _step(numbers: Sequence[Decimal]) -> float:
-    """Return the step in which numbers are written: 0.1 for 7.4 and 3, and 5 for many multiples of 5."""
+    """Return the step to which numbers are rounded: 0.1 for 7.4 and 3, and 5 for many multiples of 5."""
     exponents = [number.as_tuple().exponent for number in numbers]
     last = min(exponent for exponent in exponents if isinstance(exponent, int))
     different = {int(number.scaleb(-last)) for number in numbers}
@@ -144,7 +144,7 @@ def _step(numbers: Sequence[Decimal]) -> float:
 
 
 def _units(header: Sequence[str], file: str) -> dict[str, str]:
-    """Return the unit of each column by its name, in the order of the file."""
+    """Return the unit of each column by name, in the order of the file."""
     units: dict[str, str] = {}
     for cell in header:
         name, bracket, unit = (part.strip() for part in cell.strip().removesuffix("]").partition("["))
@@ -169,7 +169,7 @@ def _units(header: Sequence[str], file: str) -> dict[str, str]:
 
 
 def _numbers(cells: Sequence[str], names: Sequence[str], line: str) -> list[float]:
-    """Return the numbers of a line, as they are written, in the order of the columns ``names``."""
+    """Return the numbers of a line in the order of the columns ``names``."""
     if len(cells) != len(names):
         raise ParameterError(f"{line}: has {len(cells)} values, the header has {len(names)}")
     numbers = []
@@ -186,9 +186,9 @@ def _numbers(cells: Sequence[str], names: Sequence[str], line: str) -> list[floa
 
 
 def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:
-    """Refuse columns (lines,) of angles [rad] and gauge pressures [Pa] in which not every pair occurs once.
+    """Raise ParameterError if columns (lines,) of angles [rad] and gauge pressures [Pa] do not form a full grid.
 
-    An actuator has room for a fixed number of each, and needs its volumes without pressure.
+    The number of angles and pressures is limited, and the volumes at zero pressure are required.
     """
     angles, pressures = np.unique(angle), np.unique(pressure)
     if angles.size < 2:
@@ -213,7 +213,7 @@ def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:
 
 
 def _check_spacing(name: str, values: Floats, maximum: int, nearest: float, file: str) -> None:
-    """Refuse more than ``maximum`` values of a column, and two of them nearer to each other than ``nearest`` [SI]."""
+    """Raise ParameterError for more than ``maximum`` values in a column, or two values closer than ``nearest`` [SI]."""
     if values.size > maximum:
         raise ParameterError(f"{file}: has {values.size} values of {name}, at most {maximum} are taken: leave some out")
     if values.size > 1 and float(np.diff(values).min()) < nearest:
@@ -221,10 +221,10 @@ def _check_spacing(name: str, values: Floats, maximum: int, nearest: float, file
 
 
 def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, resolution: float, file: str) -> None:
-    """Refuse volumes [m^3] (angles, pressures) that no chamber has, written in steps of ``resolution`` [m^3].
+    """Raise ParameterError for impossible volumes [m^3] (angles, pressures), rounded to ``resolution`` [m^3].
 
-    They are negative, fall by more than that as the pressure grows, or at the highest pressure do not grow with the
-    angle (chamber 1) or shrink with it (chamber 2).
+    Impossible volumes are negative, fall with the pressure by more than ``resolution``, or at the highest pressure do
+    not grow with the angle (chamber 1) or shrink with it (chamber 2).
     """
     # Half of the last digit each, and what the last bit of two numbers makes of it.
     unseen = resolution * (1.0 + 1.0e-6)
@@ -252,5 +252,5 @@ def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, 
 
 
 def _point_text(angle: float, pressure: float) -> str:
-    """Return an angle [rad] and a gauge pressure [Pa] as a message shows them."""
+    """Return an angle [rad] and a gauge pressure [Pa] as text for a message."""
     return f"{math.degrees(angle):.6g} deg and {pressure / 1e3:.6g} kPa_g"

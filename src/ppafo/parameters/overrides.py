@@ -1,8 +1,7 @@
-"""Overrides are a set: each value once, each orifice in one form, the same result in any order; two sets are layers.
+"""Overrides of a parameter set: one per value, one form per orifice, independent of their order; layers of overrides.
 
-A form is one of the ways to give a thing, of which only one is taken: files, overrides and columns of studies are
-checked by the same table. At the end a parameter set takes them; what the kinds of a scenario add is in
-``simulation/overrides.py``.
+A form is one of several alternative ways to state a quantity. Files, overrides and study columns are checked against
+the same table of forms. Overrides of the kinds of a scenario are in ``simulation/overrides.py``.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -41,19 +40,19 @@ FORMS: Forms = {"valve": _ORIFICE, "actuator.leak": _ORIFICE, "controller": (("r
 
 
 class Override(NamedTuple):
-    """An override: its words as they were given, path and value in them."""
+    """Override: full text, path and value, as typed by the user."""
 
     words: str
     typed: str
     text: str
 
     def __str__(self) -> str:
-        """The override as a message quotes it."""
+        """Return the override as quoted in a message."""
         return f"{self.typed}={self.text}"
 
 
 def split_override(override: str, error: type[PpafoError] = ParameterError) -> Override:
-    """Return path and value of a text such as ``run.duration=1 s``; an ``error`` for any other text."""
+    """Return path and value of a text such as ``run.duration=1 s``; raises ``error`` for any other text."""
     on_one_line = one_line(override)
     path, separator, text = (part.strip() for part in on_one_line.partition("="))
     if not separator or not path or not text:
@@ -62,7 +61,7 @@ def split_override(override: str, error: type[PpafoError] = ParameterError) -> O
 
 
 def read_overrides(texts: Iterable[str], error: type[PpafoError] = ParameterError) -> tuple[Override, ...]:
-    """Return texts as overrides, in their order; an ``error`` for the first, in sorted order, that is none."""
+    """Return texts as overrides in their order; raises ``error`` for the first invalid one in sorted order."""
     in_order = tuple(texts)
     read = {text: split_override(text, error) for text in sorted(in_order)}
     return tuple(read[text] for text in in_order)
@@ -75,10 +74,10 @@ def override_set(
     valve: str = "",
     forms: Forms = FORMS,
 ) -> dict[str, Override]:
-    """Return overrides by path, sorted, so that their order is forgotten.
+    """Return overrides by path, sorted, so that the result does not depend on their order.
 
-    ``same`` maps a path to another one of the same value; ``valve`` is the name of the valve that is chosen, whose
-    values have two paths. An ``error`` where a value is given twice or in two forms names both overrides.
+    ``same`` maps a path to another path of the same value; ``valve`` is the name of the chosen valve, whose values have
+    two paths. Raises ``error``, naming both overrides, if a value is given twice or in two forms.
     """
     by_path: dict[str, Override] = {}
     # Sorted, so that of two messages the same one comes in any order.
@@ -101,9 +100,9 @@ def layered(
     same: Mapping[str, str] | None = None,
     valve: str = "",
 ) -> dict[str, Override]:
-    """Return two layers as one set by path: what the later gives replaces value, and other form, of the earlier.
+    """Return two layers as one set by path: a later override replaces earlier ones of the value and of its other forms.
 
-    Those of a layer keep their order. The other arguments as in ``override_set``.
+    The order within each layer is kept. The other arguments are described in ``override_set``.
     """
     old, new = (override_set(layer, error, same, valve) for layer in (earlier, later))
     replaced = {other for path in new for other in (path, *other_forms(path))}
@@ -115,28 +114,28 @@ def layered(
 def over(
     earlier: Iterable[str], later: Iterable[str], error: type[PpafoError] = ParameterError, valve: str = ""
 ) -> tuple[str, ...]:
-    """Return two layers of texts as the texts of one set, as ``layered`` does."""
+    """Return two layers of override texts merged as in ``layered``."""
     old, new = (read_overrides(texts, error) for texts in (earlier, later))
     return tuple(override.words for override in layered(old, new, error, valve=valve).values())
 
 
 def one_path(path: str, valve: str) -> str:
-    """Return the path with ``valve.`` in place of ``valves.NAME.`` where that is the valve that is chosen."""
+    """Return the path with ``valve.`` in place of ``valves.NAME.`` if NAME is the chosen valve."""
     own = f"{NAMED_VALVE}{valve}."
     return CHOSEN_VALVE + path.removeprefix(own) if valve and path.startswith(own) else path
 
 
 def of_another_valve(path: str, valve: str) -> bool:
-    """Tell whether a path is of a valve by name that is not the one that is chosen."""
+    """Return True if a path names a valve other than the chosen one."""
     return path.startswith(NAMED_VALVE) and not path.startswith(f"{NAMED_VALVE}{valve}.")
 
 
 def check_valve(
     overrides: Iterable[Override], valve: str | None, choice: str, error: type[PpafoError] = ParameterError
 ) -> None:
-    """Refuse an override of another valve than the one that is chosen beside it, None for no choice.
+    """Raise ``error`` if an override concerns another valve than the one chosen beside it; ``valve`` None: no choice.
 
-    The ``error`` names the override and the ``choice`` as it was given.
+    The message quotes the override and the ``choice`` as given.
     """
     for override in sorted(overrides) if valve else ():
         if valve and of_another_valve(override.typed, valve):
@@ -144,7 +143,7 @@ def check_valve(
 
 
 def other_forms(path: str, forms: Forms = FORMS) -> tuple[str, ...]:
-    """Return the paths of the other forms of what a path gives; none where there is one form."""
+    """Return the paths of the alternative forms of a value; an empty tuple if it has only one form."""
     section, _, name = path.rpartition(".")
     ways = forms.get("valve" if section.startswith(NAMED_VALVE) else section, ())
     if not any(name in way for way in ways):
@@ -153,13 +152,13 @@ def other_forms(path: str, forms: Forms = FORMS) -> tuple[str, ...]:
 
 
 def in_two_forms(paths: Collection[str], forms: Forms = FORMS) -> tuple[str, str] | None:
-    """Return the first two paths that give one thing in two forms, None where all give each thing in one."""
+    """Return the first two paths that give one quantity in two forms; None if there are none."""
     pairs = ((path, other) for path in sorted(paths) for other in sorted(other_forms(path, forms)) if other in paths)
     return next(pairs, None)
 
 
 def either(path: str, forms: Forms = FORMS) -> str:
-    """Return what a message asks for where a thing is given in two forms."""
+    """Return the request for a message about a quantity given in two forms."""
     section = path.rpartition(".")[0]
     ways = forms["valve" if section.startswith(NAMED_VALVE) else section]
     return f"give either {' or '.join(' and '.join(f'{section}.{name}' for name in way) for way in ways)}, not both"
@@ -167,7 +166,7 @@ def either(path: str, forms: Forms = FORMS) -> str:
 
 @checked
 def apply_overrides(parameter_set: ParameterSet, overrides: Overrides, *, valve: Name | None = None) -> ParameterSet:
-    """Parameter set with values replaced.
+    """Return a parameter set with values replaced.
 
     ``valve.X`` means the valve that is chosen (``valve``, else the set's default), ``valves.NAME.X`` one by name.
     Naming another gas brings that gas's molar mass and heat capacity ratio, unless they are given too; giving an
@@ -194,7 +193,7 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Overrides, *, valve:
 
 
 def with_overrides(parameter_set: ParameterSet, overrides: Iterable[Override], valve: str | None) -> ParameterSet:
-    """Return the set with overrides in it; the other words as of ``apply_overrides``."""
+    """Return the set with overrides applied; ``valve`` is described in ``apply_overrides``."""
     chosen = chosen_valve(parameter_set, valve)
     overrides_by_path = {
         f"{NAMED_VALVE}{chosen}.{path.removeprefix(CHOSEN_VALVE)}" if path.startswith(CHOSEN_VALVE) else path: override
@@ -250,7 +249,7 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
 
 
 def _in_conductance(override: Override) -> str:
-    """Return Cv, Kv or a nominal flow as the two settings that say it; nothing for any other value."""
+    """Return the two equivalent ISO 6358 settings for a Cv, Kv or nominal flow; empty for any other value."""
     section, _, name = override.typed.rpartition(".")
     if name.lower() not in ("cv", "kv", "qn"):
         return ""
@@ -297,6 +296,6 @@ _CHANGES = {SPECIES_PATH: _with_species, RELIEVING_PATH: _with_relieving}
 
 
 def _before(parameter_set: ParameterSet, path: str) -> str:
-    """Return what stood at the path, so that an override never hides the value it replaces."""
+    """Return a note with the previous value at a path, so that an override never hides it."""
     entry = with_followers(parameter_set).entries().get(path)
     return f"the set has {entry_text(entry)} ({entry.origin}: {entry.source})" if entry else "the set has no value"

@@ -1,4 +1,4 @@
-"""A parameter set: every value with its origin, as it was given, and in SI."""
+"""Parameter set: every value with its origin, as given and in SI."""
 
 import contextlib
 import math
@@ -41,7 +41,7 @@ CONFIDENCE = 0.95
 
 
 class Entry(StrictTable):
-    """A number as it was given, in its own unit."""
+    """Number in its given unit, with origin and source."""
 
     value: Annotated[float, Field(description="the number, in the unit beside it")]
     unit: Annotated[str, Field(description="such as 'mm^2', 'psi_g' (gauge), 'psi_a' (absolute); '' for a number")]
@@ -59,7 +59,7 @@ class Entry(StrictTable):
 
 
 class TextEntry(StrictTable):
-    """Entry of a parameter set that is a name or a formula."""
+    """Name or formula in a parameter set, with origin and source."""
 
     value: Text
     origin: Annotated[Origin, Field(description="how the value came to be known")]
@@ -68,7 +68,7 @@ class TextEntry(StrictTable):
 
 
 class FlagEntry(StrictTable):
-    """Entry of a parameter set that is yes or no."""
+    """True or false in a parameter set, with origin and source."""
 
     value: Annotated[bool, Field(description="true or false")]
     origin: Annotated[Origin, Field(description="how the value came to be known")]
@@ -77,7 +77,7 @@ class FlagEntry(StrictTable):
 
 
 class Citation(StrictTable):
-    """The publication or report that the set comes from; what is not known is left out."""
+    """Publication or report on which the set is based; unknown fields are left out."""
 
     title: Text
     authors: Texts = ()
@@ -87,7 +87,7 @@ class Citation(StrictTable):
 
 
 class Accepted(StrictTable):
-    """A contradiction that the author of the set knows of and keeps, with the reason."""
+    """Contradiction that the author of the set knows and keeps, with the reason."""
 
     finding: Annotated[Text, Field(description="identifier of the finding, as 'ppafo sets audit' prints it")]
     reason: Text
@@ -95,14 +95,14 @@ class Accepted(StrictTable):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class ParameterSet:
-    """Values as given, with their provenance; conflicts and gaps allowed. ``build_device`` asks for more.
+    """Values as given, with their provenance; conflicts and gaps are allowed until ``build_device``.
 
-    ``file`` is what messages call the set; ``numbers``, ``texts`` and ``flags`` are keyed by paths such as
-    ``actuator.leak.area`` or ``valves.solenoid.area``; ``valve_kinds`` gives each valve's kind in the catalogue,
-    ``actuator_kind`` the actuator's, ``actuator_file`` the file of one that was measured, and ``actuator_table`` what
-    is in it; ``joint`` is what it turns, in words. ``parent`` is the set that this one began as, a name of the package
-    or a path from here; '' without one. ``shown`` are the units, by unit in SI, in which its author writes: numbers
-    are shown in them, also with other values.
+    ``file`` is the label used in messages. ``numbers``, ``texts`` and ``flags`` are keyed by paths such as
+    ``actuator.leak.area`` or ``valves.solenoid.area``. ``valve_kinds`` gives the catalogue kind of each valve,
+    ``actuator_kind`` the kind of the actuator, ``actuator_file`` the file of a measured actuator and ``actuator_table``
+    its curves. ``joint`` names the turned joint. ``parent`` is the set from which this one was copied, a bundled name
+    or a path relative to the working directory; '' without one. ``shown`` maps each SI unit to the unit used by the
+    author, in which numbers are displayed, overridden ones too.
     """
 
     file: str
@@ -125,16 +125,16 @@ class ParameterSet:
     shown: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
-        """Return name, title, how many values there are, and the valves; ``ppafo sets show`` lists every value."""
+        """Return name, title, number of values, and valves; ``ppafo sets show`` lists every value."""
         valves = ", ".join(f"{name} ({kind})" for name, kind in self.valve_kinds.items())
         return f"ParameterSet '{self.name}': {self.title}\n  {len(self.entries())} values; valves: {valves}"
 
     def entries(self) -> dict[str, Entry | TextEntry | FlagEntry]:
-        """Return every value of the set by path, as it was given: texts, then flags, then numbers."""
+        """Return all values of the set by path, as given: texts, then flags, then numbers."""
         return {**self.texts, **self.flags, **self.numbers}
 
     def declarations(self) -> Mapping[str, Quantity]:
-        """Return the declaration of every number that this set may hold, by path."""
+        """Return the declarations of all numbers that this set may contain, by path."""
         species = self.texts.get(SPECIES_PATH)
         return quantities(self.valve_kinds, self.actuator_kind, "" if species is None else species.value)
 
@@ -155,9 +155,9 @@ _SPEAKING_ENDS = {
 
 
 def written_units(numbers: Mapping[str, Entry]) -> dict[str, str]:
-    """Return the unit in which the author of a set writes pressures, torques, angles, flows, by unit in SI.
+    """Return the units in which the author of a set writes pressures, torques, angles and flows, by SI unit.
 
-    ``numbers`` are the entries of the set by path. A quantity without a number is left out.
+    ``numbers`` are the entries of the set by path. Quantities without a number are left out.
     """
     by_end = {
         si_unit: tuple(path for path in numbers if path.endswith(ends)) for si_unit, ends in _SPEAKING_ENDS.items()
@@ -171,9 +171,9 @@ def written_units(numbers: Mapping[str, Entry]) -> dict[str, str]:
 
 
 def units_of_texts(texts: Iterable[object]) -> dict[str, str]:
-    """Return the units in which the author of some texts writes pressures, torques and angles, by unit in SI.
+    """Return the units used in texts for pressures, torques and angles, by SI unit.
 
-    The last text of a quantity decides. A number, and one that is said to be in SI, says nothing.
+    The last text with a quantity decides. Plain numbers and numbers in ``SI`` are ignored.
     """
     units: dict[str, str] = {}
     for unit in map(unit_in, texts):
@@ -183,15 +183,15 @@ def units_of_texts(texts: Iterable[object]) -> dict[str, str]:
 
 
 def chosen_units(texts: Iterable[object]) -> dict[str, str]:
-    """Return the units of some texts as of ``units_of_texts``, without the package's own.
+    """Return the units of texts as in ``units_of_texts``, except the default units of the package.
 
-    A file that writes these chooses nothing: a set in other units goes before it.
+    A file in default units makes no choice: the units of a parameter set take precedence.
     """
     return {si_unit: unit for si_unit, unit in units_of_texts(texts).items() if unit != usual_unit(si_unit)}
 
 
 def unit_in(text: object) -> str:
-    """Return the unit of a text that is a number with a unit; empty for anything else."""
+    """Return the unit of a text with number and unit; empty for anything else."""
     with contextlib.suppress(UnitError):
         return split_quantity(text)[1] if isinstance(text, str) else ""
     return ""
@@ -200,7 +200,7 @@ def unit_in(text: object) -> str:
 def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:
     """Return the name of the valve to use: the requested one, else the set's default.
 
-    ParameterError where the set has no such valve.
+    Raises ParameterError if the set has no such valve.
     """
     name = valve or parameter_set.default_valve
     if name not in parameter_set.valve_kinds:
@@ -211,9 +211,9 @@ def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:
 
 
 def atmospheric_pressure(parameter_set: ParameterSet) -> float:
-    """Return the pressure [Pa absolute] from which the set's gauge pressures count.
+    """Return the atmospheric pressure [Pa absolute], the zero of the set's gauge pressures.
 
-    ParameterError where it is not given as absolute.
+    Raises ParameterError if the set does not give it as an absolute pressure.
     """
     entry = parameter_set.numbers.get(ATMOSPHERE_PATH)
     if entry is None:
@@ -229,11 +229,11 @@ def atmospheric_pressure(parameter_set: ParameterSet) -> float:
 def links_of_set(
     parameter_set: ParameterSet, set_paths: Collection[str] = (), atmosphere: float | None = None
 ) -> dict[str, tuple[LinkedDefault, ...]]:
-    """Return how numbers of a set follow others: gauge pressures the atmosphere, the second regulator the first.
+    """Return the links of a set: gauge pressures follow the atmosphere, the second regulator follows the first.
 
-    The second regulator does where the set has one pressure for both, unless it was ``given`` by an override and the
-    first was not; with an ``atmosphere`` [Pa absolute] they are compared at it, else at the set's. The displacement of
-    a vane per radian is its torque constant, by virtual work, unless the set states another.
+    The second regulator follows the first if the set has the same pressure for both, unless ``set_paths`` contains only
+    the second. The pressures are compared at ``atmosphere`` [Pa absolute], by default the set's. The displacement of a
+    vane per radian follows its torque constant, by virtual work, unless the set states it.
     """
     numbers = parameter_set.numbers
     links = {
@@ -253,7 +253,7 @@ def links_of_set(
 
 
 def has_one_pressure(parameter_set: ParameterSet, atmosphere: float | None = None) -> bool:
-    """Tell whether both regulators are set to one pressure, at the set's atmosphere or another [Pa absolute]."""
+    """Return True if both regulators have the same pressure, at the set's or the given atmosphere [Pa absolute]."""
     entries = [parameter_set.numbers.get(path) for path in (PRESSURE_PATH, SECOND_PRESSURE_PATH)]
     declared = parameter_set.declarations()
     zero = atmospheric_pressure(parameter_set) if atmosphere is None else atmosphere
@@ -265,10 +265,10 @@ def has_one_pressure(parameter_set: ParameterSet, atmosphere: float | None = Non
 
 
 def with_followers(parameter_set: ParameterSet) -> ParameterSet:
-    """Return the set with what it leaves to follow from another of its numbers.
+    """Return the set completed with the numbers that follow from others.
 
-    The second regulator has the pressure of the first, and a vane displaces its torque constant per radian: what the
-    shaft does, T dtheta, is what the gas does, (P1 - P2) dV.
+    The second regulator gets the pressure of the first. The displacement of a vane per radian gets its torque constant:
+    by virtual work, T dtheta = (P1 - P2) dV.
     """
     pressure, constant = (parameter_set.numbers.get(path) for path in (PRESSURE_PATH, TORQUE_CONSTANT_PATH))
     followers = {}
@@ -288,7 +288,7 @@ def with_followers(parameter_set: ParameterSet) -> ParameterSet:
 
 
 def entry_in_si(entry: Entry, quantity: Quantity, atmosphere: float) -> float:
-    """Return the entry's value in the quantity's SI unit; UnitError where the dimension does not fit."""
+    """Return the value of an entry in the SI unit of its quantity; UnitError if the dimension is wrong."""
     refused: UnitError | None = None
     for unit in alternatives(quantity):
         try:
@@ -299,9 +299,9 @@ def entry_in_si(entry: Entry, quantity: Quantity, atmosphere: float) -> float:
 
 
 def allowed_number(written: str, entry: Any, quantity: Quantity, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Return the value in SI of an entry or a figure of a part, which messages begin with as it is ``written``.
+    """Return the SI value of an entry or a figure of a part; messages begin with the text ``written``.
 
-    ParameterError where the unit does not fit, and where no device can have the value.
+    Raises ParameterError if the unit has a wrong dimension or the value is out of range.
     """
     with refused_as(ParameterError, written, UnitError):
         value = entry_in_si(entry, quantity, atmosphere)
@@ -311,10 +311,10 @@ def allowed_number(written: str, entry: Any, quantity: Quantity, atmosphere: flo
 
 
 def number_in_si(parameter_set: ParameterSet, path: str) -> float | None:
-    """Return the value at a path in SI, None where the set does not have it.
+    """Return the value at a path in SI; None if the set lacks it.
 
-    A value whose dimension does not fit is taken in the base units of its own unit: the audit reports the unit in one
-    place and can still compare the number in others.
+    A value of a wrong dimension is converted to the base units of its own unit, so that the audit can report the unit
+    once and still compare the number elsewhere.
     """
     entry = parameter_set.numbers.get(path)
     if entry is None:
@@ -326,12 +326,12 @@ def number_in_si(parameter_set: ParameterSet, path: str) -> float | None:
 
 
 def number_text(entry: Entry) -> str:
-    """Return an entry's value and unit as a person would write them."""
+    """Return the value and unit of an entry as text."""
     return format_quantity(entry.value, entry.unit)
 
 
 def entry_text(entry: Entry | TextEntry | FlagEntry) -> str:
-    """Return any entry's value as a person would write it: a number with its unit, a text, true or false."""
+    """Return the value of any entry as text: a number with its unit, a text, true or false."""
     if isinstance(entry, Entry):
         return number_text(entry)
     return str(entry.value).lower() if isinstance(entry, FlagEntry) else entry.value

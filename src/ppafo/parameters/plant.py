@@ -1,4 +1,4 @@
-"""Numbers of the plant, computed from a device: its orifices, its valve and its actuator."""
+"""Plant parameters computed from a device: orifices, valve and actuator."""
 
 from typing import Any, NamedTuple
 
@@ -13,14 +13,14 @@ from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice, Valve
 
 
 class Restriction(NamedTuple):
-    """An orifice with a gas: conductance [kg/(s Pa)] and flow function."""
+    """Orifice for a given gas: conductance [kg/(s Pa)] and flow function."""
 
     conductance: float
     curve: FlowCurve
 
 
 def area_restriction(orifice: Orifice, gas: Gas, linear_ratio: float) -> Restriction:
-    """An orifice in the paper's form with a gas; linear above ``linear_ratio`` [-]. Equations (6), (7)."""
+    """Return an orifice in the paper's form for a gas; linear above ``linear_ratio`` [-]. Equations (6), (7)."""
     conductance = area_conductance(
         orifice.area,
         orifice.discharge_coefficient,
@@ -32,37 +32,37 @@ def area_restriction(orifice: Orifice, gas: Gas, linear_ratio: float) -> Restric
 
 
 def sonic_restriction(orifice: SonicOrifice, gas: Gas, linear_ratio: float) -> Restriction:
-    """An orifice in the form of ISO 6358 with a gas; linear above ``linear_ratio`` [-]."""
+    """Return an orifice in the form of ISO 6358 for a gas; linear above ``linear_ratio`` [-]."""
     conductance = sonic_conductance_mass(orifice.sonic_conductance, gas.specific_gas_constant, gas.temperature)
     return Restriction(conductance, iso6358_curve(orifice.critical_ratio, linear_ratio))
 
 
 def restriction(orifice: Orifice | SonicOrifice, gas: Gas, linear_ratio: float) -> Restriction:
-    """Return an orifice, by conductance or by area, for a gas."""
+    """Return an orifice in either form for a gas; linear above ``linear_ratio`` [-]."""
     if isinstance(orifice, SonicOrifice):
         return sonic_restriction(orifice, gas, linear_ratio)
     return area_restriction(orifice, gas, linear_ratio)
 
 
 def orifice_conductance(orifice: Orifice | SonicOrifice, gas: Gas) -> float:
-    """Conductance [kg/(s Pa)] of an orifice in either form; choked flow over upstream pressure. Equation (6)."""
+    """Conductance [kg/(s Pa)] of an orifice in either form: choked flow divided by upstream pressure. Equation (6)."""
     return restriction(orifice, gas, 0.0).conductance
 
 
 def valve_settings(valve: Valve) -> Any:
-    """Return the settings [SI] of a valve as the class of its kind, whose numbers may be arrays (runs,)."""
+    """Return the settings [SI] of a valve as the class of its kind; numbers may be arrays (runs,)."""
     return VALVES[valve.kind].settings(**valve.settings)
 
 
 def first_settings(valve: Valve) -> Any:
-    """Return the settings [SI] of a valve in the first run of an ensemble: they choose the model for all of them."""
+    """Return the settings [SI] of a valve in the first run of an ensemble, which select the model of all runs."""
     return valve_settings(valve)._make(map(first, valve_settings(valve)))
 
 
 def venting_valve(valve: Valve) -> ValveModel:
-    """The model of a valve that a command can vent: a proportional one has a vent valve beside it.
+    """Return the model of a valve with a vent command: a proportional valve is combined with a vent valve.
 
-    Of an ensemble the first run decides which model it is.
+    In an ensemble the first run selects the model.
     """
     if valve.kind == "proportional":
         from ppafo.model.valves import vent_valve  # a vane on a bench needs none
@@ -72,7 +72,7 @@ def venting_valve(valve: Valve) -> ValveModel:
 
 
 def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParameters:
-    """The plant of a device, with a constant external torque T_ex [N m] on a free vane."""
+    """Plant parameters of a device, with a constant external torque T_ex [N m] on a free vane."""
     ratio = device.flow.linear_ratio
     valve = restriction(device.valve.orifice, device.gas, ratio)
     plant = plant_with(device, valve, restriction(device.actuator.leak, device.gas, ratio), external_torque)
@@ -87,7 +87,7 @@ def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParam
 
 
 def shape_and_growth(device: Device) -> tuple[Any, Any]:
-    """Shape of an actuator that is no vane, and how chamber 1 grows with the angle on average [m^3/rad]."""
+    """Shape of an actuator other than a vane, and mean volume change of chamber 1 with angle [m^3/rad]."""
     actuator, supply = device.actuator, device.supply
     kind = ACTUATORS[actuator.kind]
     model = kind.model
@@ -106,7 +106,7 @@ def shape_and_growth(device: Device) -> tuple[Any, Any]:
 
 
 def plant_with(device: Device, valve: Restriction, leak: Restriction, external_torque: float) -> PlantParameters:
-    """The plant of a device whose orifices are known; external torque [N m]."""
+    """Plant parameters of a device with given orifices; external torque [N m]."""
     actuator, gas, supply = device.actuator, device.gas, device.supply
     return PlantParameters(
         gas_product=gas.specific_gas_constant * gas.temperature,

@@ -1,7 +1,7 @@
-"""Static torque limits of an actuator of any kind at an angle, from the torque function of the kind itself.
+"""Static torque limits of any actuator at an angle, from the torque function of its kind.
 
-At the upper limit chamber 1 is at its supply pressure and chamber 2 vented, at the lower limit the other way round. Of
-a supply below the atmosphere chamber 2 raises the torque and chamber 1 lowers it.
+At the upper limit chamber 1 is at its supply pressure and chamber 2 is vented, at the lower limit the reverse. With a
+vacuum supply, chamber 2 raises the torque and chamber 1 lowers it.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ StaticTorque = Callable[[float, float, float], float]
 
 
 def static_torque(device: Device) -> StaticTorque:
-    """Torque function of the actuator of a device, whose numbers are those of one run."""
+    """Return the torque function of the actuator of a device with the numbers of a single run."""
     torque, plant = ACTUATORS[device.actuator.kind].model.torque, plant_parameters(device)
     return lambda angle, pressure_1, pressure_2: float(torque(plant, angle, pressure_1, pressure_2))
 
@@ -31,7 +31,7 @@ def static_torque(device: Device) -> StaticTorque:
 def torque_reach(device: Device, angle: float, torque: StaticTorque | None = None) -> tuple[float, float]:
     """Lowest and highest static torque [N m] of a device at an angle [rad].
 
-    ``torque`` is the device's ``static_torque``, where a caller asks for many angles.
+    ``torque`` is the ``static_torque`` of the device, for repeated calls.
     """
     own, supply = torque or static_torque(device), device.supply
     vented = float(supply.atmospheric_pressure)
@@ -40,15 +40,15 @@ def torque_reach(device: Device, angle: float, torque: StaticTorque | None = Non
 
 
 def supply_that_moves(device: Device, upwards: bool) -> str:
-    """Path of the supply that raises the torque of a device, or lowers it."""
+    """Path of the supply pressure that raises the torque of a device, or lowers it if ``upwards`` is False."""
     return PRESSURE_PATH if upwards != device.supply.is_vacuum else SECOND_PRESSURE_PATH
 
 
 def supply_for(device: Device, angle: float, torque: float) -> float | None:
-    """Supply pressure [Pa absolute] with which a device gives a static torque [N m] at an angle [rad].
+    """Supply pressure [Pa absolute] for which a device gives a static torque [N m] at an angle [rad].
 
-    Chamber 1 raises the torque above the torque of the vented actuator, chamber 2 lowers it; of a vacuum the other way
-    round. None where no supply up to ``HIGHEST_PRESSURE``, or no vacuum, gives it.
+    Chamber 1 raises the torque above the torque of the vented actuator, chamber 2 lowers it; with a vacuum the reverse.
+    None if no supply up to ``HIGHEST_PRESSURE``, or no vacuum, gives the torque.
     """
     own, vented = static_torque(device), float(device.supply.atmospheric_pressure)
     sign = 1.0 if torque > own(angle, vented, vented) else -1.0

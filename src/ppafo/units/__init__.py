@@ -4,16 +4,15 @@ Inside the package all floats are SI.
 
 Four rules go beyond arithmetic:
 
-- A pressure says what it is: ``psi_g`` gauge, ``psi_a`` absolute, ``psi_d`` a difference; the suffix works on
-  every unit of pressure, quotients too. ``psi`` alone is refused, except inside a compound such as ``N m/psi``. In SI
+- A pressure states its kind: ``psi_g`` gauge, ``psi_a`` absolute, ``psi_d`` a difference. The suffix works with every
+  unit of pressure, including quotients. ``psi`` alone is refused, except inside a compound such as ``N m/psi``. In SI
   a level is ``Pa_a`` and a difference ``Pa_d``.
 - An angle is a dimension: ``75`` is no angle, ``75 deg`` is, and ``rad/s`` is not ``Hz``.
-- ``4 SI`` is the number 4 in the SI unit of what it is given to: so programs write the numbers that they have.
-- Only the units listed in ``definitions.py`` exist. A short list makes a misspelling an error and the start quick.
-  What people write for them is brought to their spelling in ``spelling.py``.
+- ``4 SI`` is the number 4 in the SI unit of the quantity to which it is assigned. Programs write their numbers so.
+- Only the units listed in ``definitions.py`` exist. A short list turns a misspelling into an error and shortens the
+  start. Common other spellings are converted in ``spelling.py``.
 
-A volume flow becomes a mass flow by the reference condition and the gas behind it (``reference.py``): ``L/min (ANR,
-air)``.
+A volume flow becomes a mass flow by its reference condition and gas (``reference.py``): ``L/min (ANR, air)``.
 
 >>> pressure = parse_quantity("65 psi_g", "Pa_a")
 >>> f"{pressure:.0f} Pa absolute, {from_si(pressure, 'psi_g', 'Pa_a', 101325.0):.0f} psi gauge"

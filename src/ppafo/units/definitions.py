@@ -1,7 +1,7 @@
 """Known units and their definitions in base units.
 
-pint reads them. Its answers for units in the files of the package are kept in ``known_units.json``, so that most
-processes start without it; ``scripts/known_units.py`` writes that file.
+The definitions are parsed by pint. The results for units in the files of the package are stored in
+``known_units.json``, so that most processes start without pint; ``scripts/known_units.py`` writes that file.
 """
 
 import decimal
@@ -80,9 +80,9 @@ _KIND_BELONGS = "_g, _a and _d belong to a unit of pressure that stands alone, s
 
 
 class ParsedUnit(NamedTuple):
-    """Unit as data: a value in base units (m, kg, s, K, mol, rad) is ``scale`` times the value plus ``offset``.
+    """Unit as data: the value in base units (m, kg, s, K, mol, rad) is ``scale`` times the value plus ``offset``.
 
-    ``dimensions`` are the powers of the base dimensions, such as ``[mass]`` and ``[angle]``.
+    ``dimensions`` maps each base dimension, such as ``[mass]`` and ``[angle]``, to its power.
     """
 
     scale: Decimal
@@ -95,10 +95,10 @@ class ParsedUnit(NamedTuple):
 
 
 class UnknownUnitError(UnitError):
-    """Unknown name in a unit; ``name`` is the name, ``unit`` the whole unit in normal spelling without its kind."""
+    """Unknown name in a unit: ``name`` is this name, ``unit`` the whole unit in normal spelling without its kind."""
 
     def __init__(self, name: str, unit: str) -> None:
-        """Keep both for a suggestion."""
+        """Store both for a suggestion in a message."""
         self.name, self.unit = name, unit
         others = ", ".join(other for other in UNITS if other not in PRESSURES)
         pressures = ", ".join(f"{pressure}_{kind}" for pressure in PRESSURES[:3] for kind in KINDS)
@@ -111,9 +111,9 @@ class UnknownUnitError(UnitError):
 
 @functools.lru_cache(maxsize=512)
 def parse_unit(unit: str) -> tuple[ParsedUnit, str]:
-    """Return a unit as data, and the kind of a pressure, ``g``, ``a`` or ``d``; empty for any other unit.
+    """Return a unit as data, and the kind of a pressure: ``g``, ``a`` or ``d``, empty for any other unit.
 
-    UnitError for what is no unit.
+    Raises UnitError for an unknown unit.
     """
     bare, kind = split_pressure_kind(unit)
     # The kept file first: pint's import takes longer than a run.
@@ -134,7 +134,7 @@ def known_units() -> dict[str, ParsedUnit]:
 
 
 def unit_by_pint(unit: str) -> ParsedUnit:
-    """Return a unit as parsed by pint, without the kind of a pressure; UnitError for an unknown one."""
+    """Return a unit as parsed by pint, without the kind of a pressure; UnitError for an unknown unit."""
     import pint
 
     bare, _ = split_pressure_kind(unit)
@@ -159,7 +159,7 @@ def unit_by_pint(unit: str) -> ParsedUnit:
 
 @functools.cache
 def _registry() -> "pint.UnitRegistry[Any]":
-    """Build a registry of the definitions above: a millisecond, against a tenth of a second for pint's own list."""
+    """Build a pint registry of the definitions above, which takes 1 ms instead of 0.1 s for pint's own list."""
     import pint
 
     # Decimals throughout, so that a unit's factor is what its definition says.

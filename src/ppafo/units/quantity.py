@@ -21,9 +21,9 @@ LEVEL, DIFFERENCE = "Pa_a", "Pa_d"
 
 
 def hint(unknown: UnknownUnitError, kind: str, si_unit: str | None) -> str:
-    """Return ``, did you mean 'mm^2'?``: the nearest unit that is compatible with ``si_unit``, or an empty text.
+    """Return a hint ``, did you mean 'mm^2'?`` with the nearest unit compatible with ``si_unit``; empty if none.
 
-    Where it is not known what is wanted only another case of the same letters is meant.
+    Without ``si_unit`` only units that differ in upper and lower case are suggested.
     """
     name, is_wanted = unknown.name, si_unit is not None
     near = difflib.get_close_matches(name, sorted(spellings()), _TRIED, _NEAR) if is_wanted else []
@@ -40,9 +40,9 @@ def _in_other_case(name: str) -> list[str]:
 
 
 def _that_fit(names: Iterable[str], name: str, unit: str, kind: str, si_unit: str | None) -> list[tuple[str, ...]]:
-    """Units with other names in the place of one that fit ``si_unit``, each with all endings that a pressure may have.
+    """Return ``unit`` with ``name`` replaced by each of ``names``, if it fits ``si_unit``, with pressure suffixes.
 
-    All that are units where it is None.
+    If ``si_unit`` is None, all valid units are returned.
     """
     wanted = None if si_unit is None else parse_unit(si_unit)[0].dimensions
     usual = {LEVEL: ("_g", "_a"), DIFFERENCE: ("_d",)}.get(str(si_unit), ("_g", "_a", "_d"))
@@ -65,7 +65,7 @@ def _did_you_mean(meant: Iterable[tuple[str, ...]]) -> str:
 
 
 def pressures_to_write(unit: str, si_unit: str) -> str:
-    """Return the forms of a pressure unit where a level or a difference is required."""
+    """Return the accepted suffixes of a pressure unit, for a level or a difference, as text for a message."""
     if si_unit == DIFFERENCE:
         return f"write {unit}_d for a difference"
     return f"write {unit}_g for gauge or {unit}_a for absolute"
@@ -88,9 +88,9 @@ def split_quantity(text: str) -> tuple[float, str]:
 
 
 def split_number(text: str) -> tuple[float, str]:
-    """Return the number and the unit of a text; the unit is not checked.
+    """Return the number and the unit of a text, without checking the unit.
 
-    It is for one who knows what unit is wanted, and with it says what does not fit.
+    For callers that know the wanted unit and raise a more specific error.
     """
     stripped = text.strip()
     match = _NUMBER.match(stripped)
@@ -113,14 +113,14 @@ def split_number(text: str) -> tuple[float, str]:
 
 
 def number_text(text: str) -> str:
-    """Return a text that is an ASCII number for ``float`` or ``int``; ValueError for other digits and for ``1_000``."""
+    """Return a text checked as ASCII number for ``float`` or ``int``; ValueError for other digits and ``1_000``."""
     if not text.isascii() or "_" in text:
         raise ValueError(f"{quote(text)} is not a number")
     return text
 
 
 def parse_quantity(text: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Return the value of a text in ``si_unit``; gauge pressure counts from ``atmosphere`` [Pa absolute]."""
+    """Return the value of a text in ``si_unit``; gauge pressures are relative to ``atmosphere`` [Pa absolute]."""
     value, unit = split_number(text)
     return to_si(value, unit, si_unit, atmosphere)
 
@@ -141,7 +141,7 @@ def from_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_
 
 
 def format_quantity(value: float, unit: str) -> str:
-    """Return a text that ``split_quantity`` reads back to exactly the same number and unit."""
+    """Return a value and a unit as text, from which ``split_quantity`` recovers exactly the same number and unit."""
     return f"{repr(float(value)).removesuffix('.0')} {unit}".rstrip()
 
 
@@ -149,7 +149,7 @@ _LARGEST_WITHOUT_EXPONENT = 1.0e6
 
 
 def without_exponent(value: float, form: str) -> str:
-    """Return a number formatted by ``form``, without an exponent for thousands.
+    """Return a number formatted by ``form``, with thousands written out instead of an exponent.
 
     Zero has neither a sign nor an exponent.
 
@@ -166,14 +166,14 @@ def without_exponent(value: float, form: str) -> str:
 
 
 def percentage(fraction: float, digits: int) -> str:
-    """Return a fraction [-] as a percentage with so many significant digits, without an exponent: ``120 %``."""
+    """Return a fraction [-] as a percentage with ``digits`` significant digits, without exponent: ``120 %``."""
     return f"{float(f'{100.0 * fraction:.{digits}g}'):.12g} %"
 
 
 def check_unit(unit: str, near: str | None = None) -> None:
-    """Check that a unit exists and is written as ``kg``, ``N m s/rad`` or ``m^3/(s Pa)``; UnitError if not.
+    """Check that a unit exists and is written like ``kg``, ``N m s/rad`` or ``m^3/(s Pa)``; UnitError if not.
 
-    Of an unknown one only a unit is suggested that could stand for ``near``, where that is given.
+    The message suggests only units compatible with ``near``, if given.
     """
     if unit != SI:
         _read(unit, near)
@@ -182,7 +182,7 @@ def check_unit(unit: str, near: str | None = None) -> None:
 def _read(unit: str, si_unit: str | None) -> tuple[ParsedUnit, str]:
     """Return a unit as data with the kind of a pressure.
 
-    UnitError for an unknown one names what may be meant where ``si_unit`` is wanted.
+    UnitError for an unknown unit suggests units compatible with ``si_unit``.
     """
     try:
         return read_unit(unit)
@@ -192,20 +192,20 @@ def _read(unit: str, si_unit: str | None) -> tuple[ParsedUnit, str]:
 
 
 def base_value(value: float, unit: str) -> float:
-    """Return ``value`` in the base units (m, kg, s, K, mol, rad) of its unit, of any dimension."""
+    """Return ``value`` in the base units (m, kg, s, K, mol, rad), for a unit of any dimension."""
     parsed, kind = _read(unit, None)
     base = float(parsed.in_base(_decimal(value)))
     return base + (STANDARD_ATMOSPHERE if kind == "g" else 0.0)
 
 
 def dimension(unit: str) -> dict[str, int]:
-    """Return the powers of the base dimensions of a unit, such as ``[mass]`` and ``[angle]``."""
+    """Return the dimension of a unit as powers of base dimensions such as ``[mass]`` and ``[angle]``."""
     return dict(_read(unit, None)[0].dimensions)
 
 
 @functools.lru_cache(maxsize=512)
 def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
-    """Return scale, offset and whether to add the atmosphere; in decimals, so that 8.4 g is exactly 0.0084 kg."""
+    """Return scale, offset and a flag for adding the atmosphere; decimals, so that 8.4 g is exactly 0.0084 kg."""
     if unit == SI:
         return Decimal(1), Decimal(0), False
     wanted, _ = read_unit(si_unit)

@@ -1,9 +1,9 @@
-"""Volume flow at a reference condition, which is the mass flow of a gas: ``L/min (ANR, air)``.
+"""Volume flow at a reference condition, equivalent to a mass flow of the gas: ``L/min (ANR, air)``.
 
 ``m_dot = rho q``, where rho = p M/(R T) is the density of an ideal gas of molar mass M at the condition. Air in the
 atmosphere of ISO 8778, which is humid, has the 1.185 kg/m^3 of ISO 6358.
 
-Normal litres, slm and SCFM do not say their condition: makers mean 0, 15, 20, 21.1 or 25 degC by them.
+Normal litres, slm and SCFM do not state their condition: manufacturers mean 0, 15, 20, 21.1 or 25 degC by them.
 """
 
 import re
@@ -28,7 +28,7 @@ _MOLAR_MASS = {"[mass]": 1, "[substance]": -1}
 
 
 class Condition(NamedTuple):
-    """Reference temperature [K] and pressure [Pa absolute] of a volume of gas; humid as in ISO 8778, or dry."""
+    """Reference temperature [K] and pressure [Pa absolute] of a gas volume; humid as in ISO 8778, or dry."""
 
     temperature: float
     pressure: float
@@ -56,9 +56,9 @@ _EXAMPLE = "70 degF, 14.696 psi_a"
 
 
 def flow_of(unit: str) -> tuple[str, str, bool]:
-    """Return the volume flow in a unit, the words after it, and whether it is called normal or standard.
+    """Return the volume flow of a unit, the words after it, and True if it is a normal or standard flow.
 
-    The words are the condition, and the gas where it is said; empty where there are none.
+    The words are the condition and the gas, if given; otherwise empty.
     """
     text = unit.strip()
     behind = _BEHIND.fullmatch(text)
@@ -77,7 +77,7 @@ def flow_of(unit: str) -> tuple[str, str, bool]:
 
 
 def is_volume_flow(unit: str) -> bool:
-    """Tell whether a unit is a volume per time, with or without a reference condition; UnitError for no unit."""
+    """Return True if a unit is a volume per time, with or without reference condition; UnitError if invalid."""
     flow, _, is_normal = flow_of(unit)
     return is_normal or parse_unit(flow)[0].dimensions == VOLUME_FLOW
 
@@ -92,9 +92,9 @@ def with_condition(unit: str, condition: str, gas: str) -> str:
 
 
 def read_unit(unit: str) -> tuple[ParsedUnit, str]:
-    """Return a unit as data with the kind of a pressure; a volume flow with condition and gas is a mass flow.
+    """Return a unit as data with the kind of a pressure; a volume flow with condition and gas becomes a mass flow.
 
-    UnitError for what is no unit, for a flow that calls itself normal without a condition, and for one without a gas.
+    Raises UnitError for an invalid unit, a normal flow without condition, and a condition without gas.
     """
     flow, words, is_normal = flow_of(unit)
     if not words and not is_normal:
@@ -119,7 +119,7 @@ def read_unit(unit: str) -> tuple[ParsedUnit, str]:
 
 
 def without_condition(unit: str) -> str:
-    """Return the message about a volume flow without reference condition and gas, where a mass flow is required."""
+    """Return the message about a volume flow without reference condition and gas where a mass flow is required."""
     named, normal, own = (with_condition(unit, at, "air") for at in ("ANR", "DIN 1343", _EXAMPLE))
     return (
         f"'{unit}' is a volume flow without its reference condition, by which it is a mass flow: write '{named}' "
@@ -129,7 +129,7 @@ def without_condition(unit: str) -> str:
 
 
 def density(condition: Condition, molar_mass: float) -> float:
-    """Return the density [kg/m^3] of an ideal gas, ``p M/(R T)``; for air at ANR, the density in ISO 6358."""
+    """Return the density [kg/m^3] of an ideal gas, ``p M/(R T)``; for air at ANR, the density given in ISO 6358."""
     if condition.is_humid and abs(molar_mass / MOLAR_MASSES["air"] - 1.0) < _AS_AIR:
         return STANDARD_REFERENCE_DENSITY_AIR
     return condition.pressure * molar_mass / (MOLAR_GAS_CONSTANT * condition.temperature)
@@ -140,9 +140,9 @@ _AS_AIR = 5.0e-3
 
 
 def condition_of(text: str, unit: str) -> Condition:
-    """Return a condition by its name, or from a temperature and a pressure; UnitError, about a unit, for another text.
+    """Return a condition by its name, or from a temperature and a pressure; UnitError for any other text.
 
-    A pressure without a kind is absolute, as in every reference condition.
+    A pressure without a kind is absolute, as in every reference condition. ``unit`` is quoted in the message.
     """
     name = re.sub(r"[\s_-]+", " ", text).upper()
     if name in CONDITIONS:
@@ -171,12 +171,12 @@ def condition_of(text: str, unit: str) -> Condition:
 
 
 def _split(words: str) -> list[str]:
-    """Return the words between commas, semicolons and 'and'; a comma between digits is a decimal comma."""
+    """Return the words separated by commas, semicolons or 'and'; a comma between digits is a decimal comma."""
     return re.split(r"(?<!\d),|,(?!\d)|;|\band\b|&|@", words)
 
 
 def _condition_and_gases(words: str) -> tuple[str, list[str]]:
-    """Return the reference condition in the words behind a flow, and the gases or molar masses."""
+    """Return the reference condition in the words after a flow, and the gases or molar masses."""
     said = [word.strip() for word in _split(words) if word.strip()]
     known = [name.lower() for name in MOLAR_MASSES]
     gases = [word for word in said if word.lower() in known or word.endswith("/mol")]

@@ -1,9 +1,9 @@
-"""Display units of numbers: the one in which a number was given, else the set's, else the catalogue's.
+"""Display units of numbers: the unit as given, else the unit of the parameter set, else the default of the catalogue.
 
-``QUANTITIES`` is the only table of shown units, and ``shown_text`` what writes a number in one. Files and data stay in
-SI. Gauge pressures count from the atmosphere of the device of which they are. It stands beside the units, so that text,
-tables and axes have one zero, and so do saved results, which keep both as ``shown``. Outside of ``shown_in`` the
-package's own choices hold.
+``QUANTITIES`` is the only table of display units, and ``shown_text`` writes a number in its display unit. Files and
+data stay in SI. Gauge pressures are relative to the atmosphere of the device. This zero is stored with the units, so
+that text, tables, axes and saved results, which store both as ``shown``, use the same one. Outside of ``shown_in`` the
+defaults of the package apply.
 """
 
 import contextlib
@@ -23,10 +23,10 @@ R = TypeVar("R")
 
 
 class Units(NamedTuple):
-    """The unit of a quantity in SI, and the one in which it is shown unless a parameter set writes another.
+    """SI unit of a quantity, and its default display unit, used unless a parameter set has another.
 
-    A run computes nothing up to ``zero`` [SI]: what is not larger is rounding, and is shown as 0. It is 0 for
-    quantities that are given and not computed.
+    ``zero`` [SI] is the accuracy of computed values: magnitudes up to it are rounding errors and displayed as 0. It is
+    0 for quantities that are given and not computed.
     """
 
     si: str
@@ -91,7 +91,7 @@ _chosen: ContextVar[Mapping[str, str]] = ContextVar("_chosen", default=MappingPr
 
 @contextlib.contextmanager
 def shown_in(units: Mapping[str, str]) -> Iterator[None]:
-    """Show numbers inside in these units, by their unit in SI: ``{"Pa_a": "bar_g", "N m": "N cm"}``."""
+    """Use these display units within the ``with`` block, keyed by SI unit: ``{"Pa_a": "bar_g", "N m": "N cm"}``."""
     token = _chosen.set(units)
     try:
         yield
@@ -100,7 +100,7 @@ def shown_in(units: Mapping[str, str]) -> Iterator[None]:
 
 
 def in_units(units: Callable[..., Mapping[str, str]]) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return a decorator: the function writes and draws in the units that ``units`` returns for its arguments."""
+    """Return a decorator that runs a function with the display units returned by ``units`` for its arguments."""
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         @functools.wraps(function)
@@ -114,15 +114,15 @@ def in_units(units: Callable[..., Mapping[str, str]]) -> Callable[[Callable[P, R
 
 
 def pressure_units(level: str) -> dict[str, str]:
-    """Return the display units of pressure levels and differences, by SI unit, for levels written as ``bar_g``."""
+    """Return the display units of pressure levels and differences, by SI unit, for levels in ``bar_g``, say."""
     unit, kind = split_pressure_kind(level)
     return {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
 
 
 def units_beside(si_unit: str, unit: str) -> dict[str, str]:
-    """Return the display units, by SI unit, of whoever writes quantities of ``si_unit`` in ``unit``.
+    """Return the display units, by SI unit, implied by the use of ``unit`` for quantities of ``si_unit``.
 
-    The difference of two levels in ``bar_g`` is in ``bar_d``, an angular velocity beside ``deg`` in ``deg/s``.
+    With levels in ``bar_g`` differences are in ``bar_d``, with angles in ``deg`` angular velocities in ``deg/s``.
     """
     if si_unit == "Pa_a":
         return pressure_units(unit)
@@ -130,12 +130,12 @@ def units_beside(si_unit: str, unit: str) -> dict[str, str]:
 
 
 def counted_from(units: Mapping[str, str], atmosphere: float) -> dict[str, str]:
-    """Return units by unit in SI with the atmosphere [Pa absolute] from which gauge pressures count."""
+    """Return display units by SI unit, supplemented by the atmosphere [Pa absolute] as zero of gauge pressures."""
     return {**units, GAUGE_ZERO: f"{atmosphere!r} Pa_a"}
 
 
 def gauge_zero() -> float:
-    """Return the absolute pressure [Pa] from which displayed gauge pressures count."""
+    """Return the absolute pressure [Pa] that is displayed as gauge zero."""
     stated = _chosen.get().get(GAUGE_ZERO)
     return STANDARD_ATMOSPHERE if stated is None else float(stated.removesuffix(" Pa_a"))
 
@@ -146,21 +146,22 @@ def units_in_force() -> dict[str, str]:
 
 
 def quantity_of_unit(si_unit: str) -> str:
-    """Return the kind of quantity that has a unit in SI, empty for a plain number or a unit that is shown as it is.
+    """Return the kind of quantity for an SI unit; empty for a plain number or a unit without another display unit.
 
-    ``kg`` is a mass and ``s`` a time; masses of gas and parts, shown in grams, and what lasts minutes have to be named.
+    ``kg`` is a mass and ``s`` a time. Masses of gas and of parts, displayed in grams, and durations in minutes must be
+    named explicitly.
     """
     return _OF_UNIT.get(si_unit, "")
 
 
 def usual_unit(si_unit: str) -> str:
-    """Return the unit of the package's own table in which numbers of a unit in SI are shown; "" for a number."""
+    """Return the default display unit of an SI unit; "" for a number."""
     quantity = quantity_of_unit(si_unit)
     return QUANTITIES[quantity].shown if quantity else "" if si_unit == "1" else si_unit
 
 
 def shown_unit(si_unit: str) -> str:
-    """Return the unit in which numbers of a unit in SI are shown: the chosen one, else the table's; "" for a number."""
+    """Return the display unit of an SI unit: the chosen one, else the default; "" for a number."""
     chosen, si_unit = _chosen.get(), _WRITTEN.get(si_unit, si_unit)
     if si_unit in chosen:
         return chosen[si_unit]
@@ -170,16 +171,16 @@ def shown_unit(si_unit: str) -> str:
 
 
 def unit_of(quantity: str) -> str:
-    """Return the unit in which a kind of quantity is shown."""
+    """Return the display unit of a kind of quantity."""
     return QUANTITIES[quantity].shown if quantity in NAMED else shown_unit(QUANTITIES[quantity].si)
 
 
 def shown_value(
     value: float, si_unit: str, unit: str = "", atmosphere: float | None = None, zero: float = 0.0
 ) -> float:
-    """Return a value in SI in a unit, or in the one in which it is shown; what is not larger than ``zero`` is 0.
+    """Return an SI value in ``unit``, by default its display unit; magnitudes up to ``zero`` become 0.
 
-    Gauge counts from ``atmosphere`` [Pa absolute], by default of the device in force.
+    Gauge pressures are relative to ``atmosphere`` [Pa absolute], by default the atmosphere of the device in force.
     """
     known, unit = _WRITTEN.get(si_unit, si_unit), unit or shown_unit(si_unit)
     if unit in (known, "") or not math.isfinite(value):
@@ -190,9 +191,10 @@ def shown_value(
 
 
 def shown_text(value: float, si_unit: str, form: str = ".6g", atmosphere: float | None = None, unit: str = "") -> str:
-    """Return a value in SI as text with the unit in which it is shown; what is zero within the accuracy of a run is 0.
+    """Return an SI value as text in its display unit; a value that is zero within the accuracy of a run is 0.
 
-    ``unit`` is the one in which it was given, where that is known; gauge counts from ``atmosphere`` [Pa absolute].
+    ``unit`` is the unit in which the value was given, if known. Gauge pressures are relative to ``atmosphere`` [Pa
+    absolute].
 
     >>> shown_text(5.201e-4, "m^2"), shown_text(4.0e5, "Pa_a", unit="bar_a"), shown_text(1.0e-17, "N m")
     ('520.1 mm^2', '4 bar_a', '0 N m')
@@ -205,7 +207,7 @@ def shown_text(value: float, si_unit: str, form: str = ".6g", atmosphere: float 
 
 
 def written_text(value: float, si_unit: str, atmosphere: float | None = None, unit: str = "") -> str:
-    """Return a value in SI as text to be read again, in the unit in which it is shown, without the rounding of units.
+    """Return an SI value as text in its display unit, to be read again, without the rounding errors of the conversion.
 
     >>> written_text(206842.71879504 + 101325.0, "Pa_a"), written_text(3.929e-9, "m^3/(s Pa)")
     ('30 psi_g', '0.3929 L/(s bar)')

@@ -1,6 +1,6 @@
-"""Spellings of units in use, brought to one form: ``N m s/rad``, ``mm^2``, ``L/(s bar)``, ``psi_g``.
+"""Normalisation of unit spellings to one form: ``N m s/rad``, ``mm^2``, ``L/(s bar)``, ``psi_g``.
 
-Only what can mean one thing is brought to another spelling. What stays unknown is refused where the unit is looked up.
+Only unambiguous spellings are changed. Unknown units are refused where the unit is looked up.
 """
 
 import functools
@@ -120,9 +120,9 @@ _KIND_OF_QUOTIENT = re.compile(
 
 @functools.lru_cache(maxsize=512)
 def split_pressure_kind(unit: str) -> tuple[str, str]:
-    """Return a unit in its normal spelling without ``_g``, ``_a`` or ``_d`` at its end, and that letter.
+    """Return a unit in normal spelling without its suffix ``_g``, ``_a`` or ``_d``, and the letter of that suffix.
 
-    UnitError for a text that is not written like a unit.
+    Raises UnitError for a text that does not have the form of a unit.
     """
     normal = unit.replace("**", "^").replace("^^", "^ ^").translate(_CHARACTERS).replace("^-^", "^-").strip(" ")
     normal = _COLUMNS_OF.sub(r"\1WC", normal)
@@ -150,12 +150,12 @@ def split_pressure_kind(unit: str) -> tuple[str, str]:
 
 
 def says_kind(unit: str) -> bool:
-    """Tell whether a word after a unit states the kind of a pressure."""
+    """Return True if a word after a unit states the kind of a pressure."""
     return _kind_of_pressure(unit.translate(_CHARACTERS).strip(" "))[1] != ""
 
 
 def _kind_of_pressure(text: str) -> tuple[str, str]:
-    """Return a pressure unit without the word of its kind, and the kind: ``psig``, ``bar (abs)``, ``kPa gauge``."""
+    """Return a pressure unit without the word for its kind, and the kind: ``psig``, ``bar (abs)``, ``kPa gauge``."""
     match = _KIND.fullmatch(text)
     word = "" if match is None else match["word"]
     if match is None and "/" in text:
@@ -168,9 +168,10 @@ def _kind_of_pressure(text: str) -> tuple[str, str]:
 
 
 def as_product(name: str) -> str:
-    """Return a joined name as known units with spaces, ``N m`` for ``Nm``; empty if it is known or no product.
+    """Return a joined name as known units with spaces, ``N m`` for ``Nm``; empty if already known or no product.
 
-    No unit is there twice, so that ``Nmm`` is ``N mm``; of the rest short ones come first: ``Nms`` is ``N m s``.
+    Each unit occurs at most once, so that ``Nmm`` is ``N mm``. After the first unit, shorter ones are tried first:
+    ``Nms`` is ``N m s``.
     """
     known = spellings()
     # A letter typed twice, as in degg, is no product.
@@ -199,6 +200,6 @@ def spellings() -> frozenset[str]:
 
 
 def quote(text: object) -> str:
-    """Return a short quotation of a value, on one line."""
+    """Return a short quotation of a value on one line."""
     quoted = repr(text)
     return quoted if len(quoted) <= 50 else f"{quoted[:46]}...'"

@@ -1,1 +1,1 @@
-"""Reproduction of the paper's experiments and of other publications: verdict on each claim."""
+"""Reproduction of the paper's experiments and of other publications, with a verdict on each claim."""

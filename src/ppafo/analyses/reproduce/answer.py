@@ -1,4 +1,4 @@
-"""The reproduction: every claim with its verdict, figures, recordings, and the one bespoke page."""
+"""Report of the reproduction: verdict on every claim, figures, synthetic recordings, and a page of its own."""
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
@@ -54,7 +54,7 @@ PROPORTIONAL = "torque-task-proportional"
 class Reproduction:
     """Result of a reproduction: claims in the paper's order, observations, runs, assumptions and audit findings.
 
-    ``synthetic`` is a sentence where there is no synthetic measurement.
+    ``synthetic`` is the synthetic recordings, or a sentence with the reason if there are none.
     """
 
     claims: tuple[Claim, ...]
@@ -75,11 +75,11 @@ class Reproduction:
 
     @property
     def missed(self) -> tuple[Claim, ...]:
-        """Claims whose number is outside the window that it has to meet."""
+        """Claims whose value is outside the required window."""
         return tuple(claim for claim in self.claims if claim.is_missed)
 
     def json_document(self) -> dict[str, Any]:
-        """Return claims with their verdicts, and how many there are of each, as plain data in SI."""
+        """Return claims with verdicts, and the number of claims for each verdict, as plain data in SI."""
         return {
             "counts": verdict_counts(self.claims),
             "claims": [claim.document() for claim in self.claims],
@@ -91,19 +91,19 @@ class Reproduction:
 
 @dataclass(frozen=True, slots=True)
 class Studies:
-    """Some publications with their judged claims, and the reproduction of the paper where it is among them."""
+    """Publications with their judged claims, and the reproduction of the paper if it is included."""
 
     studies: tuple[tuple[Publication, tuple[JudgedClaim, ...]], ...]
     reproduction: Reproduction | None = None
 
     @property
     def verdicts(self) -> list[Verdict]:
-        """The verdicts of all claims, the paper's first."""
+        """Verdicts of all claims, starting with the paper's."""
         own = [] if self.reproduction is None else [claim.verdict for claim in self.reproduction.claims]
         return own + [claim.verdict for _, claims in self.studies for claim in claims]
 
     def json_document(self) -> dict[str, Any]:
-        """Return claims with their verdicts, and how many there are of each, as plain data in SI."""
+        """Return claims with verdicts, and the number of claims for each verdict, as plain data in SI."""
         own = () if self.reproduction is None else self.reproduction.claims
         return {
             "study": self.studies[0][0].name if self.reproduction is None else ALL,
@@ -142,7 +142,10 @@ _TASK_METRICS = (
 
 
 def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> bytes:
-    """Return the page as HTML; ``drawn`` has SVG files by the names of the figures, which become part of the page."""
+    """Return the page as HTML.
+
+    ``drawn`` are the figures as SVG by file name; they become part of the page.
+    """
     changed = [word for override in reproduction.overrides for word in ("--set", override)]
     solenoid, proportional = reproduction.solenoid, reproduction.proportional
     runs = (solenoid, proportional, reproduction.step)
@@ -184,7 +187,7 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
 
 
 def _set_values(reproduction: Reproduction) -> dict[str, Any]:
-    """Return what the page says of both parameter sets: findings of the printed one, and those that the other keeps."""
+    """Return template values on both parameter sets: findings of the printed set, and remaining ones of the other."""
     severities = {"error": "contradictions", "warning": "remarks", "note": "notes"}
     groups: dict[tuple[str, ...], list[AssumedValue]] = {}
     for value in reproduction.assumed:
@@ -206,7 +209,7 @@ def _set_values(reproduction: Reproduction) -> dict[str, Any]:
 
 
 def holding_torque(result: Result) -> float:
-    """Largest torque that a result's supply can hold [N m]; equation (2) with atmosphere in the other chamber."""
+    """Largest static torque for the supply of a result [N m]; equation (2), other chamber at atmosphere."""
     device = result.scenario.device
     return device.actuator.torque_constant * (device.supply.pressure - device.supply.atmospheric_pressure)
 
@@ -220,7 +223,7 @@ def _metric_text(metric: Metric) -> str:
 
 
 def _synthetic(evidence: SyntheticEvidence | str, figure: bytes | None) -> dict[str, Any]:
-    """Return what the template needs of the synthetic measurements; without them only why there are none."""
+    """Return template values on the synthetic measurements, or the reason why there are none."""
     if isinstance(evidence, str):
         return {"synthetic": None, "no_synthetic": evidence}
     reported = load_reported()
@@ -259,7 +262,10 @@ NOT_READ = (
 
 
 def finding_of_studies(solved: Studies) -> Finding[Studies]:
-    """Return the table of studies; a claim of another publication that is not met is a result, no failure."""
+    """Return the table of studies as a finding.
+
+    A claim of another publication that is not met counts as a result, not as a failure.
+    """
     reproduction = solved.reproduction
     rows: list[Sequence[Cell]] = [] if reproduction is None else [(SEED, *row) for row in _paper_rows(reproduction)]
     details = [] if reproduction is None else [Section(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]
@@ -298,7 +304,7 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
 
 
 def _agrees(low: float | None, high: float | None, unit: str) -> str | None:
-    """Return the range that agrees with a claim, in words."""
+    """Return in words the range of values that agrees with a claim."""
     if low is None and high is None:
         return None
     ends = f"{low:g} to {high:g}" if low is not None and high is not None else ""
@@ -310,7 +316,7 @@ def _paper_rows(reproduction: Reproduction) -> list[tuple[str, str, str, str]]:
 
 
 def result_on_u(rows: Sequence[InterpretationOfU]) -> tuple[str, ...]:
-    """Return what the readings come to in one sentence, where they come to it."""
+    """Return the conclusion from the interpretations of U as a sentence; empty if they do not support it."""
     entries = paper_entries()
     error, saving = entries["torque_rms_improvement"], entries["co2_saving"]
     low, high, least = error.at_least or 0.0, error.at_most or 0.0, saving.at_least or 0.0
@@ -324,9 +330,10 @@ def result_on_u(rows: Sequence[InterpretationOfU]) -> tuple[str, ...]:
 
 
 def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
-    """Return the paper's claims; it has not passed where a number misses its window, unless values were changed.
+    """Return the paper's claims as a finding.
 
-    Without the simulated test bench there is no figure 3.
+    It has not passed if a value is outside its window although no value was overridden. Figure 3 needs the simulated
+    test bench.
     """
     said, missed, rows = [NOTHING_CONFIRMED], reproduction.missed, reproduction.readings_of_u
     if reproduction.overrides:
@@ -362,7 +369,7 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
 
 
 def _figures(reproduction: Reproduction) -> list[Section]:
-    """Return the figures of the page, each drawn where it is wanted."""
+    """Return the figures of the page, each drawn on demand."""
     supply = reproduction.step.scenario.device.supply
     levels = SupplyLevels(supply.pressure, supply.atmospheric_pressure)
     stated = {claim.id: claim.paper or 0.0 for claim in reproduction.claims}

@@ -1,6 +1,6 @@
-"""Basis of the simulations, and synthetic recordings of the same experiments for the figures.
+"""Assumptions of the simulations, and synthetic recordings of the same experiments for the figures.
 
-What a synthetic recording shows says nothing about the paper's device, so that no claim rests on one.
+A synthetic recording contains no information on the paper's device, so no claim rests on one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,9 +26,13 @@ _ONLY_FOR_A_FREE_VANE = frozenset({"actuator.restitution", "foot_plate.gravity_t
 
 @dataclass(frozen=True, slots=True)
 class AssumedValue:
-    """A value that the paper does not print as it is used: path, meaning, value with unit, reason, and who uses it.
+    """Value of a simulation that the paper does not print in this form.
 
-    ``source`` is what the reason goes by, empty where the reason says it all.
+    ``path``, ``meaning``, ``value``: dotted path, description, and value with unit
+    ``origin``: kind of origin
+    ``reason``: reason for the value
+    ``source``: source of the reason; empty if the reason needs none
+    ``used_by``: experiments that use the value
     """
 
     path: str
@@ -40,13 +44,13 @@ class AssumedValue:
     used_by: tuple[str, ...]
 
     def sentence(self) -> str:
-        """Return the value and its reason on one line."""
+        """Return value and reason on one line."""
         source = f" ({self.source})" if self.source else ""
         return f"{self.path} = {self.value}: {self.reason}{source}"
 
 
 def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...]:
-    """Return what the scenarios rest on, by the name that a reader knows them by; the same value is listed once."""
+    """Return the assumed values of the scenarios, with their displayed names and without duplicates."""
     merged: dict[tuple[str, str, str], AssumedValue] = {}
     for name, scenario in scenarios.items():
         origin = scenario.origin
@@ -93,14 +97,14 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
 PLANTED_SET = "ppafo2011"
 RIG_SEED = 1
 BENCH_PRESET = "paper-bench"
-"""The bench as it may have been, for figures 3 and 7."""
+"""Preset of a bench similar to the paper's, for figures 3 and 7."""
 TASK_PRESET = "ideal-laboratory"
-"""The paper's physics behind noisy sensors: on ``paper-bench`` the proportional valve's task alone takes 6 s."""
+"""Preset with the paper's physics and noisy sensors: on ``paper-bench`` the proportional valve's task takes 6 s."""
 
 
 @dataclass(frozen=True, slots=True)
 class SyntheticEvidence:
-    """Both procedures of figure 3, the recorded step response, and both torque tasks."""
+    """Synthetic recordings: both procedures of figure 3, the step response, and both torque tasks."""
 
     torque: BenchResult
     decay: BenchResult
@@ -110,10 +114,10 @@ class SyntheticEvidence:
 
 
 def synthetic_evidence(tasks: Mapping[str, tuple[str, ...]], step_overrides: Sequence[str]) -> SyntheticEvidence | str:
-    """Return what the rig records, or one sentence: its solver gives up, or it cannot follow the overrides.
+    """Return the recordings of the rig, or an error message if its solver fails or it does not support the overrides.
 
-    ``tasks`` has the overrides of the torque task by valve, ``solenoid`` and ``proportional``. The bench keeps the
-    paper's values whatever is overridden.
+    ``tasks`` are the overrides of the torque task for the valves ``solenoid`` and ``proportional``. The procedures of
+    figure 3 always use the paper's values, without overrides.
     """
     try:
         recorded = {
@@ -134,7 +138,10 @@ def synthetic_evidence(tasks: Mapping[str, tuple[str, ...]], step_overrides: Seq
 
 @cache
 def bench_figure() -> tuple[BenchResult, BenchResult]:
-    """Identify torque constant and damping as figure 3 does, from synthetic recordings; SimulationError."""
+    """Identify torque constant and damping as in figure 3, from synthetic recordings.
+
+    Raises SimulationError if the solver of the rig fails.
+    """
     # Kept: it takes seconds, and no override reaches it.
     inertia = load_device(PLANTED_SET).foot_plate.inertia
     torque, decay = (

@@ -1,4 +1,4 @@
-"""Claims of the paper beside our numbers, the paper's numbers as reported, and the claims that are arithmetic."""
+"""Claims of the paper compared with our values, the reported numbers, and claims decided by arithmetic."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ Verdict = Literal[
     "not_testable",
 ]
 VERDICTS: dict[Verdict, str] = {verdict: verdict.replace("_", " ") for verdict in get_args(Verdict)}
-"""Every verdict in words. Only the first two follow from reported numbers alone."""
+"""Verdicts in words. Only the first two follow from reported numbers alone."""
 MEANINGS: dict[Verdict, str] = {
     "consistent": "the reported numbers agree with each other",
     "inconsistent_as_reported": "the reported numbers do not agree with each other",
@@ -38,12 +38,15 @@ MEANINGS: dict[Verdict, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A row of the comparison: what the paper states and our number, both in ``unit``; None where it is no number.
+    """Claim of the paper with our value and the verdict, a row of the comparison.
 
-    ``words`` and ``found`` say the same as they are shown where it is no single number. ``source`` is where the paper
-    says it, ``assumptions`` what our number rests on beside the paper, ``note`` why the verdict is what it is.
-    ``range`` has the least and the largest of our numbers over what is not known. A claim that has to hold for this
-    package to be sound has a window that ``value`` must fall into.
+    ``paper``, ``value``: published value and our value, both in ``unit``; None if not a single number
+    ``words``, ``found``: text displayed in place of ``paper`` and ``value``; empty if not needed
+    ``source``: page, section or equation of the paper
+    ``assumptions``: assumptions of our value beyond the paper
+    ``note``: reason of the verdict
+    ``window``: range into which ``value`` must fall for this package to be sound; None for other claims
+    ``range``: smallest and largest of our values over unknown quantities
     """
 
     id: str
@@ -62,17 +65,17 @@ class Claim:
 
     @property
     def published(self) -> str:
-        """Published value as text for display."""
+        """Published value as displayed text."""
         return self.words if self.paper is None else format_reported_quantity(self.paper, self.unit)
 
     @property
     def ours(self) -> str:
-        """Value found here as text for display."""
+        """Our value as displayed text."""
         return self.found or quantity(self.value, self.unit, 3)
 
     @property
     def is_missed(self) -> bool:
-        """True where the claim has a window and our number is not in it."""
+        """True if the claim has a window and our value is outside."""
         if self.window is None:
             return False
         return self.value is None or not self.window[0] <= self.value <= self.window[1]
@@ -92,9 +95,9 @@ _DOCUMENT = (
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """Statement of the paper's text, whether the simulated recording shows it, and the numbers that decide it.
+    """Statement of the paper's text, with the verdict of the simulated recording and the numbers behind it.
 
-    ``difference`` says what the recording shows beyond the sentence, where that is not what the paper tells.
+    ``difference`` is a deviation of the recording from the text beyond the statement; empty if there is none.
     """
 
     id: str
@@ -114,7 +117,7 @@ def stated_claim(
     window: tuple[float, float] | None = None,
     found: str = "",
 ) -> Claim:
-    """Return the claim of an entry of the paper's file with our number and the verdict on it."""
+    """Return the claim of an entry of the paper's file, with our value and the verdict."""
     entry = paper_entries()[identifier]
     return Claim(
         id=identifier,
@@ -135,7 +138,7 @@ def stated_claim(
 def claim_on_text(
     identifier: str, statement: str, observations: Sequence[Observation], assumptions: tuple[str, ...]
 ) -> Claim:
-    """Return the claim on what the text tells, statement by statement, of a recording."""
+    """Return a claim that summarises the paper's statements on a recording, one observation for each."""
     missing = [observation.id for observation in observations if not observation.holds]
     reserved = [observation for observation in observations if observation.holds and observation.difference]
     plain = len(observations) - len(missing) - len(reserved)
@@ -155,18 +158,18 @@ def claim_on_text(
 
 
 def observation(identifier: str, holds: bool, evidence: str, difference: str = "") -> Observation:
-    """Return what an entry of the paper's file tells, with whether the recording shows it."""
+    """Return the observation for an entry of the paper's file; ``holds`` is the verdict of the recording."""
     entry = paper_entries()[identifier]
     return Observation(identifier, entry.statement, holds, evidence, entry.where, difference)
 
 
 def verdict_counts(claims: Sequence[Claim]) -> dict[Verdict, int]:
-    """Return how many claims have each verdict, in the order of ``VERDICTS``."""
+    """Return the number of claims for each verdict, in the order of ``VERDICTS``."""
     return {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
 
 
 def count_sentence(verdicts: Sequence[Verdict]) -> str:
-    """Return how many claims have each verdict, for example ``16 claims: 2 consistent, 3 inconsistent as reported``."""
+    """Return the numbers of verdicts in words, for example ``16 claims: 2 consistent, 3 inconsistent as reported``."""
     counts = ", ".join(f"{count} {words}" for key, words in VERDICTS.items() if (count := verdicts.count(key)))
     return f"{len(verdicts)} claims: {counts}"
 
@@ -176,34 +179,34 @@ REPORTED_SET = "ppafo2011-printed"
 
 @dataclass(frozen=True, slots=True)
 class ReportedSet:
-    """Read access to the reported set; every requested value has to be there."""
+    """Parameter set with the paper's numbers as reported; every requested entry must exist."""
 
     parameter_set: ParameterSet
     evidence: Evidence
 
     def entry(self, path: str) -> Entry:
-        """Return the entry at a path: number and unit as reported, and where the paper prints it."""
+        """Return the entry at a path: reported number and unit, and its location in the paper."""
         return self._known(path, self.parameter_set.numbers.get(path))
 
     def quotation(self, path: str) -> str:
-        """Return number and unit for a sentence, for example ``8.4 g m^2``."""
+        """Return number and unit for use in a sentence, for example ``8.4 g m^2``."""
         entry = self.entry(path)
         return f"{entry.value:g} {entry.unit}".rstrip()
 
     def in_si(self, path: str) -> float:
-        """Return the value in SI units."""
+        """Return the reported value at a path in SI units."""
         return self._known(path, self.evidence.number(path))
 
     def in_reported_unit(self, path: str, value: float) -> float:
-        """Return an SI value in the unit in which the paper prints the quantity at a path (a unit without offset)."""
+        """Return an SI value converted to the paper's unit for the quantity at a path (a unit without offset)."""
         return value * self.entry(path).value / self.in_si(path)
 
     def text(self, path: str, value: float, digits: int = 4) -> str:
-        """Return a value in the reported unit of a path as it is shown."""
+        """Return a value in the reported unit of a path, as displayed text."""
         return quantity(value, self.entry(path).unit or "-", digits)
 
     def range(self, path: str) -> ReportedRange:
-        """Return the range in SI that the reported digits leave open, without sign."""
+        """Return the range [SI] of values that round to the reported digits, without sign."""
         return self._known(path, self.evidence.magnitude(path))
 
     def gas(self) -> Gas:
@@ -217,7 +220,7 @@ class ReportedSet:
 
 
 def load_reported() -> ReportedSet:
-    """Return the paper's numbers, exactly as reported."""
+    """Return the paper's parameter set, exactly as reported."""
     parameter_set = load_parameter_set(REPORTED_SET)
     return ReportedSet(parameter_set, Evidence(parameter_set, parameter_set.declarations()))
 
@@ -226,7 +229,7 @@ _INERTIA = "foot_plate.inertia"
 
 
 def arithmetic_claims(reported: ReportedSet) -> list[Claim]:
-    """Return the claims that the reported numbers alone decide."""
+    """Return the claims that follow from the reported numbers alone."""
     return [
         _orifice_constants(reported),
         _step_percentages(),
@@ -241,7 +244,7 @@ def _verdict(holds: bool) -> Verdict:
 
 
 def _orifice_constants(reported: ReportedSet) -> Claim:
-    """Compare C1, C2 and the critical ratio with the gas as reported; equations (6), (7)."""
+    """Compare C1, C2 and the critical ratio with the reported gas properties; equations (6), (7)."""
     gas = reported.gas()
     k, constant, temperature = gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
     constants = {
@@ -263,11 +266,11 @@ def _orifice_constants(reported: ReportedSet) -> Claim:
 
 
 STEP_ERRORS = {"position": 110.0, "pressure_1": 55.0, "pressure_2": 55.0, "pressure_difference": 110.0}
-"""Reported errors of the step response, and the full ranges [deg, psi] that the paper takes them over."""
+"""Reported errors of the step response, and the full ranges [deg, psi] by which the paper divides them."""
 
 
 def _step_percentages() -> Claim:
-    """Compare the reported percentages with the reported errors over the reported ranges."""
+    """Compare the reported percentages with reported errors divided by reported ranges."""
     entries = paper_entries()
     errors = [entries[f"step_rms_{name}"].published or 0.0 for name in STEP_ERRORS]
     percents = [entries[f"step_percent_{name}"].published or 0.0 for name in STEP_ERRORS]
@@ -294,11 +297,14 @@ _RATES = {
     "friction.viscous_damping": "reported.velocity_over_acceleration",
     "friction.dynamic_torque": "reported.stopping_deceleration",
 }
-"""Products of the inertia, and what it is multiplied by; a rate in 1/s is one, whatever it is called."""
+"""Reported rate [1/s] or [1/s^2] by which the inertia is multiplied, for each product."""
 
 
 def _damping_and_friction(reported: ReportedSet) -> Claim:
-    """Compare damping and dynamic friction with inertia times the reported rates: one inertia decides both."""
+    """Compare damping and dynamic friction with inertia times the reported rates.
+
+    A single inertia must satisfy both relations.
+    """
     inertia = reported.range(_INERTIA)
     # The slope of acceleration over velocity is reported with its sign, the damping without.
     rates = {path: abs(reported.in_si(rate)) for path, rate in _RATES.items()}
@@ -322,7 +328,7 @@ def _damping_and_friction(reported: ReportedSet) -> Claim:
 
 
 def _discharge_coefficient(reported: ReportedSet) -> Claim:
-    """Compare the reported Cd with what the reported flow needs through each reported area; equation (6)."""
+    """Compare the reported Cd with the value needed for the reported flow through each area; equation (6)."""
     coefficients, passed, held, gas = [], [], [], reported.gas()
     choked = choked_flow_constant(gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature)
     for valve in ("solenoid", "proportional"):
@@ -360,7 +366,7 @@ def _discharge_coefficient(reported: ReportedSet) -> Claim:
 
 
 def _swept_volume(reported: ReportedSet) -> Claim:
-    """Compare the displacement per radian with the torque constant, which virtual work makes one number."""
+    """Compare displacement per radian with torque constant, which are equal by the principle of virtual work."""
     path, constant = "actuator.displacement_per_radian", "actuator.torque_constant"
     needed = reported.in_si(constant)
     share = 100.0 * needed / reported.in_si(path)
@@ -387,7 +393,7 @@ NOT_PUBLISHED = (
     "unmodelled_dynamics",
     "temperature_would_help",
 )
-"""Statements that only recordings or masses could test, neither of which is published."""
+"""Statements that could be tested only with recordings or masses, neither of which is published."""
 
 
 NOT_PUBLISHED_CLAIM = Claim(
@@ -400,4 +406,4 @@ NOT_PUBLISHED_CLAIM = Claim(
     "in tests/, on synthetic recordings; it says nothing about the paper's device.",
     words=f"{len(NOT_PUBLISHED)} statements",
 )
-"""The claim on everything that nothing published can test."""
+"""Claim that summarises all statements that no published data can test."""

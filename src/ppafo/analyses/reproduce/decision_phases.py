@@ -1,7 +1,7 @@
-"""The solenoid pair's torque task over the unknown phase of its decisions.
+"""Torque task of the solenoid pair for all phases of the sampled controller decisions.
 
-The task starts in a tie: the error is exactly 0, and the decisions have an unknown phase. So the pair runs once for
-each phase, with either valve first.
+The task starts with an error of exactly 0, so the first decision is undefined and the phase of the decisions is
+unknown. The pair is therefore simulated for each phase, with either valve first.
 """
 
 from collections.abc import Iterator
@@ -15,18 +15,19 @@ from ppafo.simulation.scenario import Initial, PrescribedMotion, Scenario
 from ppafo.simulation.simulate import Result, simulate
 
 PHASES = 20
-"""Phases of the decisions, evenly over one period; each with valve A and with valve B first."""
+"""Number of phases of the decisions, evenly spaced over one period; each with valve A and with valve B first."""
 _TIE = 1.0e-3
-"""A reference [N m] this far from 0 decides the tie at the start."""
+"""Reference [N m] that is large enough to determine the first decision."""
 _STEP = 0.5e-3
-"""Step of the engine and time between two samples [s], which divide every phase."""
+"""Time step and output interval [s], which divide every phase."""
 
 
 @dataclass(frozen=True, slots=True)
 class PhasedRuns:
-    """The pair's RMS torque error [N m] and gas from the supply [g] for each phase of its decisions, A or B first.
+    """RMS torque error [N m] and supplied gas [g] of the solenoid pair for each phase of its decisions.
 
-    Both are (runs,). Run number ``PHASES``, a whole period with A first, is the run as its scenario has it.
+    Both have shape (runs,), with valve A first and then with valve B first. Run number ``PHASES``, a whole period with
+    A first, is the scenario as written.
     """
 
     errors: Floats
@@ -34,7 +35,10 @@ class PhasedRuns:
 
 
 def phased_runs(solenoid: Result) -> PhasedRuns:
-    """Return the pair's task with its decisions at each phase; its own run alone where the task has no such phase."""
+    """Return the solenoid pair's task with its decisions at each phase.
+
+    If the task has no undefined phase, the result contains only the given run.
+    """
     scenario = solenoid.scenario
     # Two runs are joined by their pressures, which are the whole state only of a locked vane at constant temperature
     # without lines; and a tie is only where reference and torque both begin at 0.
@@ -62,8 +66,8 @@ def phased_runs(solenoid: Result) -> PhasedRuns:
 def _runs_with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[float, float]]:
     """Yield RMS torque error [N m] and gas [g] of the run for each phase of the decisions.
 
-    The valve that a reference ``tie`` [N m] calls is held on until then. What follows the first decision is the task
-    from that time on, from the pressures of that time.
+    Until the first decision, a constant reference ``tie`` [N m] keeps one valve on. After it the task continues from
+    the pressures at this time.
     """
     period, duration = scenario.controller.period, scenario.run.duration
     ramp = scenario.reference.settings
@@ -90,6 +94,6 @@ def _runs_with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[flo
 
 
 def with_reference(scenario: Scenario, **settings: float) -> Scenario:
-    """Return a scenario with other settings [SI] of its reference."""
+    """Return a scenario with changed settings [SI] of its reference."""
     reference = scenario.reference
     return replace(scenario, reference=replace(reference, settings={**reference.settings, **settings}))

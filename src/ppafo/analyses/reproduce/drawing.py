@@ -1,4 +1,4 @@
-"""A drawing of the paper's device: gas circuit in symbols of fluid power (ISO 1219-1), and the leg that wears it."""
+"""Drawing of the paper's device: gas circuit with ISO 1219-1 symbols, and the leg with the device."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SIZE = (9.2, 4.85)
-"""Inches; the drawing is in the same units, with the origin at the lower left."""
+"""Size of the drawing [inches]; its coordinates have the same unit, with the origin at the lower left."""
 _MIDDLE = 2.4
 """Height of the proportional valve and of the shaft."""
 _UPPER, _LOWER = 3.9, 0.9
@@ -23,13 +23,13 @@ _BRANCHES = (
 )
 """Direction, its solenoid valve, colour and height of the two branches of the circuit."""
 _BOX, _HALF = 0.42, 0.21
-"""Side of a square of a symbol."""
+"""Side length of the square of a symbol."""
 _REGULATED, _TO_ACTUATOR = 2.25, 4.75
 """Horizontal positions of the couplings between regulators and valves, and between valves and actuator."""
 
 
 def device_figure() -> "Figure":
-    """Return the drawing: bottle, regulators, the two choices of valve, rotary actuator; shank and foot with angles."""
+    """Return the drawing: bottle, regulators, both valve variants, rotary actuator; shank and foot with angles."""
     from matplotlib.figure import Figure
 
     with house_style():
@@ -55,7 +55,10 @@ def _line(
 
 
 def _pipe(axes: "Axes", *turns: float, colour: str = BLACK, width: float = 1.3, dashed: bool = False) -> None:
-    """A line of level and upright pieces: x and y where it begins, then x, y, x, ... to which it goes in turn."""
+    """Draw a line of horizontal and vertical segments.
+
+    ``turns`` are x and y of the start, then x, y, x, ... of the corners in turn.
+    """
     points = [(turns[0], turns[1])]
     for corner, turn in enumerate(turns[2:]):
         x, y = points[-1]
@@ -76,30 +79,30 @@ def _words(
 
 
 def _box(axes: "Axes", x: float, y: float, wide: float, high: float, colour: str = BLACK, width: float = 1.3) -> None:
-    """A rectangle with its lower left corner at (x, y)."""
+    """Draw a rectangle with lower left corner at (x, y)."""
     _pipe(axes, x, y, x + wide, y + high, x, y, colour=colour, width=width)
 
 
 def _rings(axes: "Axes", places: Sequence[tuple[float, float]], colour: str, size: float) -> None:
-    """Open circles: couplings of lines, the shaft, joints of the leg."""
+    """Draw open circles for couplings of lines, the shaft and joints of the leg."""
     x, y = zip(*places, strict=True)
     axes.plot(x, y, "o", color=colour, markersize=size, markerfacecolor="white", linestyle="none", zorder=4)
 
 
 def _blocked(axes: "Axes", x: float, y: float, step: float, half: float) -> None:
-    """A port that a position of the valve closes: a short line with a bar across its end."""
+    """Draw a port that is closed in a valve position: a short line with a bar across its end."""
     _line(axes, (x, y), (x, y + step), width=1.0)
     _line(axes, (x - half, y + step), (x + half, y + step), width=1.0)
 
 
 def _exhaust(axes: "Axes", x: float, y: float) -> None:
-    """A silencer to the atmosphere: a short line, and an open triangle that points away."""
+    """Draw a silencer to the atmosphere: a short line, and an open triangle that points outwards."""
     _line(axes, (x, y), (x, y - 0.1))
     _line(axes, (x - 0.07, y - 0.1), (x + 0.07, y - 0.1), (x, y - 0.22), (x - 0.07, y - 0.1), width=1.0)
 
 
 def _supply(axes: "Axes") -> None:
-    """The bottle, a pressure source, and the lines to the regulators."""
+    """Draw the bottle, a pressure source, and the lines to the regulators."""
     from matplotlib.patches import FancyBboxPatch
 
     shape = "round,pad=0,rounding_size=0.2"
@@ -113,7 +116,7 @@ def _supply(axes: "Axes") -> None:
 
 
 def _regulator(axes: "Axes", name: str, _valve: str, colour: str, y: float) -> None:
-    """A regulator with its spring above and the pressure that it keeps led back to it, dashed."""
+    """Draw a regulator with spring and dashed pilot line from its outlet."""
     x, right, top = 1.25, 1.25 + _BOX, y + _HALF
     _box(axes, x, y - _HALF, _BOX, _BOX, colour)
     _arrow(axes, (x + 0.02, y), (right - 0.02, y), colour)
@@ -127,7 +130,7 @@ def _regulator(axes: "Axes", name: str, _valve: str, colour: str, y: float) -> N
 
 
 def _solenoid_valve(axes: "Axes", _name: str, valve: str, colour: str, y: float) -> None:
-    """A 3/2 valve with solenoid and spring, from its regulator to its chamber."""
+    """Draw a 3/2 valve with solenoid and spring, between regulator and chamber."""
     x, orange = 3.1, SOLENOID.colour
     centre, low, high = x + _BOX, y - _HALF, y + _HALF
     _pipe(axes, 1.25 + _BOX, y, 2.72, low - 0.16, centre + 0.12, low, colour=colour)
@@ -148,7 +151,7 @@ def _solenoid_valve(axes: "Axes", _name: str, valve: str, colour: str, y: float)
 
 
 def _proportional_valve(axes: "Axes", x: float, y: float) -> None:
-    """The 5/3 valve: work ports on top, and below one exhaust between the ports of the two regulators."""
+    """Draw the 5/3 valve with work ports on top, and below the exhaust port between two supply ports."""
     blue, low, high = PROPORTIONAL.colour, y - _HALF, y + _HALF
     centre, right, end = x + _BOX, x + 2 * _BOX, x + 3 * _BOX
     first, second = 0.11, 0.31
@@ -181,7 +184,7 @@ def _proportional_valve(axes: "Axes", x: float, y: float) -> None:
 
 
 def _actuator(axes: "Axes", x: float, y: float) -> None:
-    """The semi-rotary actuator with two chambers and a leak past the vane."""
+    """Draw the semi-rotary actuator with two chambers and a leak across the vane."""
     from matplotlib.patches import Wedge
 
     radius, vane = 0.72, np.radians(165.0)
@@ -203,7 +206,7 @@ def _actuator(axes: "Axes", x: float, y: float) -> None:
 
 
 def _leg(axes: "Axes") -> None:
-    """Shank and foot in the sagittal plane, with the angles of the model."""
+    """Draw shank and foot in the sagittal plane, with the angles of the model."""
     from matplotlib.patches import Arc
 
     knee, ankle, toes = (7.55, 4.2), (7.75, 1.85), (8.75, 1.3)

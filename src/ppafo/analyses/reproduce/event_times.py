@@ -16,11 +16,11 @@ from ppafo.walking.stride_events import EVENTS, event_errors, known_events, true
 from ppafo.walking.task_sequence import TaskSegment, TaskSequence
 
 WEARERS = {"healthy": ("wearer.keeps_gait=1",), "impaired": ("wearer.keeps_gait=0",)}
-"""A wearer whose muscles keep the measured gait, and the one of the walk file, whose foot drops."""
+"""Overrides of a wearer whose muscles keep the measured gait, and of the walk file's wearer, who has drop foot."""
 LONGEST = 60.0
-"""Time [s] of a walk at most."""
+"""Longest time [s] of a walk."""
 SETTLED = 6.0
-"""Time [s] from which events count: strides are learnt by then."""
+"""Time [s] after which events count, when the stride estimate has settled."""
 UNEVEN_STRIDES = 24
 VARIATION = 0.025
 """Standard deviation of stride times over their mean in steady walking, as published for healthy adults (Hausdorff
@@ -29,7 +29,7 @@ SEED = 20110501
 
 
 def uneven_task_sequence(cadence: float) -> TaskSequence:
-    """Strides whose times vary as people's do, about a cadence [1/s] of steps."""
+    """Return a task sequence whose stride times vary as in healthy walking, about a cadence of steps [1/s]."""
     generator = np.random.default_rng(SEED)
     paces = cadence / (1.0 + VARIATION * np.clip(generator.standard_normal(UNEVEN_STRIDES), -2.0, 2.0))
     # Each stride is a segment of its own, since a segment has one pace.
@@ -39,7 +39,10 @@ def uneven_task_sequence(cadence: float) -> TaskSequence:
 
 
 def event_error(configuration: Scenario) -> float:
-    """RMS time error of the gait events of one walk over a task sequence [s]; SimulationError where it diverges."""
+    """Return the RMS time error [s] of the gait events of a walk over a task sequence.
+
+    Raises SimulationError if the walk diverges.
+    """
     sequence = task_sequence_of_walk(configuration)
     assert sequence is not None, "its strides are uneven"
     duration = min(float(sequence.duration), LONGEST)

@@ -1,4 +1,4 @@
-"""Figures 7 and 8 of the paper: the step response and the torque task, simulated, beside synthetic measurements."""
+"""Figures 7 and 8 of the paper: simulated step response and torque task, with synthetic measurements."""
 
 from dataclasses import replace
 from functools import partial
@@ -33,20 +33,20 @@ if TYPE_CHECKING:
 _MILLISECONDS = 1.0e3
 _AFTER_STEP = Kind("Time after the step", "ms")
 _SHOWN_BEFORE_STEP = 0.03
-"""Fraction of the time axis before the step, so that a rise within the first milliseconds does not hide in the axis."""
+"""Fraction of the time axis before the step, so that the rise within the first milliseconds stays visible."""
 _SHOWN_AFTER_STOP = 0.8
-"""Fraction of the time until the stop that is shown beyond it; what follows is rest."""
+"""Fraction of the time until the stop that is shown after the stop; the vane then rests."""
 _ENLARGED = 40.0
-"""First milliseconds after the step that are shown enlarged."""
+"""First milliseconds after the step, shown enlarged."""
 _BIN = 3.0
-"""Milliseconds over which the band of a measurement reaches from its least to its largest reading."""
+"""Interval [ms] over which the band of a measurement reaches from the smallest to the largest reading."""
 _CURVES = (
     ("Vane angle", "Angle", "deg", ACTUAL.colour, (0.66, 0.26, 0.31, 0.34)),
     ("Pressure difference, $P_1 - P_2$", "Difference", "psi", ACTUAL.colour, (0.69, 0.14, 0.29, 0.34)),
     ("Chamber 1 (plantarflexion), $P_1$", "Pressure", "psig", CHAMBER_1.colour, (0.22, 0.12, 0.3, 0.34)),
     ("Chamber 2 (dorsiflexion), $P_2$", "Pressure", "psig", CHAMBER_2.colour, (0.69, 0.3, 0.29, 0.4)),
 )
-"""Panels of figure 7: name, quantity, unit, colour, and the room for the first milliseconds (x, y, width, height)."""
+"""Panels of figure 7: name, quantity, unit, colour, and frame of the enlarged part (x, y, width, height)."""
 _EVENT: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (4, 3)), "alpha": 0.7, "zorder": 0.5}
 _LEVEL: dict[str, Any] = {"linewidth": 0.9, "linestyle": (0, (1, 2)), "zorder": 0.9}
 _WORDS: dict[str, Any] = {"fontsize": 8.5, "va": "center"}
@@ -56,10 +56,10 @@ _SMALL_WORDS: dict[str, Any] = {"fontsize": 7.5, "va": "center"}
 def step_response_figure(
     recording: Recording, levels: SupplyLevels, events: StepEvents | None, synthetic: Recording | None = None
 ) -> "Figure":
-    """Return figure 7: angle, pressure difference, and both pressures over time; ``events`` are marked where known.
+    """Return figure 7: angle, pressure difference and both pressures over time, with ``events`` marked if known.
 
-    ``synthetic`` is a measurement on the simulated bench: a thin line and the band of its readings; below each panel
-    stands what it differs from the model.
+    ``synthetic`` is a recording of the simulated bench, drawn as a thin line with a band from the smallest to the
+    largest readings; below each panel, the difference from the model is stated.
     """
     end, marked, named = _MILLISECONDS * float(recording.time[-1]), [], []
     if events is not None:
@@ -101,14 +101,14 @@ def step_response_figure(
 
 
 def _curves(recording: Recording, levels: SupplyLevels) -> tuple[Floats, ...]:
-    """Return what the panels show, in their order and units."""
+    """Return the curves of the panels, in their order and units."""
     first, second = recording["pressure_1"], recording["pressure_2"]
     gauge = ((pressure - levels.atmosphere) / PASCALS_PER_PSI for pressure in (first, second))
     return (np.degrees(recording["angle"]), (first - second) / PASCALS_PER_PSI, *gauge)
 
 
 def _measurement(times: Floats, values: Floats) -> list[Mark]:
-    """Return a measurement over times [ms] as a line, with the band of its readings."""
+    """Return marks for a measurement over time [ms]: a line, and a band from smallest to largest readings."""
     first = np.flatnonzero(np.diff(np.floor(times / _BIN), prepend=-np.inf) > 0.0)
     ends = np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
     thin = {"linestyle": "-", "linewidth": 0.8, "zorder": 2}
@@ -119,7 +119,7 @@ def _measurement(times: Floats, values: Floats) -> list[Mark]:
 
 
 def _enlarge(frame: tuple[float, float, float, float], ends: tuple[float, float], axes: "Axes") -> None:
-    """Show a panel between two times [ms], and its first milliseconds enlarged inside it."""
+    """Limit a panel to two times [ms], and show the first milliseconds enlarged in an inset."""
     axes.margins(y=0.06)
     axes.set_xlim(*ends)
     inset = axes.inset_axes(frame)
@@ -148,11 +148,11 @@ def torque_task_figure(
     gas_in_paper: tuple[float, float],
     synthetic: tuple[Recording, Recording] | None = None,
 ) -> "Figure":
-    """Return figure 8: torque and reference with each valve, what the valve does below, error and gas at the bottom.
+    """Return figure 8: torque and reference with each valve, valve commands below, error and gas at the bottom.
 
-    ``ceiling`` is the torque that the supply can hold [N m], ``gas_in_paper`` what the paper states for the solenoid
-    valves and for the proportional valve [g]. ``synthetic`` is the same task on the simulated bench, with the one and
-    with the other.
+    ``ceiling`` is the largest torque for the supply pressure [N m], ``gas_in_paper`` the gas that the paper states for
+    the solenoid valves and for the proportional valve [g]. ``synthetic`` are recordings of the same task on the
+    simulated bench with both valves.
     """
     runs = ((solenoid, SOLENOID, "solenoid"), (proportional, PROPORTIONAL, "proportional"))
     torques, gas, at_end = [], [], []
@@ -202,7 +202,7 @@ def torque_task_figure(
 
 
 def _torque_marks(recording: Recording, look: DrawingStyle, ceiling: float, synthetic: Recording | None) -> list[Mark]:
-    """Return reference, torque and what the supply can hold, over the broad torque of a synthetic experiment."""
+    """Return marks of reference, torque and largest torque, over the broad line of a synthetic experiment."""
     time, dashed = recording.time, {"linestyle": REFERENCE.line, "linewidth": 1.3}
     held = f"maximum that the supply can hold: {ceiling:.1f} N m"
     marks = [
@@ -219,7 +219,7 @@ def _torque_marks(recording: Recording, look: DrawingStyle, ceiling: float, synt
 
 
 def _filling_marks(recording: Recording) -> list[Mark]:
-    """Return when each of the two valves is on, as bars in the colour of the chamber that it fills."""
+    """Return bars for the times at which each of the two valves is on, in the colour of its chamber."""
     marks = []
     for row, valve, look in ((1, 1.0, CHAMBER_1), (0, -1.0, CHAMBER_2)):
         is_on = np.sign(recording["command"]) == valve
@@ -231,7 +231,7 @@ def _filling_marks(recording: Recording) -> list[Mark]:
 
 
 def _end_marks(height: float, run: Recording, look: DrawingStyle) -> list[Mark]:
-    """Return where the supplied gas is at the end: in the chambers, or vented; below it what leaked past the vane."""
+    """Return bars of the supplied gas at the end: in the chambers, vented, and below it leaked past the vane."""
     supplied, vented, leaked = (float(run[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass"))
     bars = (
         (0.0, supplied - vented, height, 0.25, look.colour, 1.0),

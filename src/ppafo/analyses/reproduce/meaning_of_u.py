@@ -10,13 +10,17 @@ from ppafo.simulation.simulate import Result, simulate
 READINGS_OF_U = (("the opening, -1 to 1", 1.0), ("volts, 5 open the valve", 5.0), ("volts, 10 open the valve", 10.0))
 """Interpretations of U of equation (13), each with the U that opens the proportional valve fully."""
 WITHIN_REACH = 4.0
-"""A level [N m] that the supply can hold."""
+"""Reference level [N m] within the reach of the supply."""
 _GAINS = ("proportional_gain", "integral_gain", "derivative_gain")
 
 
 @dataclass(frozen=True, slots=True)
 class InterpretationOfU:
-    """Interpretation of U: reduction of RMS error and gas by the proportional valve [%], and the smallest error."""
+    """Interpretation of U, with the advantage of the proportional valve over the solenoid pair.
+
+    ``error``, ``gas``: reduction of RMS error and of gas [%]
+    ``error_within_reach``: reduction of RMS error [%] with a reference level within the reach of the supply
+    """
 
     name: str
     error: float
@@ -25,7 +29,10 @@ class InterpretationOfU:
 
 
 def readings_of_u(solenoid: Result, proportional: Result) -> tuple[InterpretationOfU, ...]:
-    """Return what each meaning of U makes of the comparison; none where another law or reference runs."""
+    """Return the comparison of the valves for each interpretation of U.
+
+    The result is empty if another control law or reference is used.
+    """
     pair, spool = solenoid.scenario, proportional.scenario
     if spool.controller.kind != "pid" or {pair.reference.kind, spool.reference.kind} != {"ramp_hold"}:
         return ()
@@ -48,5 +55,5 @@ def readings_of_u(solenoid: Result, proportional: Result) -> tuple[Interpretatio
 
 
 def _less(metrics: Mapping[str, Metric], against: Mapping[str, Metric], name: str) -> float:
-    """Return by how much a metric is less than another run's [%]."""
+    """Return the reduction of a metric relative to another run [%]."""
     return 100.0 * (1.0 - metrics[name].value / against[name].value)

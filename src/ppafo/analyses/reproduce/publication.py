@@ -1,4 +1,4 @@
-"""A publication as a file of claims: what it states, where, what is assumed, and how our number is computed."""
+"""Publication as a file of claims: statements, sources, assumptions, and computation of our values."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -27,17 +27,17 @@ from ppafo.wording import nearest_name
 
 DEVICE = "ppafo2011"
 MINUTES = 0.5
-"""A walk without noise repeats itself stride by stride, so that longer ones say the same."""
+"""Minutes of a walk; without noise the strides repeat, so that longer walks give the same result."""
 PAIR, RECYCLING = "solenoid", "solenoid-recycling"
-"""The walks that direct event control and recycling stand for."""
+"""Names of the walks with direct event control and with recycling."""
 KEEPS_GAIT = "wearer.keeps_gait=1"
-"""A nondisabled wearer: muscles keep the measured ankle."""
+"""Override for a nondisabled wearer, whose muscles keep the measured ankle angle."""
 Values = Mapping[str, str | float]
 
 
 @dataclass(frozen=True, slots=True)
 class Computation:
-    """Computation of a number: its SI unit, its arguments with their SI units, and the function."""
+    """Computation of a value: SI unit, arguments with their SI units, and function."""
 
     unit: str
     arguments: Mapping[str, str]
@@ -47,7 +47,10 @@ class Computation:
 # Several claims rest on one walk, which takes seconds.
 @lru_cache(maxsize=16)
 def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
-    """Return a shipped walk; SimulationError where it does not reach its end with help."""
+    """Return a shipped walk.
+
+    Raises SimulationError if the walk does not reach its end with help in most strides.
+    """
     result = walk(load_walk(name, overrides), minutes=MINUTES)
     if not (result.status.is_completed and result.is_helped):
         raise SimulationError(f"{name}: {result.status.message}; the claims need a walk with help in most strides")
@@ -60,41 +63,44 @@ def _nondisabled(name: str, values: Values) -> WalkResult:
 
 
 def held_torque(values: Values) -> float:
-    """Torque [N m] that a gauge pressure holds at rest: torque constant times pressure. Equation (2)."""
+    """Static torque [N m] at a supply pressure: torque constant times gauge pressure. Equation (2)."""
     constant = load_device(DEVICE).actuator.torque_constant
     return constant * (float(values["pressure"]) - STANDARD_ATMOSPHERE)
 
 
 def share_of_healthy_moment(values: Values) -> float:
-    """Torque that a pressure holds over the largest ankle moment of the built-in gait [-]."""
+    """Static torque at a pressure divided by the largest ankle moment of the built-in gait [-]."""
     configuration = load_walk(PAIR)
     moment = walk_of(configuration).gait.curve("ankle_moment").values_at(np.linspace(0.0, 1.0, 1001))
     return held_torque(values) / (walk_of(configuration).wearer.body_mass * float(moment.max()))
 
 
 def walking_torque(values: Values) -> float:
-    """Largest torque [N m] of the mean stride of the walk 'solenoid' at a supply pressure."""
+    """Peak torque [N m] of the mean stride of the walk 'solenoid' at a supply pressure."""
     # As repr, so that the walk has this very number. Nothing is published of a limit of the torque.
     overrides = (f"supply.pressure={float(values['pressure'])!r} SI", "controller.largest_torque=100 N m")
     return float(_walked(PAIR, overrides).averages["torque"].mean.max())
 
 
 def dorsiflexor_share(values: Values) -> float:
-    """Moment of a nondisabled wearer's dorsiflexors with the device over that without any [-], means of a stride."""
+    """Dorsiflexor moment of a nondisabled wearer with the device divided by the moment without [-], stride means."""
     worn = _nondisabled(PAIR, values)
     return worn.metrics["dorsiflexor_moment"].value / healthy_metrics(worn.scenario)["dorsiflexor_moment"].value
 
 
 def recycling_saving(values: Values) -> float:
-    """Share [-] of the gas of a stride that the valve between the chambers saves against event-based control."""
+    """Fraction of the gas of a stride that the valve between the chambers saves [-].
+
+    The reference is event-based control without this valve.
+    """
     plain, recycling = (_nondisabled(name, values).metrics["gas"].value for name in (PAIR, RECYCLING))
     return 1.0 - recycling / plain
 
 
 def recycling_work(values: Values) -> float:
-    """Net work of the actuator on the ankle in a stride with the valve between the chambers, over event-based [-].
+    """Net work of the actuator on the ankle in a stride, with the valve between the chambers divided by without [-].
 
-    Work is a mean over the strides with help.
+    The work is a mean over the strides with help; without the valve, control is event-based.
     """
     walks = (_nondisabled(name, values) for name in (PAIR, RECYCLING))
     plain, recycling = (integral_of_a_stride(result, result.recording["torque"]) for result in walks)
@@ -102,7 +108,7 @@ def recycling_work(values: Values) -> float:
 
 
 def event_reduction(wearer: str, _values: Values) -> float:
-    """Share [-] by which state estimation lowers the error of event times of one wearer, against thresholds."""
+    """Relative reduction of the event time error by state estimation instead of thresholds, for one wearer [-]."""
     configuration = load_walk(PAIR, WEARERS[wearer])
     # Two steps a stride.
     sequence = uneven_task_sequence(2.0 / walk_of(configuration).gait.stride_time)
@@ -128,7 +134,7 @@ COMPUTATIONS: dict[str, Computation] = {
 
 @dataclass(frozen=True, slots=True)
 class PublishedClaim:
-    """A claim whose computation is known to exist; ``arguments`` in SI."""
+    """Claim with a known computation; ``arguments`` in SI."""
 
     entry: ClaimEntry
     computation: Computation | None
@@ -138,7 +144,7 @@ class PublishedClaim:
 
 @dataclass(frozen=True, slots=True)
 class Publication:
-    """A publication with its claims in the order of the file."""
+    """Publication with its claims in the order of the file."""
 
     name: str
     title: str
@@ -147,7 +153,10 @@ class Publication:
 
 
 def load_publication(name_or_path: str | Path) -> Publication:
-    """Return a publication of the package by its name, or any other by its file; ScenarioError where it is wrong."""
+    """Return a publication by its name in the package or by its file.
+
+    Raises ScenarioError for an invalid file.
+    """
     read, file = read_publication(name_or_path)
     claims = tuple(_checked(entry, read.citation, file) for entry in read.claims)
     return Publication(read.name, read.title, read.citation, claims)
@@ -185,7 +194,7 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
 
 
 def _arguments(entry: ClaimEntry, computation: Computation, where: str) -> dict[str, str | float]:
-    """Return the arguments of a claim in SI: those that its computation takes, all of them and no other."""
+    """Return the arguments of a claim in SI, checked against the arguments of its computation."""
     wanted = ", ".join(computation.arguments)
     for name in entry.arguments:
         if name not in computation.arguments:
@@ -205,12 +214,12 @@ def _arguments(entry: ClaimEntry, computation: Computation, where: str) -> dict[
 
 
 SEED, ALL = PAPER, "all"
-"""The study of the paper that this package is made from, and all studies one after the other."""
+"""Name of the study of the paper behind this package, and name for all studies in turn."""
 
 
 @dataclass(frozen=True, slots=True)
 class JudgedClaim:
-    """A claim of a publication with our number in its unit, None where nothing is computed, and the verdict."""
+    """Claim of a publication with the verdict and our value in its unit; None if nothing is computed."""
 
     claim: PublishedClaim
     value: float | None
@@ -218,19 +227,19 @@ class JudgedClaim:
 
     @property
     def published(self) -> str:
-        """Published value as text with its direction; empty for a computation of our own."""
+        """Published value as displayed text with its direction; empty for a computation of our own."""
         entry = self.claim.entry
         number = "" if entry.published is None else format_reported_quantity(entry.published, entry.unit or "-")
         return f"up to {number}" if number and entry.direction == "maximum" else entry.words or number
 
     @property
     def ours(self) -> str:
-        """Our number as it is shown."""
+        """Our value as displayed text."""
         return quantity(self.value, self.claim.entry.unit or "-", 3)
 
     @property
     def note(self) -> str:
-        """Why the verdict is what it is."""
+        """Reason of the verdict."""
         return self.claim.entry.note or self.claim.entry.not_testable
 
     def document(self, study: str) -> dict[str, Any]:
@@ -258,18 +267,18 @@ class JudgedClaim:
 
 
 def study_names() -> tuple[str, ...]:
-    """Return every name that ``--study`` takes."""
+    """Return the valid arguments of ``--study``."""
     return (SEED, *(name for name in FILE.names() if name != SEED), ALL)
 
 
 def list_studies() -> list[dict[str, Any]]:
-    """Return name and subject of every study."""
+    """Return name and title of every study."""
     words = {name: read_publication(name)[0].title for name in FILE.names()} | {ALL: "every study, one table"}
     return [{"name": name, "title": words[name]} for name in study_names()]
 
 
 def check_study(study: str, overrides: Sequence[str]) -> None:
-    """Refuse a study that does not exist, and changed values with any but the paper's own; ScenarioError."""
+    """Raise ScenarioError for an unknown study, and for overrides with any study but the paper's."""
     if study not in study_names() and Path(study).suffix != ".toml":
         known = ", ".join(study_names())
         hint = nearest_name(study, study_names())
@@ -279,7 +288,10 @@ def check_study(study: str, overrides: Sequence[str]) -> None:
 
 
 def run_studies(study: str, report: Report) -> tuple[tuple[Publication, tuple[JudgedClaim, ...]], ...]:
-    """Return one study, or all but the paper's, each with its claims judged; ScenarioError, SimulationError."""
+    """Return the judged claims of one study, or of all studies but the paper's.
+
+    Raises ScenarioError for an invalid study, SimulationError if a walk fails.
+    """
     studies = []
     for name in study_names()[1:-1] if study == ALL else (study,):
         publication, claims = load_publication(name), []
@@ -291,7 +303,7 @@ def run_studies(study: str, report: Report) -> tuple[tuple[Publication, tuple[Ju
 
 
 def judge(claim: PublishedClaim) -> JudgedClaim:
-    """Return a claim with our number and the verdict; SimulationError where a walk fails."""
+    """Return a claim with our value and the verdict; SimulationError if a walk fails."""
     entry, computation = claim.entry, claim.computation
     if computation is None:
         return JudgedClaim(claim, None, "not_testable")

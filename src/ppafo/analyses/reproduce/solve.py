@@ -1,4 +1,4 @@
-"""Runs the paper's experiments and judges what the paper claims of them."""
+"""Runs of the paper's experiments and verdicts on its claims."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -41,13 +41,13 @@ from ppafo.wording import count_of
 # The torque task: what the paper claims of tracking error and gas, and what its text tells of both valves.
 
 FEWEST_REVERSALS = paper_entries()["solenoid_oscillates_on_ramp"].at_least or 0.0
-"""Reversals of the torque on the ramp from which on the text's oscillation shows."""
+"""Smallest number of torque reversals on the ramp that counts as the oscillation of the text."""
 
 
 def torque_task_claims(runs: PhasedRuns, proportional: Result, rests_on: tuple[str, ...]) -> list[Claim]:
-    """Return the claims on tracking error and gas over all phases of the pair's decisions; gas is from the supply.
+    """Return the claims on tracking error and supplied gas, over all phases of the solenoid pair's decisions.
 
-    ``rests_on`` are the assumptions of the task beside the paper.
+    ``rests_on`` are the assumptions of the task beyond the paper.
     """
     error = proportional.metrics["rms_error"].value
     gas = GRAMS_PER_KILOGRAM * proportional.metrics["gas_supplied"].value
@@ -66,7 +66,7 @@ def torque_task_claims(runs: PhasedRuns, proportional: Result, rests_on: tuple[s
 
 
 def _claim_over_phases(identifier: str, values: Floats, decimals: int, note: str, rests_on: tuple[str, ...]) -> Claim:
-    """Return a claim on the median of values (runs,), in its unit, which has to meet the window of the task."""
+    """Return a claim on the median of values (runs,), in its unit, with the window of the task as criterion."""
     entry = paper_entries()[identifier]
     assert entry.at_least is not None, f"{identifier} has a window"
     assert entry.at_most is not None, f"{identifier} has a window"
@@ -83,7 +83,7 @@ def _claim_over_phases(identifier: str, values: Floats, decimals: int, note: str
 
 
 def torque_task_observations(solenoid: Result, proportional: Result) -> list[Observation]:
-    """Return what the text tells of the torque task, each with our numbers."""
+    """Return the paper's statements on the torque task, each with our numbers."""
     pair_on_ramp, pair_on_hold = _reversals(solenoid, "ramp"), _reversals(solenoid, "hold")
     spool_on_ramp, spool_on_hold = _reversals(proportional, "ramp"), _reversals(proportional, "hold")
     return [
@@ -103,7 +103,7 @@ def torque_task_observations(solenoid: Result, proportional: Result) -> list[Obs
 
 
 def _reversals(result: Result, part: str) -> int | None:
-    """Return how often the torque turns on the ramp or the hold; None where the reference has no such part."""
+    """Return the number of torque reversals on the ramp or the hold; None if the reference has no such part."""
     metric = result.metrics.get(f"oscillations_{part}")
     return None if metric is None else round(metric.value)
 
@@ -115,7 +115,10 @@ def _reversals_text(reversals: int | None, part: str) -> str:
 
 
 def _tracks_better_on_ramp(solenoid: Result, proportional: Result) -> Observation:
-    """Return whether the proportional valve lowers the RMS error on the ramp, and by more than on the hold."""
+    """Return the observation on the tracking advantage of the proportional valve on the ramp.
+
+    The statement holds if its RMS error on the ramp is lower, by more than on the hold.
+    """
     (pair_ramp, pair_hold), (spool_ramp, spool_hold) = (
         (run.metrics.get("rms_error_ramp"), run.metrics.get("rms_error_hold")) for run in (solenoid, proportional)
     )
@@ -143,7 +146,7 @@ TUNED = (
     "controller.derivative_filter=3.1 ms",
     "controller.anti_windup=4.8 1/s",
 )
-"""Gains of a PID that were searched for the least error and gas, on an ideal and on a slow, late and noisy valve."""
+"""PID gains found by a search for the least error and gas, on an ideal valve and on a slow, late and noisy one."""
 DEAD_ZONE = (
     "controller.kind=on_off_dead_zone",
     "controller.rate=20 Hz",
@@ -151,16 +154,16 @@ DEAD_ZONE = (
     "controller.release=0.05 N m",
     "controller.opening=1",
 )
-"""An on-off law with a dead zone narrower than what the solenoid pair can hold within one sample."""
+"""On-off law with a dead zone narrower than the torque resolution of the solenoid pair within one sample."""
 FASTER = ("controller.rate=100 Hz", "valve.switching_interval=10 ms")
-"""Five times the switching rate: the set has the printed 20 Hz of the component as its shortest time between two."""
+"""Five times the switching rate; in the set, the printed 20 Hz of the component limits the switching interval."""
 _RESTS_ON = ("the torque task as completed here",)
 
 
 def control_claims(solenoid: Result, proportional: Result, runs: PhasedRuns) -> list[Claim]:
-    """Return the claims on switching rate, gains, dead zone and improved control, none of which is decided here.
+    """Return the claims on switching rate, gains, dead zone and improved control, all of them undetermined here.
 
-    ``runs`` are the solenoid pair's over the unknown phase of its decisions.
+    ``runs`` are the solenoid pair's runs over the unknown phase of its decisions.
     """
     beyond = paper_entries()["beyond_improved_control"]
     return [
@@ -172,7 +175,7 @@ def control_claims(solenoid: Result, proportional: Result, runs: PhasedRuns) -> 
 
 
 def _error_with(run: Result, overrides: tuple[str, ...]) -> float | str:
-    """Return the RMS torque error [N m] of a run's task under other settings, or why there is none."""
+    """Return the RMS torque error [N m] of a run's task with overrides, or the error message if the run fails."""
     # Another law takes nothing that was set for this one.
     kept = [override for override in run.scenario.origin.overrides if not override.startswith("controller.")]
     try:
@@ -182,7 +185,7 @@ def _error_with(run: Result, overrides: tuple[str, ...]) -> float | str:
 
 
 def _limited_by_switching(solenoid: Result, runs: PhasedRuns) -> Claim:
-    """Return by how much less error the same rule makes with valves that switch five times as often."""
+    """Return the claim on the error reduction of the same control law at five times the switching rate."""
     entry, faster = paper_entries()["limited_by_switching"], _error_with(solenoid, FASTER)
     if isinstance(faster, str):
         return stated_claim(entry.id, None, "undetermined", f"{entry.note} {faster}.")
@@ -194,7 +197,7 @@ def _limited_by_switching(solenoid: Result, runs: PhasedRuns) -> Claim:
 
 
 def _undetermined(identifier: str, run: Result, overrides: tuple[str, ...]) -> Claim:
-    """Return a claim that settings which are not reported decide, with the error of a run's task under other ones."""
+    """Return a claim that depends on unreported settings, with the error of the task under other settings."""
     entry, error, other = paper_entries()[identifier], run.metrics["rms_error"].value, _error_with(run, overrides)
     if isinstance(other, str):
         return stated_claim(identifier, None, "undetermined", f"{entry.note} {other}.")
@@ -205,7 +208,7 @@ def _undetermined(identifier: str, run: Result, overrides: tuple[str, ...]) -> C
 
 
 EXPERIMENTS = (STEP, SOLENOID, PROPORTIONAL)
-"""Shipped scenarios that stand for the paper's experiments."""
+"""Shipped scenarios of the paper's experiments."""
 ORDER = (
     "orifice_constants",
     "step_percentages",
@@ -224,14 +227,15 @@ ORDER = (
     "beyond_improved_control",
     "not_published",
 )
-"""Every claim: what the reported numbers decide, what is simulated, what is left."""
+"""All claims in order: decided by reported numbers, simulated, and remaining."""
 
 
 def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothing) -> Reproduction:
-    """Return what came of the paper's own experiments.
+    """Return the reproduction of the paper's own experiments.
 
-    ``overrides`` are texts such as ``supply.pressure=60 psi_g``, each for the experiments that have its value;
-    ``report`` hears what is being done. ScenarioError for a value that none has, SimulationError for a run that fails.
+    ``overrides`` are texts such as ``supply.pressure=60 psi_g``, each for the experiments that have this path;
+    ``report`` receives the progress. Raises ScenarioError for a path that no experiment has, SimulationError if a run
+    fails.
     """
     scenarios, runs = _scenarios(overrides), []
     for name, scenario in scenarios.items():
@@ -292,12 +296,12 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
 
 
 def _used_by(assumed: Iterable[AssumedValue], *experiments: str) -> tuple[str, ...]:
-    """Return what any of some experiments rests on beside the paper, a sentence each."""
+    """Return the assumptions of some experiments beyond the paper, a sentence for each."""
     return tuple(value.sentence() for value in assumed if not set(experiments).isdisjoint(value.used_by))
 
 
 def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
-    """Return the experiments, each with the overrides that are meant for it."""
+    """Return the experiments, each with the applicable overrides."""
     meant: dict[str, list[Override]] = {name: [] for name in EXPERIMENTS}
     given = override_set(read_overrides(overrides, ScenarioError), ScenarioError)
     # Kinds come first, outer ones before inner ones: they decide which numbers there are.

@@ -1,7 +1,8 @@
 """Statements of the paper's text on the step response, tested on a simulated or measured recording.
 
 The text (section 'PPAFO Model Validation', figure 7): pressure 1 rises until the vane breaks away, falls while the vane
-moves, then goes to the supply; pressure 2 falls, slows while chamber 2 is compressed, then goes to the atmosphere.
+moves, then approaches the supply pressure; pressure 2 falls, more slowly while chamber 2 is compressed, then approaches
+the atmosphere.
 """
 
 from collections.abc import Callable
@@ -15,25 +16,25 @@ from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
 RESOLUTION = 1.0e-6
-"""Smallest part of the travel that counts as motion in a simulated recording; a measured one needs more."""
+"""Smallest fraction of the travel that counts as motion in a simulated recording; a measured one needs more."""
 _SMALLEST_TRAVEL = 1.0e-3
 _FIRST_ANGLE, _LAST_ANGLE, _SAME_ANGLE = 20.0, 130.0, 0.5
 """First and last angle of figure 7, and the tolerance for the same angle [deg]."""
 _CLEAR = 0.05
 _SAME = 0.01
 _NOTABLE_TIME = 2.0e-3
-"""Fractions of the pressure range: a change has to be clear, a level reached or kept may be off by the second."""
+"""Fractions of the pressure range: smallest clear change, and tolerance for a level that is reached or kept."""
 _SLOWED = 0.5
-"""The fall has slowed where its rate is at most this fraction of the steepest before and after."""
+"""Ratio of a slow rate of fall to the steepest rates before and after, up to which the fall has slowed."""
 _LARGEST_RISE = 1.0 * PASCALS_PER_PSI
-"""A fall that slows may turn into a rise of this much [Pa]; the text tells of none."""
+"""Largest rise [Pa] that still counts as a slowed fall; the text mentions no rise."""
 _SETS_OFF = 0.02
-"""Pressure 1 peaks before the vane has gone this fraction of its travel: it still fills while the vane sets off."""
+"""Fraction of the travel within which pressure 1 peaks, since the chamber still fills while the vane starts."""
 
 
 @dataclass(frozen=True, slots=True)
 class StepEvents:
-    """When the vane breaks away and when it comes to rest [s], as numbers of samples too."""
+    """Breakaway and stop of the vane, as sample numbers and as times [s]."""
 
     breakaway: int
     stop: int
@@ -43,26 +44,26 @@ class StepEvents:
 
 @dataclass(frozen=True, slots=True)
 class SupplyLevels:
-    """Supply and atmosphere [Pa absolute], between which a step response runs."""
+    """Supply and atmospheric pressure [Pa absolute], the limits of a step response."""
 
     supply: float
     atmosphere: float
 
     @property
     def range(self) -> float:
-        """Pressure range [Pa]."""
+        """Pressure range between supply and atmosphere [Pa]."""
         return self.supply - self.atmosphere
 
     def gauge(self, pressure: float) -> float:
-        """Gauge pressure [psi]."""
+        """Return the gauge pressure [psi] of an absolute pressure [Pa]."""
         return (pressure - self.atmosphere) / PASCALS_PER_PSI
 
 
 def step_events(recording: Recording, resolution: float = RESOLUTION) -> StepEvents | None:
-    """Return breakaway and stop of a vane that goes from one rest to another; None where it does not.
+    """Return breakaway and stop of a vane that moves from rest to rest; None for any other motion.
 
-    Breakaway is the last sample at which the angle is where it started, stop the first from which on it is where it
-    ends, both within ``resolution`` times the travel.
+    Breakaway is the last sample at the initial angle, stop the first sample after which the angle stays at its final
+    value, both within ``resolution`` times the travel.
     """
     angle = recording["angle"]
     travel = abs(float(angle[-1] - angle[0]))
@@ -79,7 +80,10 @@ def step_events(recording: Recording, resolution: float = RESOLUTION) -> StepEve
 
 
 def step_observations(recording: Recording, levels: SupplyLevels, events: StepEvents | None) -> list[Observation]:
-    """Return each sentence of the text with whether the recording shows it; none holds where the vane does not move."""
+    """Return the verdict of the recording on each statement of the text.
+
+    No statement holds if the vane does not move.
+    """
     if events is None:
         return [observation(identifier, False, "the vane does not move from rest to rest") for identifier in _SAID]
     step = _Step(recording, levels, events)
@@ -88,7 +92,7 @@ def step_observations(recording: Recording, levels: SupplyLevels, events: StepEv
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """The values with which the sentences are compared."""
+    """Recording, supply levels and events with which the statements are compared."""
 
     recording: Recording
     levels: SupplyLevels
@@ -143,7 +147,10 @@ def _rises(step: _Step) -> tuple[bool, str, str]:
 
 
 def _falls_in_motion(step: _Step) -> tuple[bool, str, str]:
-    """Pressure 1 falls from its peak, while the vane sets off, to its lowest; the text has it fall to the stop."""
+    """Test the fall of pressure 1 during motion, from the peak near breakaway to the minimum.
+
+    In the text the pressure falls until the stop.
+    """
     pressure, angle = step.recording["pressure_1"], step.recording["angle"]
     # Chamber 1 still fills while the vane sets off, so that the peak lies behind breakaway.
     gone = np.abs(angle - angle[0]) > _SETS_OFF * np.abs(angle[-1] - angle[0])
@@ -178,9 +185,9 @@ def _falls(step: _Step) -> tuple[bool, str]:
 
 
 def _slows(step: _Step) -> tuple[bool, str, str]:
-    """The slowest fall in motion lies between two steeper ones; gas that only vents would fall ever more slowly.
+    """Test the slower fall of pressure 2 during motion, between two phases of faster fall.
 
-    Gas that is compressed far above what it was does not slow its fall: it rises.
+    Gas that only vents would fall at an ever slower rate; gas that is strongly compressed would rise.
     """
     pressure, (start, end) = step.recording["pressure_2"], (step.events.breakaway, step.events.stop)
     rate = -np.diff(pressure) / np.diff(step.recording.time)

@@ -1,1 +1,1 @@
-"""Sensitivity of a metric to uncertain values: Sobol indices, Shapley effects and signed changes."""
+"""Sensitivity of metrics to uncertain values: Sobol indices, Shapley effects and signed changes."""

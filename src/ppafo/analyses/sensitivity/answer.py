@@ -1,4 +1,4 @@
-"""The sensitivity of metrics in words, a table for each metric, and two panels: the indices, and how they settle."""
+"""Report of a sensitivity analysis: a table for each metric, and panels of the indices and their convergence."""
 
 import math
 from functools import partial
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _NEGLIGIBLE = 0.01
-"""Fraction of the largest index up to which a value does not matter."""
+"""Fraction of the largest index below which a value counts as negligible."""
 _INCHES_OF_A_BAR = 0.27
 """Height of the bars of one value."""
 _MAXIMUM_LINES = 5
-"""Values whose indices are drawn over the size of the sample."""
+"""Number of values whose indices are plotted over the sample size."""
 _TITLES = {"total": "total", "first": "first order", "shapley": "Shapley effect"}
 _CAPTION = (
     "Left: the indices with their bands, {filled} filled{open}. Right: the largest of them, in the colours and markers "
@@ -32,7 +32,7 @@ _CAPTION = (
 
 
 def finding_of(influences: Influences) -> Finding[Influences]:
-    """Return the indices in words, a table and two panels for each metric."""
+    """Return the sensitivity indices as a finding, with a table and two panels for each metric."""
     settings, method = influences.settings, METHODS[influences.method]
     said = [
         f"{influences.study}: {influences.method}, {settings.samples:,} {method.sizes_label}, {influences.runs:,} runs "
@@ -64,12 +64,12 @@ def finding_of(influences: Influences) -> Finding[Influences]:
 
 
 def _panels(influences: Influences) -> list[Panel]:
-    """Return two panels for each metric: its indices, and how they settle."""
+    """Return two panels for each metric: sensitivity indices, and their convergence."""
     return [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)]
 
 
 def _part(influences: Influences, metric: OfMetric) -> Section:
-    """Return a row for each uncertain value, the most important one first, and what these numbers leave open."""
+    """Return a table with a row for each uncertain value, the most influential first, with remarks."""
     kind, indices = of_metric(metric.metric, "+.3g"), metric.indices
     order = np.argsort(-indices.values[METHODS[influences.method].shown[0]])
     columns = [Column("value", [influences.paths[row] for row in order])]
@@ -88,9 +88,9 @@ def _part(influences: Influences, metric: OfMetric) -> Section:
 
 
 def overlapping_pairs(influences: Influences, metric: OfMetric) -> list[tuple[str, str]]:
-    """Return neighbours in the order of the first index whose bands overlap: which of the two matters more is open.
+    """Return pairs of neighbours in the ranking whose confidence bands overlap, so that their order is open.
 
-    Nothing is said of two that both are surely below a hundredth of the largest: neither matters.
+    Values surely below a hundredth of the largest index are left out as negligible.
     """
     name, indices = METHODS[influences.method].shown[0], metric.indices
     # In the order of the table, in which only neighbours can be mistaken for each other.
@@ -105,7 +105,10 @@ def overlapping_pairs(influences: Influences, metric: OfMetric) -> list[tuple[st
 
 
 def remarks(influences: Influences, metric: OfMetric) -> list[str]:
-    """Return what these numbers leave open; a rest within the error of the sum may be no interaction."""
+    """Return remarks on overlapping bands and on the sum of first-order indices.
+
+    A difference of the sum from 1 within its error is not attributed to interactions.
+    """
     said = []
     unsettled = overlapping_pairs(influences, metric)
     if unsettled:
@@ -122,12 +125,15 @@ def remarks(influences: Influences, metric: OfMetric) -> list[str]:
 
 
 def _colour_of(rank: int) -> str:
-    """Return the colour of a value by its rank, grey of those whose indices are not drawn over the sample."""
+    """Return the colour of a value by its rank; grey for values beyond the lines of the convergence panel."""
     return COLOURS[rank] if rank < _MAXIMUM_LINES else GREY
 
 
 def _bars(influences: Influences, metric: OfMetric) -> Panel:
-    """Return the indices with their bands, a row and a colour a value, markers of the second index open."""
+    """Return a panel of the indices with their bands, a row and a colour for each value.
+
+    The second index has open markers.
+    """
     shown, indices = METHODS[influences.method].shown, metric.indices
     labels = [label_of(path) for path in influences.paths]
     order = np.argsort(-indices.values[shown[0]])
@@ -151,7 +157,7 @@ def _bars(influences: Influences, metric: OfMetric) -> Panel:
 
 
 def _course(influences: Influences, metric: OfMetric) -> Panel:
-    """Return the largest indices from growing parts of the sample."""
+    """Return a panel of the largest indices for growing parts of the sample."""
     method = METHODS[influences.method]
     name, sizes = method.shown[0], [step.blocks for step in metric.settling]
     order = np.argsort(-metric.indices.values[name])[:_MAXIMUM_LINES]

@@ -1,7 +1,7 @@
-"""The methods by which influence is measured: Sobol and Shapley, each with design and indices; the signed change.
+"""Methods of sensitivity analysis: Sobol and Shapley, each with design and indices; signed changes.
 
-A design is made of blocks that belong together: one base point of Sobol with its exchanged copies, one order of the
-values for Shapley. A block is the least that can be left out.
+A design consists of blocks: a base point of Sobol with its exchanged copies, or an order of the values for Shapley. A
+block is the smallest unit that can be left out.
 """
 
 import math
@@ -16,20 +16,20 @@ from ppafo.studies.distributions import Floats, jackknife_reach
 from ppafo.studies.draws import Uncertainty, replicate_seed
 
 SCRAMBLES = 8
-"""Independent scrambles of the Sobol sequence, to which the base points are dealt out in turn."""
+"""Number of independent scrambles of the Sobol sequence, to which base points are assigned in turn."""
 _INNER = 3
-"""Draws of some values with the others held, for the variance that they leave (Song, Nelson and Staum, 2016)."""
+"""Number of draws of the free values for a conditional variance (Song, Nelson and Staum, 2016)."""
 _SMALLEST = 2.0**-53
-"""Smallest fraction of a draw: its normal score is finite, as is the score of 1 less it."""
+"""Smallest fraction of a draw, for which the normal scores of it and of 1 minus it are finite."""
 _ONE = 0.6827
-"""Confidence of one standard deviation."""
+"""Confidence level of one standard deviation."""
 _NEAREST = 0.2
-"""Fraction of the runs, nearest to an end of a value, that say what the metric is there."""
+"""Fraction of the runs, nearest to an end of a value, to which the parabola is fitted."""
 
 
 @dataclass(frozen=True, slots=True)
 class Indices:
-    """Indices by name, each (paths,), and the half width of the band around each one that has a band."""
+    """Sensitivity indices by name, each (paths,), and the half widths of their bands, where available."""
 
     values: Mapping[str, Floats]
     bands: Mapping[str, Floats]
@@ -37,9 +37,13 @@ class Indices:
 
 @dataclass(frozen=True, slots=True)
 class EvaluatedBlocks:
-    """Whole blocks of a design: shares and inputs [SI] (rows, paths), values (rows,), and the numbers of the blocks.
+    """Complete blocks of a design with the values of a metric.
 
-    ``ends`` (2, paths) [SI] are the 5 and the 95 % quantile of each input, nan of the noise; ``seed`` made the design.
+    ``fractions``, ``inputs`` (rows, paths): fractions in (0, 1) and inputs [SI]
+    ``values`` (rows,): values of the metric [SI]
+    ``blocks``: numbers of the blocks
+    ``ends`` (2, paths): 5 and 95 % quantile of each input [SI], nan for noise
+    ``seed``: random seed of the design
     """
 
     fractions: Floats
@@ -52,13 +56,16 @@ class EvaluatedBlocks:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """A design and its evaluation.
+    """Method of sensitivity analysis: design and evaluation.
 
-    ``shown`` are the indices that are drawn, the first of which ranks. ``takes_dependent`` tells whether they mean
-    something where values are correlated. There are ``fewest`` to ``most`` blocks, called by ``sizes_label`` and each
-    by ``block_label``; ``block_rows`` says how many runs belong together for a number of values. ``design`` takes an
-    uncertainty, blocks and a seed and returns fractions in (0, 1), shape (blocks * block_rows, paths), block after
-    block; each row is a draw of the values. ``indices`` returns the indices of whole blocks with bands of a confidence.
+    ``shown``: names of the plotted indices; the first one determines the ranking
+    ``takes_dependent``: True if the indices are meaningful for correlated values
+    ``fewest``, ``most``: limits of the number of blocks
+    ``sizes_label``, ``block_label``: names of the blocks, and of one block
+    ``block_rows``: number of runs of a block for a number of values
+    ``design``: function of uncertainty, number of blocks and seed; returns fractions in (0, 1), shape (blocks *
+        block_rows, paths), block after block
+    ``indices``: function of complete blocks and confidence; returns the indices with bands
     """
 
     name: str
@@ -74,7 +81,7 @@ class Method:
 
 
 def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
-    """Return fractions in (0, 1) for a power of 2 of blocks; block b is of scramble b % SCRAMBLES."""
+    """Return fractions in (0, 1) for a power of 2 of blocks; block b belongs to scramble b % SCRAMBLES."""
     if blocks & (blocks - 1):
         raise StudyError(f"samples = {blocks}: Sobol indices need a power of 2, such as {1 << blocks.bit_length()}")
     from scipy.stats import qmc
@@ -94,7 +101,7 @@ def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
 
 
 def _sobol_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
-    """Return ``first`` and ``total`` with bands."""
+    """Return the indices ``first`` and ``total`` with bands."""
     # Points of one scramble depend on each other, scrambles do not: those are left out in turn.
     table = evaluated.values.reshape(evaluated.blocks.size, -1)
     scramble = evaluated.blocks % SCRAMBLES
@@ -106,9 +113,9 @@ def _sobol_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
 
 
 def _sobol_total_and_first(table: Floats) -> Floats:
-    """Return total and first-order indices (2, paths) from blocks (blocks, paths + 2): a point, its copies, another.
+    """Return total and first-order Sobol indices (2, paths) from values (blocks, paths + 2).
 
-    With f(A) at the first point, f(B) at the last, f(AB_i) where value i comes from B, and V the variance of f(A) and
+    The columns are f(A), then f(AB_i) with value i from B for each path, then f(B). With V the variance of f(A) and
     f(B): total_i = mean (f(A) - f(AB_i))^2 / 2 V (Jansen, 1999), first_i = mean f(B) (f(AB_i) - f(A)) / V (Saltelli et
     al., 2010).
     """
@@ -132,7 +139,7 @@ SOBOL = Method(
     design=_sobol_design,
     indices=_sobol_indices,
 )
-"""Fractions of the variance: first-order (each value alone) and total (with all its interactions).
+"""Sobol indices, fractions of the variance: first-order (a value alone) and total (with all interactions).
 
 Saltelli's design on independent scrambles of the Sobol sequence; estimators of Saltelli et al.
 (2010) and Jansen (1999). The bands come from the spread between the scrambles, because the points of one sequence
@@ -141,7 +148,10 @@ are not independent and resampling them gives bands that are several times too w
 
 
 def _shapley_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
-    """Return fractions in (0, 1): in each block, for ever more values of its order, draws with the rest held."""
+    """Return fractions in (0, 1) of a design for Shapley effects.
+
+    For each block and each prefix of its order of values, there are draws with the remaining values fixed.
+    """
     from scipy.special import ndtr
 
     count = len(uncertainty.drawn)
@@ -168,7 +178,7 @@ def _shapley_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
 
 
 def _shapley_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
-    """Return ``shapley`` with bands, by the delta method over the orders."""
+    """Return the index ``shapley`` with bands by the delta method over the orders."""
     from scipy.special import stdtrit
 
     blocks, count = evaluated.blocks.size, evaluated.fractions.shape[1]
@@ -187,7 +197,7 @@ def _shapley_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
 
 
 def _orders(count: int, blocks: int, seed: int) -> NDArray[np.intp]:
-    """Return the order of the values in each block (blocks, count); the first ones are the same for more blocks."""
+    """Return the order of the values in each block (blocks, count); a larger number of blocks keeps the first ones."""
     ranks = np.random.default_rng([seed, 2]).random((blocks, count))
     return np.argsort(ranks, axis=1)
 
@@ -204,24 +214,25 @@ SHAPLEY = Method(
     design=_shapley_design,
     indices=_shapley_indices,
 )
-"""Fractions of the variance that add up to 1 whether the values depend on each other or not.
+"""Shapley effects: fractions of the variance that add up to 1, for independent and for correlated values.
 
-What two values explain together, because they act together or because they are correlated, is divided between
-them (Owen, 2014). By random orders: each value gets what it adds to the variance that the values before it leave
-when all after it are held (Song, Nelson and Staum, 2016). Held values are drawn from the Gaussian copula.
+Variance that two values explain together, by interaction or by correlation, is divided between them (Owen, 2014).
+The values are added in random orders: each value gets its increase of the variance that remains when all later
+values of the order are fixed (Song, Nelson and Staum, 2016). Fixed values are drawn from the Gaussian copula.
 """
 METHODS = {method.name: method for method in (SOBOL, SHAPLEY)}
-"""Methods by name. To add a method: its design, its indices, and its value here."""
+"""Methods by name. To add a method: its design, its indices, and its entry here."""
 
 
 def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floats]:
-    """Return the change of the metric (paths,) from the 5 to the 95 % quantile of each value, and its half band.
+    """Return the change of the metric (paths,) from the 5 to the 95 % quantile of each value, and the half band.
 
-    In the unit of the metric, above 0 where the metric grows with the value; nan for the noise. It is the difference of
-    two means of the metric, given that the value is at one or the other end and with all others as drawn, so that
-    correlated ones go along. Each mean is read from a parabola through the runs nearest to the end (Cleveland, 1979,
-    without weights). The bands come from the spread between as many parts of the blocks as there are scrambles and from
-    how far a parabola is off: by at most twice the difference from the change that the nearer half of those runs gives.
+    The change has the unit of the metric and is positive if the metric grows with the value; it is nan for noise. It is
+    the difference between two conditional means of the metric, with the value at either quantile and all other values
+    as drawn, so that correlated values change too. Each mean is the value of a parabola fitted to the nearest runs
+    (Cleveland, 1979, without weights). The bands add two errors: the spread between parts of the blocks, one part for
+    each scramble, and twice the difference from the change with the nearer half of these runs, as the error of the
+    parabola.
     """
     own = np.unique(evaluated.blocks % SCRAMBLES, return_inverse=True)[1]
     part = np.repeat(own, evaluated.values.size // evaluated.blocks.size)
@@ -245,9 +256,9 @@ def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floa
 
 
 def _levels(values: Floats, inputs: Floats, end: float, part: NDArray[np.intp], nearest: float) -> Floats:
-    """Return the mean of the metric where a value is at an end: from all parts, then without each (parts + 1,).
+    """Return the mean of the metric with a value at an end: from all parts, then without each part (parts + 1,).
 
-    It is read from the fraction of the runs that is ``nearest`` to the end.
+    ``nearest`` is the fraction of the runs, nearest to the end, to which the parabola is fitted.
     """
     count = int(part.max()) + 1
     if math.isnan(end):

@@ -1,8 +1,8 @@
-"""The sensitivity of metrics to what has a distribution in a study, at growing sizes of the sample.
+"""Sensitivity of metrics to the distributions of a study, for growing sample sizes.
 
-Policy for runs that fail: where more than a fraction of all runs has no value it is refused, because the indices
-would be the survivors'. Otherwise every block (base point or order) with such a run is left out whole,
-since the formulas need whole blocks, and counted; the indices then hold for values with which the model runs.
+Failed runs: the analysis is refused if more than a given fraction of all runs has no value, because the indices would
+describe only the remaining ones. Otherwise every block (base point or order) with such a run is left out and counted,
+since the formulas need complete blocks; the indices then hold for values at which the model runs.
 """
 
 from collections.abc import Sequence
@@ -22,18 +22,18 @@ from ppafo.studies.sampling import NOISE
 from ppafo.study.runs import Runs, tracking_violation
 
 _ENDS = (0.05, 0.95)
-"""Fractions between which a value goes for the change of a metric."""
+"""Quantile fractions of a value between which the change of a metric is taken."""
 DEFAULT_SAMPLES = {"sobol": 8192, "shapley": 2048}
-"""Blocks by the name of the method: tens of thousands of runs of a few values."""
+"""Default number of blocks by method: tens of thousands of runs for a few values."""
 _FEWEST_WHOLE = 4
-"""Whole blocks from which indices are estimated."""
+"""Smallest number of complete blocks for an estimate."""
 _SIZES = 6
-"""Sizes at which the indices are shown: all blocks, and halved again and again."""
+"""Number of sample sizes at which the indices are shown: all blocks, and repeated halves."""
 
 
 @dataclass(frozen=True, slots=True)
 class SensitivitySettings:
-    """Number of blocks, seed, confidence of the bands, fraction of the runs that may fail."""
+    """Number of blocks, random seed, confidence level of the bands, maximum fraction of failed runs."""
 
     samples: int
     seed: int = 1
@@ -43,7 +43,12 @@ class SensitivitySettings:
 
 @dataclass(frozen=True, slots=True)
 class IndexConvergence:
-    """The indices of one metric, and their bands, by name from the first ``blocks`` blocks; ``used`` had all values."""
+    """Sensitivity indices of a metric from the first blocks of the sample.
+
+    ``blocks``: number of blocks
+    ``used``: number of blocks without a missing value
+    ``indices``, ``bands``: indices and half widths of their bands, by name
+    """
 
     blocks: int
     used: int
@@ -53,10 +58,13 @@ class IndexConvergence:
 
 @dataclass(frozen=True, slots=True)
 class OfMetric:
-    """The indices of a metric at growing sizes, the last the result; mean and standard deviation [SI] of all runs.
+    """Sensitivity of a metric at growing sample sizes.
 
-    The change [SI] is how the metric goes from the 5 to the 95 % quantile of each value, with its sign and the half
-    width of its band; nan for the noise.
+    ``mean``, ``standard_deviation``: over all runs [SI]
+    ``change_from_5_to_95_percent``: signed change of the metric from the 5 to the 95 % quantile of each value [SI], nan
+        for noise
+    ``band_of_change``: half width of the band of this change [SI]
+    ``settling``: indices at growing sample sizes; the last is the result
     """
 
     metric: str
@@ -69,7 +77,7 @@ class OfMetric:
 
     @property
     def indices(self) -> Indices:
-        """The indices from all blocks."""
+        """Sensitivity indices from all blocks."""
         last = self.settling[-1]
         values, bands = (
             {name: np.array(numbers) for name, numbers in by_name.items()} for by_name in (last.indices, last.bands)
@@ -78,15 +86,17 @@ class OfMetric:
 
     @property
     def dropped_blocks(self) -> int:
-        """Number of blocks that were left out."""
+        """Number of blocks left out."""
         return self.settling[-1].blocks - self.settling[-1].used
 
 
 @dataclass(frozen=True, slots=True)
 class Influences:
-    """Indices of some metrics with regard to some paths.
+    """Sensitivity indices of metrics with respect to uncertain values.
 
-    ``runs`` were made, ``failed`` of them failed, and ``not_following`` completed without following their reference.
+    ``paths``: paths of the uncertain values
+    ``runs``, ``failed``: number of runs, and of failed runs
+    ``not_following``: number of completed runs that do not follow their reference
     """
 
     study: str
@@ -113,9 +123,10 @@ def analyse(
     scenario: Scenario | None = None,
     metrics: Sequence[str] = (),
 ) -> Influences:
-    """Return the indices of the metrics; StudyError for bad settings, dependent values or too many failures.
+    """Return the sensitivity indices of metrics.
 
     ``scenario`` is the scenario of the runs, None for a model; ``metrics`` are the metrics to analyse, () for all.
+    Raises StudyError for invalid settings, dependent values or too many failures.
     """
     if uncertainty.scores is not None and not method.takes_dependent:
         raise StudyError(
@@ -164,9 +175,9 @@ def analyse(
 def _of_metric(
     name: str, values: Floats, design: EvaluatedBlocks, method: Method, settings: SensitivitySettings
 ) -> OfMetric:
-    """Return the indices of a metric, whose ``values`` are (rows,), from growing parts of the sample.
+    """Return the sensitivity of a metric with ``values`` (rows,), for growing parts of the sample.
 
-    StudyError where it is the same in every run, or too few blocks have a value in all their runs.
+    Raises StudyError if the metric is equal in every run, or if too few blocks are complete.
     """
     known = np.isfinite(values)
     if float(np.ptp(values[known])) == 0.0:
@@ -208,7 +219,7 @@ def _of_metric(
 
 
 def _part_of(design: EvaluatedBlocks, values: Floats, kept: NDArray[np.intp]) -> EvaluatedBlocks:
-    """Return the part of a design that is made of some blocks, with the values of a metric in their runs."""
+    """Return the rows of the given blocks of a design, with the values of a metric."""
     rows = np.flatnonzero(np.isin(design.blocks, kept))
     return replace(
         design, fractions=design.fractions[rows], inputs=design.inputs[rows], values=values[rows], blocks=kept

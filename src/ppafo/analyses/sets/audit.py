@@ -1,4 +1,4 @@
-"""Audit of parameter sets: changes against their parents and contradictions, in words and as data."""
+"""Audit of parameter sets: changes against the parent set and contradictions, in words and as data."""
 
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -23,7 +23,7 @@ _SEVERITIES = ("error", "warning", "note")
 
 @dataclass(frozen=True, slots=True)
 class AuditedSet:
-    """A parameter set with its findings, errors first, and the parent that it was compared with."""
+    """Parameter set with the findings of the audit, errors first, and the parent set for comparison."""
 
     parameter_set: ParameterSet
     parent: ParameterSet | None
@@ -31,7 +31,7 @@ class AuditedSet:
     overrides: tuple[str, ...] = ()
 
     def __iter__(self) -> Iterator[AuditFinding]:
-        """Go through the findings."""
+        """Iterate over the findings."""
         return iter(self.findings)
 
     @property
@@ -40,7 +40,7 @@ class AuditedSet:
         return {name: sum(finding.severity == name for finding in self.findings) for name in _SEVERITIES}
 
     def json_document(self) -> dict[str, Any]:
-        """Return the findings, and what the set changes of its parent, as plain data."""
+        """Return the findings, and the changes against the parent set, as plain data."""
         parent = self.parent
         return {
             "set": self.parameter_set.name,
@@ -58,9 +58,9 @@ def audit(
 ) -> Finding[AuditedSet]:
     """Audit of a parameter set: contradictions and values that deserve attention, errors first.
 
-    An error that the set accepts with a reason becomes a warning that shows the reason. A reason that stands in its
-    ``parent`` too, the set that the file names unless given, lapses where the set changes a value of the finding. A
-    reason for something that is not found is a warning, so that it does not outlive what it excuses.
+    An error that the set accepts with a reason becomes a warning that states the reason. A reason inherited from the
+    ``parent`` is void if the set changes a value of the finding. A reason without a matching finding is a warning, so
+    that obsolete reasons are removed.
 
     Arguments:
         parameter_set: the set, its name or its file
@@ -86,9 +86,10 @@ def audit(
 
 
 def audited(names: Sequence[str], parent: str | None, is_whole: bool, overrides: Sequence[str]) -> Finding[Any]:
-    """Return changes and findings of one set, or a table of several; it has not passed where one is an error.
+    """Return changes and findings of one set, or a table of several sets; not passed if a set has an error.
 
-    Where ``is_whole`` is false, findings that concern no changed value of a set with a parent or overrides are counted.
+    If ``is_whole`` is false and a set has a parent or overrides, findings that concern no changed value are only
+    counted.
     """
     sets = []
     for name in names:
@@ -127,9 +128,9 @@ def _finding_of(sets: Sequence[AuditedSet], is_whole: bool) -> Finding[Any]:
 
 
 def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Section]:
-    """Return what a set changes of its parent, errors and what concerns a ``changed`` value, and how many there are.
+    """Return sections on changes against the parent, on findings, and on their number.
 
-    All findings are shown where ``changed`` is None.
+    The findings are errors and findings on ``changed`` paths; all findings if ``changed`` is None.
     """
     name, parent, findings = audited_set.parameter_set.name, audited_set.parent, audited_set.findings
     parts = []

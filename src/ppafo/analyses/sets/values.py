@@ -35,7 +35,7 @@ def values_document(parameter_set: ParameterSet) -> dict[str, Any]:
 
 
 def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
-    """Return every value of a set with its source, in words and one table."""
+    """Return every value of a set with its source as a finding with one table."""
     document = values_document(parameter_set)
     notes, citation = document["notes"], document["citation"]
     cited = ""

@@ -1,1 +1,1 @@
-"""Distributions of the metrics of a study over many runs, and their dependence on the varied values."""
+"""Distributions of a study's metrics over many runs, and their dependence on the varied values."""

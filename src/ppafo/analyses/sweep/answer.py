@@ -1,4 +1,4 @@
-"""The results of a study as a finding: counts, metrics of each configuration, what varied, and a panel a metric."""
+"""Report of a study: number of runs, metrics of each configuration, varied values, panels of the metrics."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,20 +23,20 @@ _Count = Annotated[int, Field(ge=0)]
 
 
 def _fraction(text: str) -> str:
-    """Return a text that is a fraction; ValueError for any other."""
+    """Return a text unchanged if it is a fraction from 0 to 1; ValueError otherwise."""
     if not 0.0 <= float(text) <= 1.0:
         raise ValueError("must be a fraction from 0 to 1")
     return text
 
 
 class _OpenTable(BaseModel):
-    """A table of which more may be written than is read."""
+    """Table of a JSON file in which additional keys are allowed."""
 
     model_config = ConfigDict(strict=True)
 
 
 class _Described(_OpenTable):
-    """A metric over the runs of a configuration: ``count`` of them have it."""
+    """Statistics of a metric over the runs of a configuration; ``count`` is the number of runs with a value."""
 
     count: _Count
     mean: float = 0.0
@@ -51,7 +51,7 @@ class _Described(_OpenTable):
 
 
 class _Failure(_OpenTable):
-    """A run without metrics, and why."""
+    """Failed run, with the reason."""
 
     run: _Count
     configuration: str
@@ -74,7 +74,7 @@ class _Summary(_OpenTable):
 
 @in_units(lambda results: results.document.get("shown", {}))
 def finding_of(results: StudyResults) -> Finding[StudyResults]:
-    """Return the results in words, tables and panels; they have passed where any run completed."""
+    """Return the results of a study as a finding; passed if at least one run completed."""
     document, summary = results.document, results.summary
     ended = ", ".join(f"{summary[key]:,} {key}" for key in ("completed", "diverged", "refused") if summary[key])
     described = " ".join(document["study"].get("description", "").split())
@@ -111,7 +111,7 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
 
 
 def _useless_runs(results: StudyResults) -> list[str]:
-    """Return how many runs failed, with the first of them, oscillate or do not follow, by configuration."""
+    """Return sentences on failed, oscillating and not following runs, the latter two by configuration."""
     summary, runs = results.summary, results.document["runs"]
     sentences = [
         f"{runs - summary['completed']:,} of {runs:,} runs failed and have no metrics; the first is run "
@@ -131,7 +131,7 @@ def _useless_runs(results: StudyResults) -> list[str]:
 
 
 def _sampling(study: Mapping[str, Any]) -> list[str]:
-    """Return the correlations of what a study draws, and how it draws them."""
+    """Return sentences on the correlations and the sampling method of a study."""
     sentences = [
         f"Correlation of {pair['between'][0]} with {pair['between'][1]}: {pair['coefficient']}, of their normal scores."
         for pair in study.get("correlations", ())
@@ -144,7 +144,7 @@ def _sampling(study: Mapping[str, Any]) -> list[str]:
 
 
 def _assumed(scenarios: Mapping[str, Any]) -> Section:
-    """Return what the base scenarios assume, once where several assume the same."""
+    """Return a table of the assumptions of the base scenarios, without duplicates."""
     names: dict[tuple[str, str, str], list[str]] = {}
     for name, scenario in scenarios.items():
         for number in scenario["assumptions"]:
@@ -160,7 +160,7 @@ def _assumed(scenarios: Mapping[str, Any]) -> Section:
 
 
 def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str, Any]]) -> Section:
-    """Return the table of the metrics of a configuration: how many runs have each, mean, deviation and quantiles."""
+    """Return the table of a configuration's metrics: number of runs, mean, standard deviation and quantiles."""
     described = [
         description for own in results.metrics.values() for description in own.values() if description["count"]
     ]
@@ -179,9 +179,9 @@ def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str
 
 
 def write_report(results: StudyResults) -> None:
-    """Write figure, page and summary beside the results, in a folder that resumes and is known by its ``study.json``.
+    """Write figure, page and summary into the folder of the results.
 
-    No file names the place: the same study makes the same bytes anywhere.
+    No file contains the path of the folder, so the same study gives the same bytes anywhere.
     """
     finding: Finding[Any] = finding_of(results)
     finding = replace(finding, name=Path(SUMMARY).stem, found=results.summary)
@@ -191,7 +191,7 @@ def write_report(results: StudyResults) -> None:
 
 @checked
 def load_study_results(folder: str | Path) -> Finding[StudyResults]:
-    """Return the finished results of a study in a folder; DataError where there are none.
+    """Return the finished results of a study in a folder; DataError if the folder contains none.
 
     >>> import ppafo
     >>> written = ppafo.sweep("torque-task-uncertainty", draws=4, out="four")

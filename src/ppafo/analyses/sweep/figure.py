@@ -1,4 +1,4 @@
-"""The figure of a study: a panel a metric, over what varied, and bands of channels over time."""
+"""Figure of a study: a panel for each metric over the varied values, and bands of channels over time."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,33 +23,36 @@ if TYPE_CHECKING:
 FIGURE = "figure"
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, GREY)
 MOST_CONFIGURATIONS = len(COLOURS)
-"""Configurations that are drawn: as many as colours that can be told apart."""
+"""Largest number of configurations in a figure: as many as distinguishable colours."""
 MOST_METRICS = 9
-"""Metrics that are drawn."""
+"""Largest number of metrics in a figure."""
 MAXIMUM_DRAWN = 4_000_000
-"""Runs from which a figure is drawn, spread evenly over all; the numbers beside it are from all of them."""
+"""Largest number of runs in a figure, spread evenly over all; printed statistics use all runs."""
 _COLUMNS = 2
-"""Panels side by side."""
+"""Number of panels side by side."""
 _PANEL, _COMPARED_PANEL = (2.9, 2.4), (2.7, 2.3)
-"""Width and height of a panel [inches], and of one of a row that compares configurations."""
+"""Width and height of a panel [inches], and of a panel in a row that compares configurations."""
 _HISTOGRAM_BINS = 60
-"""Bins of a histogram at most."""
+"""Largest number of bins of a histogram."""
 _MAXIMUM_POINTS = 3000
-"""Runs of which a curve or the points of a panel are made."""
+"""Largest number of runs in a curve or in the points of a panel."""
 _MEDIAN = 0.5
 _OPACITIES = (0.18, 0.32, 0.45)
 """Opacities of the bands of one channel, from the outermost to the innermost."""
 _GRIDDED = ("grid", "list")
 """Kinds of ``[[vary]]`` that are crossed with each other."""
 _NAMED = 3
-"""Varied values that a title names."""
+"""Number of varied values in a title."""
 _CAPTION = (
     "Distributions of the metrics, their dependence on the varied values, and quantiles over time where requested."
 )
 
 
 def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Section:
-    """Return maps for a grid of two axes, points for two values that are drawn, else a panel a metric; and bands."""
+    """Return the figure of a study: panels of the metrics, and bands over time.
+
+    A grid of two axes is drawn as maps, two drawn values as coloured points, all else as one panel for each metric.
+    """
     study, all_metrics = results.document["study"], list(results.document["metrics"])
     # A metric that no run has would be a hole in the figure, unless no metric has a value.
     with_values = [
@@ -83,7 +86,7 @@ def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]
 
 
 def _listed(paths: Sequence[str]) -> str:
-    """Return the labels of paths within a sentence: without a capital, unless one begins with a name in capitals."""
+    """Return a list of path labels for use within a sentence, in lower case except for abbreviations."""
     labels = [label_of(path) for path in paths[:_NAMED]]
     labels = [label if label[:2].isupper() else label[:1].lower() + label[1:] for label in labels]
     more = f" and {len(paths) - _NAMED} more" if len(paths) > _NAMED else ""
@@ -93,7 +96,10 @@ def _listed(paths: Sequence[str]) -> str:
 def _panels(
     results: StudyResults, metrics: Sequence[str], names: Sequence[str], varied: Sequence[str], grid: Sequence[str]
 ) -> list[Panel]:
-    """Return a panel for each metric, of each configuration where it is over two paths, and one for each band."""
+    """Return a panel for each metric and each band.
+
+    Over two paths, every configuration has its own panel of a metric.
+    """
     if 2 in (len(grid), len(varied)):
         over_two = partial(_map, results, grid) if len(grid) == 2 else partial(_points, results, varied)
         panels = [over_two(metric, name, len(names) > 1) for metric in metrics for name in names]
@@ -108,13 +114,13 @@ def _panels(
 
 
 def _kind(results: StudyResults, path: str) -> Kind:
-    """Return what the number at a varied path is."""
+    """Return label, unit and format of the values of a varied path."""
     varied = results.document["varied"][path]
     return of_path(path, varied["unit"].removeprefix("-"), given=varied.get("given", ""))
 
 
 def _histogram(results: StudyResults, metric: str) -> Panel:
-    """Return how often each value came, for every configuration."""
+    """Return a panel with the histogram of a metric for every configuration."""
     parts = {name: values[np.isfinite(values)] for name, values in results.thin(metric, MAXIMUM_DRAWN).items()}
     filled = [values for values in parts.values() if values.size]
     edges = np.zeros(2)
@@ -133,7 +139,7 @@ def _histogram(results: StudyResults, metric: str) -> Panel:
 
 
 def _over(results: StudyResults, path: str, metric: str, names: Sequence[str]) -> Panel:
-    """Return a metric over the one path that varies."""
+    """Return a panel of a metric over the single varied path."""
     across, values = results.thin(path, MAXIMUM_DRAWN), results.thin(metric, MAXIMUM_DRAWN)
     marks = []
     for name, colour in zip(names, COLOURS, strict=False):
@@ -147,7 +153,7 @@ def _over(results: StudyResults, path: str, metric: str, names: Sequence[str]) -
 
 
 def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_compared: bool) -> Panel:
-    """Return the mean of a metric over the two paths, for one configuration; white where no run completed."""
+    """Return a map of the mean of a metric over two paths for one configuration; white if no run completed."""
     across, upward = (results.thin(path, MAXIMUM_DRAWN)[name] for path in grid)
     columns, column = np.unique(across, return_inverse=True)
     rows, row = np.unique(upward, return_inverse=True)
@@ -163,7 +169,7 @@ def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_
     axis_y = _MapAxis(_kind(results, grid[1]), rows, declared[grid[1]])
 
     def mark_axes(axes: "Axes") -> None:
-        """Set ticks at the values of a list, and logarithmic scales."""
+        """Set ticks for the values of a list, and logarithmic scales."""
         axes.grid(visible=False)
         axis_x.mark(axes.xaxis, axes.set_xscale)
         axis_y.mark(axes.yaxis, axes.set_yscale)
@@ -175,9 +181,13 @@ def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_
 
 @dataclass(frozen=True, slots=True)
 class _MapAxis:
-    """An axis of a map: what its numbers are, the values [SI] that they take, and how the study file varies them.
+    """Axis of a map.
 
-    Values of a list are side by side, in cells of the same size.
+    ``kind``: label, unit and format of the values
+    ``levels``: values [SI] on the axis
+    ``declared``: entry of the study file for the varied path
+
+    Values of a list are drawn side by side, in cells of equal size.
     """
 
     kind: Kind
@@ -186,12 +196,12 @@ class _MapAxis:
 
     @property
     def is_listed(self) -> bool:
-        """True where the values are a list."""
+        """True if the values are a list."""
         return bool(self.declared["kind"] == "list")
 
     @property
     def shown_kind(self) -> Kind:
-        """Kind of the tick values; for a list, words alone."""
+        """Label, unit and format of the ticks; for a list, only the label."""
         return Kind(self.kind.axis) if self.is_listed else self.kind
 
     @property
@@ -200,7 +210,7 @@ class _MapAxis:
         return np.arange(float(self.levels.size)) if self.is_listed else self.levels
 
     def mark(self, axis: "Axis", set_scale: "Callable[[str], None]") -> None:
-        """Set the ticks of an axis of a figure, and its scale."""
+        """Set ticks and scale of an axis of a figure."""
         from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
         if self.is_listed:
@@ -214,7 +224,7 @@ class _MapAxis:
 
 
 def _points(results: StudyResults, paths: Sequence[str], metric: str, name: str, is_compared: bool) -> Panel:
-    """Return a metric as the colour of points over the two values that were drawn, for one configuration."""
+    """Return a panel of points over two drawn values, coloured by a metric, for one configuration."""
     most, kind = _MAXIMUM_POINTS * len(results.configurations), metric_kind(results, metric)
     x, y, values = (results.thin(path, most)[name] for path in (*paths, metric))
     marks = (Mark("points", x, y, kind.values(values)),)
@@ -223,7 +233,10 @@ def _points(results: StudyResults, paths: Sequence[str], metric: str, name: str,
 
 
 def _band(results: StudyResults, channel: str, names: Sequence[str]) -> Panel:
-    """Return the bands of a channel for every configuration: the outermost pair of quantiles light, the next darker."""
+    """Return a panel with the quantile bands of a channel for every configuration.
+
+    The outermost pair of quantiles is drawn light, the next one darker.
+    """
     table = results.bands()
     # The quantiles that the study asked for are the columns of its file.
     fractions = sorted(float(name[1:]) for name in table if name.startswith("q"))

@@ -1,4 +1,4 @@
-"""The results of a study, read from its folder on demand."""
+"""Results of a study, read from its folder on demand."""
 
 import re
 import tempfile
@@ -30,9 +30,11 @@ Columns = dict[str, np.ndarray[Any, Any]]
 
 @dataclass(frozen=True, slots=True, repr=False)
 class StudyResults:
-    """The results of a study: ``document`` is its ``study.json``, ``summary`` its ``summary.json``.
+    """Results of a study.
 
-    ``kept`` holds a temporary folder as long as its results are used; None for a folder of one's own.
+    ``folder``: folder of the results
+    ``document``, ``summary``: content of ``study.json`` and of ``summary.json``
+    ``kept``: temporary folder, which exists as long as its results are in use; None for a folder of the user
     """
 
     folder: StudyFolder
@@ -41,7 +43,7 @@ class StudyResults:
     kept: tempfile.TemporaryDirectory[str] | None = None
 
     def __repr__(self) -> str:
-        """Return name, runs, how many completed, and the metrics."""
+        """Return name, number of runs, number of completed runs, and metrics."""
         counted = ", ".join(f"{self.summary[key]:,} {key}" for key in ("completed", "diverged", "refused"))
         return (
             f"StudyResults of '{self.name}' in {self.folder.path}\n  {self.document['runs']:,} runs: {counted}\n  "
@@ -61,7 +63,7 @@ class StudyResults:
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """The varied paths."""
+        """Paths of the varied values."""
         return tuple(self.document["varied"])
 
     @property
@@ -71,9 +73,9 @@ class StudyResults:
         return metrics
 
     def table(self, columns: Sequence[str] | None = None) -> Columns:
-        """Return the rows of all runs, or some columns of them, as arrays by name; SI units, nan where none.
+        """Return the rows of all runs, or some of their columns, as arrays by name; SI units, nan for missing values.
 
-        Channels over time are columns of their own, which ``trajectories`` returns.
+        Channels over time are not part of the table; ``trajectories`` returns them.
         """
         if columns is None:
             # All chunks have the columns of the first.
@@ -83,12 +85,15 @@ class StudyResults:
         return joined([as_numpy(part) for part in self.chunks(columns)])
 
     def by_configuration(self, column: str) -> dict[str, np.ndarray[Any, Any]]:
-        """Return a column of all runs, by name of the configuration; runs of the same place got the same draw."""
+        """Return a column of all runs, by name of the configuration.
+
+        Runs with the same index have the same draw in all configurations.
+        """
         values = self.table([column])[column]
         return dict(zip(self.configurations, np.split(values, len(self.configurations)), strict=True))
 
     def trajectories(self, channel: str) -> np.ndarray[Any, Any]:
-        """Return a kept channel of all runs, shape (runs, samples), nan where a run failed and after a fall."""
+        """Return a stored channel of all runs, shape (runs, samples), nan for failed runs and after a fall."""
         outputs = self.document["study"]["outputs"]
         kept = list(dict.fromkeys([*outputs.get("trajectories", ()), *outputs.get("bands", ())]))
         if channel not in kept:
@@ -99,7 +104,7 @@ class StudyResults:
         return np.concatenate([matrix_of(part.column(column)) for part in self.chunks([column])])
 
     def bands(self) -> Columns:
-        """Return the bands: configuration, channel, time and a column for each quantile."""
+        """Return quantile bands over time as columns: configuration, channel, time, and a column for each quantile."""
         try:
             table = read_parquet(self.folder.open(BANDS), BANDS)
             check_types(table, BANDS)
@@ -113,7 +118,7 @@ class StudyResults:
         return as_numpy(table)
 
     def thin(self, column: str, maximum: int) -> dict[str, np.ndarray[Any, Any]]:
-        """Return a column by name of the configuration, of about ``maximum`` runs in all: every so many of them."""
+        """Return a column by name of the configuration, thinned to every n-th run for about ``maximum`` runs in all."""
         # An odd step: an even one would see one half of a grid whose last axis has two values.
         step = -(-int(self.document["runs"]) // maximum) | 1
         thinned = {}
@@ -126,13 +131,13 @@ class StudyResults:
         return thinned
 
     def parts(self, configuration: str, column: str) -> Iterator[np.ndarray[Any, Any]]:
-        """Give the finite values of a column of a configuration, chunk by chunk."""
+        """Yield the finite values of a column of a configuration, chunk by chunk."""
         for table in self.chunks([column], configuration):
             values = table.column(column).to_numpy()
             yield values[np.isfinite(values)]
 
     def chunks(self, columns: Sequence[str], configuration: str | None = None) -> "Iterator[pa.Table]":
-        """Give some columns of the chunks one after the other, of all configurations or of one."""
+        """Yield some columns chunk by chunk, of one configuration or of all."""
         # No chunk holds runs of two configurations, and each configuration has the same number of them.
         numbers = range(self.document["chunks"])
         if configuration is not None:
@@ -142,10 +147,10 @@ class StudyResults:
         return stored_rows(self.folder, numbers, columns)
 
     def json_document(self) -> dict[str, Any]:
-        """Return the summary, and where the rows are."""
+        """Return the summary, and the path of the folder."""
         return {**self.summary, "folder": str(self.folder.path)}
 
 
 def metric_kind(results: StudyResults, metric: str) -> Kind:
-    """Return what a metric of a study is, from the unit that its folder has, as which it need not be there any more."""
+    """Return label, unit and format of a metric from the stored unit, also for a metric that no longer exists."""
     return of_stored_metric(metric, results.document["metrics"][metric]["unit"])

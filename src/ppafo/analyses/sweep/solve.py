@@ -1,8 +1,8 @@
-"""Runs a study into a folder, from where it stands, and sums it up; chunks that are whole are not computed again.
+"""Execution of a study into a folder, with resumption and summary; finished chunks are not computed again.
 
-Only completed runs that have the metric count, and how many those are is said beside each. Mean, spread and quantiles
-are exact; for quantiles a column of one configuration is in memory at a time. The quantile of fraction q of n sorted
-values is the value at place (n - 1) q, on a line between its neighbours: definition 7 of Hyndman and Fan (The American
+Statistics use the completed runs that have the metric; their number is stated with each. Mean, standard deviation and
+quantiles are exact; for quantiles, one column of one configuration is in memory at a time. The quantile of fraction q
+of n sorted values is interpolated linearly at position (n - 1) q: definition 7 of Hyndman and Fan (The American
 Statistician, 1996). The standard deviation divides by n - 1.
 """
 
@@ -59,13 +59,13 @@ QUANTILE_DEFINITION = (
     "value at place (n - 1) q of the n sorted values, on a line between neighbours (Hyndman and Fan 1996, definition 7)"
 )
 MAXIMUM_IN_MEMORY = 16_000_000
-"""Values of a channel over time from which bands are made at once."""
+"""Number of samples of a channel from which bands are computed at once."""
 Parts = Callable[[], Iterator[Floats]]
-"""Gives the finite values of a column anew each time, in parts whose order is always the same."""
+"""Function that yields the finite values of a column, in parts of constant order at every call."""
 
 
 def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
-    """Return the content of ``summary.json``: counts, the first few runs that failed, and each metric."""
+    """Return the content of ``summary.json``: numbers of runs, first failed runs, and statistics of each metric."""
     completed = dict.fromkeys((configuration.name for configuration in study.configurations), 0)
     failures: list[dict[str, Any]] = []
     for name in completed:
@@ -113,7 +113,7 @@ def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
 
 
 def bands_file(study: Study, results: StudyResults) -> bytes:
-    """Return the content of ``bands.parquet``: quantiles over the runs at each time, exact."""
+    """Return the content of ``bands.parquet``: exact quantiles over the runs at each time."""
     fractions = study.outputs.quantiles
     parts: list[Columns] = []
     for number, configuration in enumerate(study.configurations):
@@ -146,9 +146,9 @@ def bands_file(study: Study, results: StudyResults) -> bytes:
 def _band(
     study: Study, results: StudyResults, configuration: str, channel: str, samples: int
 ) -> tuple[NDArray[np.int64], Floats]:
-    """Return how many runs there are at each time, and each quantile over them (quantiles, times).
+    """Return the number of runs at each time, and each quantile over them (quantiles, times).
 
-    As many times are read at once as fit into the memory together with all runs.
+    Samples are read in blocks that fit into the memory for all runs.
     """
     column, at_once = trace_column(channel), max(1, MAXIMUM_IN_MEMORY // study.runs_of_configuration)
     counts, levels = [], []
@@ -161,7 +161,7 @@ def _band(
 
 
 def sorted_quantiles(ordered: Floats, counts: NDArray[np.int64], fractions: Sequence[float]) -> Floats:
-    """Return quantiles (fractions, columns) of the first ``counts`` values of sorted columns; nan without values."""
+    """Return quantiles (fractions, columns) of the first ``counts`` values of sorted columns; nan for empty ones."""
     places = np.maximum(counts - 1, 0) * np.asarray(fractions)[:, None]
     low = places.astype(np.int64)
     columns = np.arange(counts.size)
@@ -170,7 +170,10 @@ def sorted_quantiles(ordered: Floats, counts: NDArray[np.int64], fractions: Sequ
 
 
 def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
-    """Return count, and unless it is 0 mean, standard deviation (from 2 values on), extremes, quantiles by fraction."""
+    """Return count, mean, standard deviation, extremes, and quantiles by fraction.
+
+    Without values there is only the count; the standard deviation needs two values.
+    """
     sums = [(part.size, float(np.sum(part)), float(part.min()), float(part.max())) for part in parts() if part.size]
     count = sum(part[0] for part in sums)
     if count == 0:
@@ -190,7 +193,7 @@ def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
 
 
 LOG = "log.jsonl"
-"""The only file that says when, where and how fast; all others are the same wherever they are made."""
+"""Log file, the only one with date, machine and speed; all other files are the same on any machine."""
 INTERRUPTED = "interrupted; finished chunks are kept, and the same command resumes the study"
 INTERRUPTED_AT_ONCE = "interrupted; nothing was kept yet, and the same command begins anew"
 
@@ -208,10 +211,10 @@ def sweep(
     plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[StudyResults]:
-    """Return the results of a study: a name, a TOML file, data laid out as one, or a Study.
+    """Run a study, given as a name, a TOML file, data with the layout of such a file, or a Study.
 
-    Columns of the results are arrays of shape (runs,), trajectories (runs, samples), in SI units, pressures absolute;
-    nan where a run failed, which is a row that says so.
+    Columns of the results are arrays of shape (runs,), trajectories (runs, samples), in SI units, pressures absolute.
+    A failed run has a row with its status and nan for all results.
 
     Arguments:
         study: name of a study, a .toml file, data laid out as one, or a Study
@@ -255,19 +258,19 @@ def sweep(
 
 
 def is_begun(study: Study, folder: str | Path) -> bool:
-    """Return whether a folder has a finished chunk of a study."""
+    """Return whether a folder contains a finished chunk of a study."""
     names = study_folder(folder).names()
     return any(note_file(number) in names for number in range(chunk_count(study)))
 
 
 def studies_of_the_package() -> list[dict[str, Any]]:
-    """Return name, number of runs and description of each study that comes with the package."""
+    """Return name, number of runs and description of each study of the package."""
     studies = [load_study(name) for name in list_studies()]
     return [{"name": study.name, "runs": study.runs, "description": study.description} for study in studies]
 
 
 def _work(store: StudyStore, threads: int | None, progress: Report | None) -> None:
-    """Compute the chunks that are missing, and add a line on this session to the log."""
+    """Compute the missing chunks, and add a line on this process to the log."""
     study, folder, started = store.study, store.folder, time.monotonic()
     known = store.finished()
     earlier, missing = sum(block.runs for block in known), set(range(chunk_count(study)))
@@ -302,7 +305,7 @@ def _work(store: StudyStore, threads: int | None, progress: Report | None) -> No
 def _compute(
     store: StudyStore, numbers: Iterable[int], threads: int | None, finish: Callable[[FinishedChunk], None]
 ) -> None:
-    """Compute chunks one after the other; while one is written, the next one is computed."""
+    """Compute chunks one after the other, writing each while the next is computed."""
     with ThreadPoolExecutor(1, "ppafo-writing") as writer:
         writing: Future[FinishedChunk] | None = None
         for number in numbers:

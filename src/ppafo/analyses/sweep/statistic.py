@@ -1,7 +1,7 @@
-"""A statistic over the distributions of a study, drawn until its interval is narrow enough.
+"""Estimation of a statistic over the distributions of a study, with draws until its interval is narrow enough.
 
-``statistic_kind.py`` says what is estimated and from which draws, ``stopping.py`` when it stops, and why its intervals
-hold although it looks again and again.
+``statistic_kind.py`` defines the statistics and their draws, ``stopping.py`` the stopping rule, and the reason why
+intervals stay valid although the estimate is examined repeatedly.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,13 +29,13 @@ from ppafo.study.runs import RunCounter, Runs
 from ppafo.units.shown import shown_in
 
 DEFAULT_WIDTH = "1 %"
-"""Width of an interval, of the value, unless another is given."""
+"""Default width of an interval, as a fraction of the value."""
 PROBABILITY_WIDTH = "0.02"
-"""Width of the interval of a probability [-] unless another is given."""
+"""Default width of the interval of a probability [-]."""
 FIRST_DRAWS = 256
-"""Draws of the first look."""
+"""Number of draws before the first look."""
 MOST_DRAWS = 2**20
-"""Draws at most."""
+"""Default maximum number of draws."""
 
 
 @checked
@@ -116,14 +116,14 @@ def draw_until(
     seed: int,
     also: Sequence[str] = (),
 ) -> Finding[StatisticEstimate]:
-    """Draw from one stream until the rule is met or there are no more looks.
+    """Draw from one stream until the stopping rule is met or its last look is reached.
 
-    A narrow interval from few draws is not trusted: drawing continues. For a mean it continues until an event of one
-    run in 3,300 would have been drawn, and until rarer events within 100 standard deviations of the mean cannot move it
-    out of the wanted width.
+    A narrow interval from few draws is not sufficient. For a mean, drawing continues until an event of one run in 3,300
+    would have been drawn, and until rarer events within 100 standard deviations of the mean cannot change the interval
+    beyond the target width.
 
-    Runs that fail have no value: up to the fraction that the rule allows they are left out and counted, above it
-    StudyError.
+    Failed runs have no value: up to the fraction that the rule allows they are left out and counted; above, StudyError
+    is raised.
     """
     looks: list[InterimEstimate] = []
     first_drawn: Columns = {}

@@ -1,4 +1,4 @@
-"""An estimated statistic in words, its looks as a table, their trace and the histogram of the values."""
+"""Report of an estimated statistic: table and trace of the looks, histogram of the values."""
 
 import math
 from functools import partial
@@ -14,23 +14,23 @@ from ppafo.report.style import GREY, VERMILION
 from ppafo.studies.distributions import Floats, fraction_text
 
 _RULE_OF_THREE = 3.0
-"""Over the draws: probability of an event that 95 of 100 such sets of draws show."""
+"""Numerator of the rule of three: 3 / n bounds the probability of an event missing in n draws (95 %)."""
 _ENDS = ("estimate", "low", "high")
-"""Heads of an estimate and the ends of its interval."""
+"""Column heads of an estimate and the ends of its interval."""
 _MAXIMUM_BINS = 80
-"""Bins of the histogram of the values at most."""
+"""Largest number of bins of the histogram."""
 _CAPTION = "Left: estimate and interval at each look; grey: the target width. Right: the values of all draws."
 
 
 def kind_of(metric: str, statistic: Statistic) -> Kind:
-    """Return what the numbers of a statistic are: a probability, or values of the metric."""
+    """Return label, unit and format of a statistic: of a probability, or of the metric."""
     return Kind("Probability", form=".5g") if statistic.unit == "-" else of_metric(metric, ".5g")
 
 
 def remarks_on(
     last: InterimEstimate, values: Floats, statistic: Statistic, kind: Kind, noise: ConfidenceInterval | None
 ) -> list[str]:
-    """Return what the number must not be read without: draws that decide alone, and noise."""
+    """Return remarks on estimates that few draws dominate, on values not drawn, and on sensor noise."""
     said = []
     are_equal = values.size > 0 and float(np.ptp(values)) == 0.0
     known = last.draws - last.missing
@@ -63,7 +63,7 @@ def remarks_on(
 
 
 def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: StoppingRule) -> Finding[StatisticEstimate]:
-    """Return an estimate in words, its looks as a table, the trace and the histogram of the values."""
+    """Return an estimate as a finding: sentence, table of the looks, trace and histogram of the values."""
     kind, looks = kind_of(estimated.metric, statistic), estimated.looks
     unit = kind.shown_unit if kind.quantity else ""
     ending = ""
@@ -125,9 +125,9 @@ def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: Stoppin
 
 
 def _panels(estimated: StatisticEstimate, kind: Kind, rule: StoppingRule, threshold: float | None) -> list[Panel]:
-    """Return estimate, interval and target width at each look, and the values of all draws.
+    """Return panels of estimate, interval and target width at each look, and of the values of all draws.
 
-    Beside the values stands the estimate, or the ``threshold`` [SI] that a probability is about.
+    The histogram marks the estimate, or for a probability its ``threshold`` [SI].
     """
     draws = np.array([look.draws for look in estimated.looks])
     values = np.array([(look.interval.value, look.interval.low, look.interval.high) for look in estimated.looks]).T

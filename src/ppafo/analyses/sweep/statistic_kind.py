@@ -1,8 +1,8 @@
 """Statistics of a metric: mean, quantile or probability, each with its draws and its confidence interval.
 
-A mean is estimated from randomised Sobol replicates, which know the mean of a smooth function far better than as many
-independent draws; its interval is never narrower than theirs, as nobody knows beforehand that no rare value decides.
-The intervals of quantiles and probabilities are exact for independent draws, and get those.
+A mean is estimated from randomised Sobol replicates, which are much more accurate than independent draws for a smooth
+function. The interval is never narrower than for independent draws, because a dominant rare value cannot be excluded
+beforehand. Quantiles and probabilities are estimated from independent draws, for which their intervals are exact.
 """
 
 import math
@@ -26,9 +26,9 @@ from ppafo.studies.draws import REPLICATES, Columns, Uncertainty
 from ppafo.studies.limits import level_of
 
 FEWEST_SEEN = 10_000
-"""Draws from which a mean is believed: one in 3,300 that differs would have come (95 %)."""
+"""Smallest number of draws for a trusted mean: an event of one run in 3,300 would have occurred (95 %)."""
 FURTHEST_UNSEEN = 100.0
-"""Distance from the mean, over the standard deviation [-], up to which values that were not drawn are allowed for."""
+"""Largest assumed distance from the mean of values not drawn, divided by the standard deviation [-]."""
 GRAMMAR = "'mean', 'quantile 0.95', 'probability above VALUE' or 'probability below VALUE'"
 _QUANTILE = re.compile(r"quantile\s+([0-9]*\.?[0-9]+)")
 _PROBABILITY = re.compile(r"probability\s+(above|below)\s+(\S.*)")
@@ -36,11 +36,14 @@ _PROBABILITY = re.compile(r"probability\s+(above|below)\s+(\S.*)")
 
 @dataclass(frozen=True, slots=True)
 class Statistic:
-    """A number about a distribution: in words that ``parse_statistic`` reads, the SI unit of its interval ('-': plain).
+    """Statistic of a distribution, with its estimator.
 
-    ``estimate`` takes the values (draws,) of the metric [SI], nan where there is none, and a confidence. Means come
-    from replicates, whose interval rests on the central limit theorem; intervals of all else are exact. ``threshold``
-    [SI] is what a probability is about.
+    ``label``: text that ``parse_statistic`` reads
+    ``unit``: SI unit of the interval ('-': dimensionless)
+    ``estimate``: function of the values (draws,) of the metric [SI], nan for missing, and a confidence
+    ``is_of_replicates``: True for means, from Sobol replicates with an interval by the central limit theorem; False for
+        exact intervals from independent draws
+    ``threshold``: threshold of a probability [SI]; None for other statistics
     """
 
     label: str
@@ -50,16 +53,16 @@ class Statistic:
     threshold: float | None = None
 
     def columns(self, uncertainty: Uncertainty, first: int, count: int, seed: int) -> Columns:
-        """Return the draws from number ``first`` on that its interval is made for: Sobol replicates, or independent."""
+        """Return the draws from number ``first`` on: Sobol replicates for a mean, else independent draws."""
         draw = uncertainty.replicated_columns if self.is_of_replicates else uncertainty.random_columns
         return draw(first, count, seed)
 
     def unseen(self, values: Floats, confidence: float) -> float:
-        """Change of a mean [SI] by values that no draw had, at most; 0 of other statistics, whose intervals are exact.
+        """Return an upper bound of the change of a mean [SI] by values that were not drawn; 0 for other statistics.
 
-        No interval of a mean holds without a bound on its values (Bahadur and Savage, 1956). Of n draws without it an
-        event has a probability up to 1 - (1 - confidence)^(1/n) (Clopper and Pearson), and its values are assumed to
-        lie within ``FURTHEST_UNSEEN`` standard deviations of the mean.
+        No interval of a mean holds without a bound on its values (Bahadur and Savage, 1956). An event that none of n
+        draws shows has a probability up to 1 - (1 - confidence)^(1/n) (Clopper and Pearson), and its values are assumed
+        to lie within ``FURTHEST_UNSEEN`` standard deviations of the mean.
         """
         known = values[np.isfinite(values)]
         if not self.is_of_replicates or not known.size:
@@ -68,9 +71,9 @@ class Statistic:
         return share * FURTHEST_UNSEEN * float(np.std(known))
 
     def effective_size(self, values: Floats) -> float:
-        """Return how many of the values determine the estimate; all where its interval is exact.
+        """Return the effective sample size of the estimate; the number of values if the interval is exact.
 
-        None of them, for a mean, while all are equal and few: one that comes later may lie anywhere.
+        For a mean of few values that are all equal the result is 0, since a later value may lie anywhere.
         """
         known = values[np.isfinite(values)]
         if self.is_of_replicates and 0 < known.size < FEWEST_SEEN and float(np.ptp(known)) == 0.0:
@@ -79,12 +82,12 @@ class Statistic:
 
 
 def mean_of(unit: str) -> Statistic:
-    """Return the statistic of a sweep that is the mean of a metric, in the unit of the metric."""
+    """Return the statistic for the mean of a metric, in the unit of the metric."""
     return Statistic("mean", unit, lambda values, level: floored_interval(values, REPLICATES, level), True)
 
 
 def quantile_of(unit: str, fraction: float) -> Statistic:
-    """Return the value of a metric below which a fraction of the runs lies."""
+    """Return the statistic for the quantile of a metric at a fraction of the runs."""
 
     def interval(values: Floats, level: float) -> ConfidenceInterval:
         return quantile_interval(values[np.isfinite(values)], fraction, level)
@@ -93,7 +96,7 @@ def quantile_of(unit: str, fraction: float) -> Statistic:
 
 
 def probability_of(threshold: float, is_above: bool, text: str) -> Statistic:
-    """Return the probability that a metric is above (or else below) a value [SI], written as ``text``."""
+    """Return the statistic for the probability of a metric above (or else below) a value [SI], given as ``text``."""
 
     def interval(values: Floats, level: float) -> ConfidenceInterval:
         # Strictly beyond: a metric that counts may be exactly at the threshold in many runs.
@@ -106,9 +109,9 @@ def probability_of(threshold: float, is_above: bool, text: str) -> Statistic:
 
 
 def parse_statistic(text: str, metric: str, atmosphere: float | None) -> Statistic:
-    """Return the statistic of a metric that a text names; StudyError where it names none.
+    """Return the statistic of a metric from its text; StudyError for an unknown statistic.
 
-    A gauge pressure counts from ``atmosphere`` [Pa absolute], as in ``studies.draws.level_of``.
+    A gauge pressure refers to ``atmosphere`` [Pa absolute], as in ``studies.draws.level_of``.
     """
     words, unit = text.strip(), METRICS[metric].unit
     if words == "mean":

@@ -1,8 +1,8 @@
-"""When drawing for a statistic stops, and what was seen by then: a rule, its looks, and the estimate.
+"""Stopping rule for a statistic, interim estimates, and the final estimate.
 
-Looking repeatedly and stopping at a favourable interval makes an ordinary interval too narrow. Here the number of
-looks is bounded before the first draw, and each look takes an equal part of the allowed error (Bonferroni's
-inequality): with the stated confidence all intervals of the trace hold at once, the one at which it stopped too.
+Repeated looks with a stop at a favourable interval make an ordinary interval too narrow. Here the number of looks is
+limited before the first draw, and each look takes an equal part of the allowed error (Bonferroni's inequality): with
+the stated confidence all intervals of the trace hold at the same time, including the last one.
 """
 
 import math
@@ -21,11 +21,14 @@ from ppafo.units import number_text, parse_quantity
 
 @dataclass(frozen=True, slots=True)
 class StoppingRule:
-    """When to stop: at an interval of this width, or after ``maximum`` draws.
+    """Rule for the end of drawing: at an interval of a target width, or after ``maximum`` draws.
 
-    ``width`` is in the SI unit of the statistic, or a fraction of its value where ``is_relative``. The first look is
-    after ``first`` draws, each later one after twice as many; ``confidence`` holds for all looks together. Draws are
-    refused where more than the fraction ``maximum_failed`` of them fails.
+    ``width``: target width in the SI unit of the statistic, or as a fraction of its value
+    ``is_relative``: True if ``width`` is a fraction of the value
+    ``first``: number of draws before the first look; it doubles for each later look
+    ``maximum``: maximum number of draws
+    ``confidence``: joint confidence level of all looks
+    ``maximum_failed``: fraction of failed draws above which the estimate is refused
     """
 
     width: float
@@ -36,7 +39,7 @@ class StoppingRule:
     maximum_failed: float = 0.01
 
     def __post_init__(self) -> None:
-        """Refuse a rule that can never be met or that asks for nothing."""
+        """Raise StudyError for a rule that can never be met or that has invalid limits."""
         if not (math.isfinite(self.width) and self.width > 0.0):
             raise StudyError(f"width = {self.width!r}: must be more than 0")
         if not FEWEST_DRAWS <= self.first <= self.maximum <= MAXIMUM_DRAWS:
@@ -49,7 +52,7 @@ class StoppingRule:
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """The numbers of draws at which it is looked at the interval, at most."""
+        """Numbers of draws at the looks, up to the maximum."""
         # Doubled each time: few looks have to share the allowed error, and the last takes half of all draws.
         sizes = [self.first]
         while sizes[-1] < self.maximum:
@@ -58,17 +61,17 @@ class StoppingRule:
 
     @property
     def confidence_of_look(self) -> float:
-        """Confidence of each single look, so that all of them together keep ``confidence``."""
+        """Confidence level of a single look, for which all looks together keep ``confidence``."""
         return 1.0 - (1.0 - self.confidence) / len(self.sizes)
 
     def is_narrow(self, look: "InterimEstimate") -> bool:
-        """Tell whether an interval is narrow enough, with what values that were not drawn would add to it."""
+        """Return whether an interval, widened by the effect of values not drawn, is narrow enough."""
         allowed = self.width * (abs(look.interval.value) if self.is_relative else 1.0)
         return look.interval.width + look.unseen <= allowed
 
 
 def stopping_rule(statistic: Statistic, metric: str, width: str, like: StoppingRule) -> StoppingRule:
-    """Return the rule with the width that a text says, else like another one."""
+    """Return a stopping rule with the target width of a text, and all other fields from ``like``."""
     text = width.strip()
     if statistic.threshold is not None:
         try:
@@ -83,10 +86,12 @@ def stopping_rule(statistic: Statistic, metric: str, width: str, like: StoppingR
 
 @dataclass(frozen=True, slots=True)
 class InterimEstimate:
-    """Interim estimate: number of draws, number without a value, and the interval [SI].
+    """Interim estimate after a number of draws.
 
-    ``effective_size`` is how many of them determine the estimate: fewer than there are where a few large values decide.
-    ``unseen`` [SI] is the change of a mean by values that were not drawn, at most.
+    ``draws``, ``missing``: number of draws, and of draws without a value
+    ``interval``: estimate with its confidence interval [SI]
+    ``effective_size``: effective sample size, below the number of values if a few large ones dominate
+    ``unseen``: upper bound of the change of a mean by values that were not drawn [SI]
     """
 
     draws: int
@@ -97,13 +102,13 @@ class InterimEstimate:
 
     @property
     def is_carried(self) -> bool:
-        """Tell whether enough draws determine the estimate."""
+        """True if the effective sample size is large enough for the number of draws."""
         return is_carried(self.effective_size, self.draws - self.missing)
 
 
 @dataclass(frozen=True, slots=True)
 class OfMean:
-    """The mean of a further metric [SI] over the same draws, with its interval, and how many draws have it."""
+    """Mean of an additional metric [SI] over the same draws, with interval and number of draws with a value."""
 
     draws: int
     value: float
@@ -113,10 +118,14 @@ class OfMean:
 
 @dataclass(frozen=True, slots=True)
 class StatisticEstimate:
-    """A statistic of a metric, with its interval [SI] and the looks one after the other.
+    """Estimate of a statistic of a metric, with interval [SI] and all looks.
 
-    ``is_met`` is true where the last interval is narrow enough and can be believed. ``share_of_noise`` is the fraction
-    of the variance that is due to sensor noise, None where there is none; ``values`` are the metric's [SI].
+    ``is_met``: True if the last interval is narrow enough and rests on enough draws
+    ``failed``: number of failed draws
+    ``also``: means of additional metrics
+    ``share_of_noise``: fraction of the variance that is due to sensor noise; None without noise
+    ``looks``: interim estimates in order
+    ``values``: values of the metric over all draws [SI]
     """
 
     metric: str
@@ -136,6 +145,6 @@ class StatisticEstimate:
     folder: str = field(default="", compare=False)
 
     def json_document(self) -> dict[str, Any]:
-        """Return the numbers, and the folder in which they are written."""
+        """Return the estimate as plain data, with the path of the result folder."""
         document: dict[str, Any] = plain(self)
         return document | ({"folder": self.folder} if self.folder else {})

@@ -1,4 +1,4 @@
-"""A walk of many wearers: what they get, as quantiles, and who they are, in words, a table and a figure."""
+"""Report of a walk of many wearers: quantiles of outcomes and traits, as text, table and figure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,12 +30,12 @@ _WEARERS_CAPTION = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wearers:
-    """Result of one walk of many wearers, in the form that is printed and kept."""
+    """Result of a walk of many wearers, as printed and saved."""
 
     population: Population
 
     def json_document(self) -> dict[str, Any]:
-        """Return the quantiles over the wearers, and who they are, as plain data in SI."""
+        """Return the quantiles of outcomes and traits over the wearers as plain data in SI units."""
         population = self.population
         return {
             "format": WEARERS_FORMAT,
@@ -66,7 +66,7 @@ class Wearers:
 
 @in_units(lambda population: population.scenario.device.shown)
 def wearers_finding(population: Population) -> Finding[Wearers]:
-    """Report of the walks of many wearers; no figure where every walk diverged."""
+    """Return the report of the walks of many wearers; it has no figure if all walks diverged."""
     configuration = population.scenario
     tables = {**population.outcomes, **population.traits}
     rows = []

@@ -1,4 +1,4 @@
-"""Law that holds an angle: it asks for the torque that the joint needs, and opens the valve for that torque.
+"""Cascade control of an angle: an outer loop requests a joint torque, an inner loop opens the valve for this torque.
 
 The load on the joint is observed, as the part of the torque that did not accelerate it. Static friction makes an
 observer cycle: the torque that breaks it is therefore a state of its own, which creeps up while the joint rests away
@@ -32,11 +32,11 @@ from ppafo.model.sensors import Measurement
 
 
 class CascadeParameters(NamedTuple):
-    """Gains of the angle loop and of the torque loop inside it, and what the law believes of joint and valve.
+    """Gains of the angle loop and of the inner torque loop, and the assumed dynamics of joint and valve.
 
     ``angle_stiffness`` [N m/rad] and ``angle_damping`` [N m s/rad] act on the error and on its rate, ``torque_gain``
     [1/(N m)] opens the valve. ``rate_filter`` [s] smooths the measured rate, ``load_time`` and ``torque_lag`` [s] are
-    time constants of the observed load and of the torque loop; 0 s of ``load_time`` observes none.
+    time constants of the load observer and of the torque loop; a ``load_time`` of 0 s switches the observer off.
     """
 
     error_limit: Annotated[
@@ -82,13 +82,14 @@ class CascadeParameters(NamedTuple):
 
 
 class CascadeState(NamedTuple):
-    """Reference and angle one sample ago [rad] and their rates, what is learnt of the joint, and what is asked for.
+    """Cascade state: reference and angle of the previous sample [rad], their rates, observed load, requested torque.
 
-    ``quickening`` is the filtered rate of the reference's rate [rad/s^2], ``started`` the number of samples, 2 at most.
-    ``load`` is the observed load [N m] beside gravity and friction, ``breakaway`` the torque [N m] that grows while the
-    joint rests, ``asked_torque`` the torque asked for and ``lagged_torque`` that behind the lag of the torque loop
-    [N m]. The joint has been near the angle ``place`` [rad] for the time ``still`` [s]. ``is_held`` is 1 while it rests
-    within the tolerance, ``is_full`` while the valve is fully open.
+    ``rate`` is the filtered rate of the angle and ``asked`` the rate of the reference [rad/s]; ``quickening`` is the
+    filtered acceleration of the reference [rad/s^2]; ``started`` is the number of samples, 2 at most. ``load`` is the
+    observed load [N m] without gravity and friction. ``breakaway`` is the torque [N m] that grows while the joint
+    rests. ``asked_torque`` is the requested torque and ``lagged_torque`` the requested torque after the lag of the
+    torque loop [N m]. The joint has been near the angle ``place`` [rad] for the time ``still`` [s]. ``is_held`` is 1
+    while the joint rests within the tolerance, ``is_full`` is 1 while the valve is fully open.
     """
 
     reference: float = 0.0
@@ -108,17 +109,17 @@ class CascadeState(NamedTuple):
 
 
 SMOOTHING = 8.0
-"""Time constant of the filter on the reference's acceleration over the rate filter's [-]: the reference may jump."""
+"""Filter time constant of the reference acceleration divided by the one of the rate [-]; the reference may jump."""
 SLOW = 0.05
-"""rad/s: rate of the joint that is asked for from which on all of the friction is made up for."""
+"""Requested joint rate [rad/s] above which the friction is compensated in full."""
 SHARE_OF_FRICTION = 0.7
-"""Share of the believed friction in motion that is made up for: too much of it makes the joint swing."""
+"""Fraction of the assumed kinetic friction that is compensated; overcompensation makes the joint oscillate."""
 CREEP_LAGS = 5.0
-"""Lags of the torque loop in which the breakaway torque grows by the static friction at an error of ``CREEP_ERROR``."""
+"""Time, in lags of the torque loop, in which the breakaway torque grows by the static friction at ``CREEP_ERROR``."""
 CREEP_ERROR = math.radians(1.0)
-"""rad."""
+"""Angle error [rad] at which the breakaway torque grows at its nominal rate."""
 FASTEST_CREEP = 10.0
-"""Times as fast it grows at most, at larger errors."""
+"""Largest growth rate of the breakaway torque divided by the nominal rate, at larger errors [-]."""
 
 
 def cascade_update(
@@ -130,13 +131,13 @@ def cascade_update(
     *,
     parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, CascadeState]:
-    """Command u from -1 to 1 for an angle error e [rad], and the torque T [N m] that the sensors show:
+    """Command u from -1 to 1 for an angle error e [rad] and the measured torque T [N m]:
 
         T_wanted = k_a e + d_a (rate of e) + load + breakaway + gravity + friction + inertia,    u = k_p (T_wanted - T)
 
-    The load follows the torque that the joint has (what was asked for, behind the lag of the torque loop; the measured
-    one while the valve is fully open) less its acceleration, with the time constant ``load_time``. What the breakaway
-    torque would exceed the static friction by is load.
+    The load follows the joint torque less inertia times acceleration, with the time constant ``load_time``. The joint
+    torque is the requested torque after the lag of the torque loop, or the measured torque while the valve is fully
+    open. The part of the breakaway torque beyond the static friction is moved to the load.
     """
     error = reference - measurement.angle
     is_begun, is_running = min(state.started, 1.0), max(state.started - 1.0, 0.0)

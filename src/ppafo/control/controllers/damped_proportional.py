@@ -1,6 +1,6 @@
-"""Proportional control with damping on the rate of what is controlled, and a feed-forward table of commands.
+"""Proportional control with damping on the rate of the controlled quantity, and a feed-forward table of commands.
 
-Units are those of a torque; of what else is controlled, its unit stands in the place of N m.
+Units are given for a torque; where another quantity is controlled, read its unit in place of N m.
 """
 
 from typing import Annotated, NamedTuple
@@ -25,7 +25,7 @@ class DampedGains(NamedTuple):
 
 
 class DampedProportionalParameters(NamedTuple):
-    """Gains, time between knots [s], learnt commands [-] at the knots, and the dead band of the valve [-], believed."""
+    """Gains, time between knots [s], learnt commands [-] at the knots, and assumed dead band of the valve [-]."""
 
     gains: DampedGains
     knot_spacing: float
@@ -34,7 +34,7 @@ class DampedProportionalParameters(NamedTuple):
 
 
 class TorqueSlope(NamedTuple):
-    """Torque one sample ago [N m], its filtered rate [N m/s], start mark."""
+    """Torque at the previous sample [N m], filtered torque rate [N m/s], and 1 after the first sample."""
 
     torque: float = 0.0
     slope: float = 0.0
@@ -42,14 +42,14 @@ class TorqueSlope(NamedTuple):
 
 
 class DampedProportionalState(NamedTuple):
-    """Time since the start [s], and the torque's course."""
+    """Time since the start [s], and torque and torque rate at the previous sample."""
 
     elapsed: float = 0.0
     course: TorqueSlope = TorqueSlope()
 
 
 def learnt_command(parameters: DampedProportionalParameters, elapsed: float) -> float:
-    """Command [-] of the table at a time since the start [s]: straight between knots, the last one held."""
+    """Command [-] of the table at a time since the start [s]: linear between knots, constant after the last knot."""
     position = min(elapsed / parameters.knot_spacing, KNOTS - 1.0)
     # The last knot has no line after it: the line before it is used up to its end.
     before = min(int(position), KNOTS - 2)
@@ -84,7 +84,7 @@ def damped_update(
     *,
     parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, DampedProportionalState]:
-    """Command from -1 to 1 by ``damped_command``, on top of the table's learnt command, beyond the dead band."""
+    """Command from -1 to 1: ``damped_command`` plus the learnt command of the table, with dead-band compensation."""
     ahead = learnt_command(parameters, state.elapsed)
     wanted, value = parts.steered(reference), parts.steered(seen_value(measurement, parts=parts))
     opening, course = damped_command(parameters.gains, state.course, wanted, value, ahead, period)

@@ -1,7 +1,7 @@
-"""Laws with a model of the device: the believed numbers, the model's inverse, and two controllers that use it.
+"""Model-based control laws: parameters of the nominal device, the inverse of its model, and two controllers.
 
-The model is equations (2) to (9) for a proportional valve, with the ellipse of ISO 6358 for the flow function. Every
-number is the controller's own, so that it can be wrong about the device as a real controller is.
+The model is equations (2) to (9) for a proportional valve, with the ellipse of ISO 6358 for the flow function. All
+parameters belong to the controller, so that they can differ from the device as in a real controller.
 """
 
 import math
@@ -15,18 +15,18 @@ from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.model.sensors import Measurement
 
 SMALLEST_GAIN = 1.0e-3
-"""N m/s: where full opening changes the torque no faster, the valve opens fully and the result is clipped."""
+"""Torque rate at full opening [N m/s] below which the valve opens fully and the result is clipped."""
 
 
 def _believed(name: str, unit: str, what: str, minimum: float, maximum: float) -> Quantity:
-    """A number of the device that a law believes, the device's own unless it is given."""
+    """Declare a parameter of the nominal device, which defaults to the value of the device."""
     return Quantity("", unit, f"believed {what}", None, minimum, maximum, follows=(nominal_term(name),))
 
 
 class NominalChambers(NamedTuple):
-    """The believed device, SI units; conductances are Cd A C1 [kg/(s Pa)], ``gas_product`` is R T / M [J/kg].
+    """Nominal device of a controller, SI units; conductance is Cd A C1 [kg/(s Pa)], ``gas_product`` is R T / M [J/kg].
 
-    The valve opens beyond commands of ``dead_band`` [-].
+    The valve opens for commands beyond ``dead_band`` [-].
     """
 
     torque_constant: Annotated[float, _believed("torque_constant", "m^3", "K_actuator", 1.0e-9, 1.0)]
@@ -50,7 +50,7 @@ class NominalChambers(NamedTuple):
 
 
 class TorqueRates(NamedTuple):
-    """Torque rate of the closed valve [N m/s], and what full opening either way adds to or takes from it [N m/s]."""
+    """Torque rate with the valve closed [N m/s], and its increase and decrease at full opening [N m/s]."""
 
     closed: float
     rising: float
@@ -58,7 +58,7 @@ class TorqueRates(NamedTuple):
 
 
 NOMINAL_QUANTITIES = quantities_of(NominalChambers)
-"""Fields of ``NominalChambers`` in order; each is the device's unless given."""
+"""Fields of ``NominalChambers`` in order; each defaults to the value of the device."""
 
 
 def ellipse_flow(pressure_a: float, pressure_b: float, conductance: float, critical_ratio: float) -> float:
@@ -76,14 +76,14 @@ def ellipse_flow(pressure_a: float, pressure_b: float, conductance: float, criti
 def torque_rates(
     nominal: NominalChambers, angle: float, angular_velocity: float, pressure_1: float, pressure_2: float
 ) -> TorqueRates:
-    """Believed rates of T = K (P_1 - P_2) [N m/s] at an angle [rad], its rate w [rad/s] and absolute pressures [Pa].
+    """Nominal rates of T = K (P_1 - P_2) [N m/s] at an angle [rad], its rate w [rad/s] and absolute pressures [Pa].
 
     Equations (2) to (9), with the volumes V = V_dead + B (angle from the stop) and the flows m_1 and m_2 into them:
 
         dT/dt = K (R T_gas / M) (m_1 / V_1 - m_2 / V_2) - K B w (P_1 / V_1 + P_2 / V_2)
 
-    Opening the valve raises or lowers the torque as it should where both pressures are above the
-    atmosphere: the believed supplies let gas in only.
+    Opening the valve raises or lowers the torque as intended only where both pressures are above the atmosphere,
+    because the nominal supplies let no gas flow back.
     """
     # A measured angle beyond a stop must not make a believed volume 0 or less.
     least = min(nominal.dead_volume_1, nominal.dead_volume_2)
@@ -107,7 +107,7 @@ def torque_rates(
 
 
 def opening_for_rate(rates: TorqueRates, requested: float) -> float:
-    """Opening from -1 to 1 that gives a torque rate [N m/s], the inverse of ``torque_rates``; clipped to full."""
+    """Opening from -1 to 1 for a requested torque rate [N m/s]: inverse of ``torque_rates``, limited to -1 and 1."""
     needed = requested - rates.closed
     gain = rates.rising if needed >= 0.0 else rates.falling
     # Where full opening moves the torque hardly at all, the quotient is limited, not the command's sign.
@@ -115,11 +115,11 @@ def opening_for_rate(rates: TorqueRates, requested: float) -> float:
 
 
 NEARLY_SUPPLY = 0.999
-"""Largest fraction of the supply pressure that the feed-forward plans for: above it no opening follows a demand."""
+"""Largest fraction of the supply pressure used by the feed-forward; above it no opening meets the request."""
 
 
 class PidFeedforwardParameters(NamedTuple):
-    """Gains of the feedback, weight of the feed-forward [-], and the believed device."""
+    """Gains of the feedback, weight of the feed-forward [-], and the nominal device."""
 
     feedback: PidGains
     feedforward: float
@@ -127,7 +127,7 @@ class PidFeedforwardParameters(NamedTuple):
 
 
 class PidFeedforwardState(NamedTuple):
-    """The state of the PID, and the reference one sample ago [N m]."""
+    """State of the PID, and the reference at the previous sample [N m]."""
 
     feedback: PidState = PidState()
     reference: float = 0.0
@@ -140,7 +140,7 @@ def feedforward_update(
     measurement: Measurement,
     period: float,
 ) -> tuple[float, PidFeedforwardState]:
-    """Command from -1 to 1: PID of the torque error [N m], equation (13), and the opening for the reference's rate."""
+    """Command from -1 to 1: PID on the torque error [N m], equation (13), plus feed-forward of the reference rate."""
     rate = (reference - state.reference) / period * state.feedback.started
     # Along the reference, with the other chamber vented, not at the measured state: the feed-forward must not see the
     # noise.
@@ -157,7 +157,7 @@ def feedforward_update(
 
 
 def feedforward_restart(state: PidFeedforwardState, requested: float, continues: float) -> PidFeedforwardState:
-    """The state, reset where another task begins (``continues`` 0, else 1); the reference [N m] then has no rate."""
+    """State, reset where a new task starts (``continues`` 0): PID at its start, reference rate 0; else unchanged."""
     return state._replace(feedback=pid_restart(state.feedback, requested, continues))
 
 
@@ -178,7 +178,7 @@ PID_FEEDFORWARD = ControllerKind(
 
 
 class FeedbackLinearisationParameters(NamedTuple):
-    """Decay rate of the error [1/s], filter of the angle's rate [s], and the believed device."""
+    """Decay rate of the error [1/s], time constant of the velocity filter [s], and the nominal device."""
 
     convergence_rate: Annotated[
         float, Number("1/s", "rate at which the torque error decays", None, 0.0, 1.0e6, follows=(CONVERGENCE,))
@@ -189,7 +189,7 @@ class FeedbackLinearisationParameters(NamedTuple):
 
 
 class FeedbackLinearisationState(NamedTuple):
-    """Reference [N m] and angle [rad] one sample ago, filtered angular velocity [rad/s], start mark."""
+    """Previous reference [N m] and angle [rad], filtered angular velocity [rad/s], and 1 after the first sample."""
 
     reference: float = 0.0
     angle: float = 0.0
@@ -204,7 +204,7 @@ def linearising_update(
     measurement: Measurement,
     period: float,
 ) -> tuple[float, FeedbackLinearisationState]:
-    """Command: the opening for which the believed chambers change the torque by r' + rate (r - torque) [N m/s]."""
+    """Command for a nominal torque rate r' + convergence_rate (r - torque) [N m/s], with the reference r [N m]."""
     reference_rate = (reference - state.reference) / period * state.started
     turned = (measurement.angle - state.angle) * state.started
     velocity = state.angular_velocity
@@ -223,7 +223,7 @@ def linearising_update(
 def linearising_restart(
     state: FeedbackLinearisationState, requested: float, continues: float
 ) -> FeedbackLinearisationState:
-    """The state; where another task begins (``continues`` 0, else 1), the requested torque [N m] has no rate yet."""
+    """State; where a new task starts (``continues`` 0), the requested torque [N m] becomes the previous reference."""
     return state._replace(reference=state.reference if continues > 0.5 else requested)
 
 

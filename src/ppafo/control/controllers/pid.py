@@ -1,6 +1,6 @@
-"""PID law on the error alone, equation (13).
+"""PID control of the error, equation (13).
 
-Units are those of a torque; of what else is controlled, its unit stands in the place of N m.
+Units are given for a torque; where another quantity is controlled, read its unit in place of N m.
 """
 
 from typing import Annotated, NamedTuple
@@ -13,7 +13,7 @@ from ppafo.model.sensors import Measurement
 
 
 class PidGains(NamedTuple):
-    """Gains [1/(N m)], [1/(N m s)], [s/(N m)]; time constant of the derivative filter [s]; back-calculation [1/s]."""
+    """PID gains [1/(N m)], [1/(N m s)], [s/(N m)]; derivative filter time constant [s]; back-calculation gain [1/s]."""
 
     proportional_gain: Annotated[float, Number("1/(N m)", "k_p", None, 0.0, 1.0e3, follows=(PROPORTIONAL_GAIN,))]
     integral_gain: Annotated[float, Number("1/(N m s)", "k_i", None, 0.0, 1.0e6, follows=(INTEGRAL_GAIN,))]
@@ -35,14 +35,14 @@ class PidGains(NamedTuple):
 
 
 class PidParameters(NamedTuple):
-    """Gains of a PID, and the dead band of the valve [-] that it believes in."""
+    """Gains of a PID, and the assumed dead band of the valve [-]."""
 
     gains: PidGains
     dead_band: BelievedBand
 
 
 class PidState(NamedTuple):
-    """Integral part of the command [-], error one sample ago [N m], filtered slope of the error [N m/s], start mark."""
+    """Integral part of the command [-], previous error [N m], filtered error rate [N m/s], 1 after the first sample."""
 
     integral: float = 0.0
     error: float = 0.0
@@ -51,13 +51,13 @@ class PidState(NamedTuple):
 
 
 def pid_command(gains: PidGains, state: PidState, error: float, ahead: float, period: float) -> tuple[float, PidState]:
-    """Opening u from -1 to 1 for a torque error e [N m], added to the opening ``ahead`` u_0 [-]. Equation (13):
+    """Opening u from -1 to 1 for a torque error e [N m], with a feed-forward opening ``ahead`` u_0 [-]. Equation (13):
 
         u = u_0 + k_p e + k_i (integral of e) + k_d (slope of e)
 
     The integral is a sum of rectangles. The slope is a backward difference through a filter of first order with the
-    time constant ``derivative_filter``. What a clipped command lacks is taken off the integral, by ``anti_windup`` a
-    second (back-calculation).
+    time constant ``derivative_filter``. Anti-windup by back-calculation: the excess of the command over its limits is
+    subtracted from the integral at the rate ``anti_windup``.
     """
     # The first sample has none before it: no kick of the derivative.
     change = (error - state.error) * state.started
@@ -80,13 +80,13 @@ def pid_update(
     *,
     parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, PidState]:
-    """Command from -1 to 1 from the torque error [N m], equation (13), beyond the dead band of the valve."""
+    """Command from -1 to 1 for the torque error [N m], equation (13), with dead-band compensation."""
     opening, after = pid_command(parameters.gains, state, seen_error(reference, measurement, parts=parts), 0.0, period)
     return beyond_dead_band(opening, parameters.dead_band), after
 
 
 def pid_restart(state: PidState, requested: float, continues: float) -> PidState:
-    """The state, reset where another task begins (``continues`` 0, else 1); ``requested`` [N m] is not used."""
+    """State, reset after a change of task (``continues`` 0, else 1); ``requested`` [N m] is not used."""
     return state._replace(
         integral=state.integral * continues, slope=state.slope * continues, started=state.started * continues
     )

@@ -1,6 +1,6 @@
-"""Switching laws: a constant command, the sign of the error (equation 14), a dead zone, sliding mode with a layer.
+"""Constant command and switching laws: sign of the error (equation 14), dead zone, sliding mode with boundary layer.
 
-Units are those of a torque; of what else is controlled, its unit stands in the place of N m.
+Units are given for a torque; where another quantity is controlled, read its unit in place of N m.
 """
 
 from typing import Annotated, NamedTuple
@@ -13,7 +13,7 @@ from ppafo.model.sensors import Measurement
 
 
 class ConstantParameters(NamedTuple):
-    """Setting of a law that gives one command [-] from -1 to 1 all the time."""
+    """Setting of a constant-command law: the command [-] from -1 to 1."""
 
     command: Annotated[float, Number("", "command, above 0 feeds chamber 1", 1.0, -1.0, 1.0)]
 
@@ -21,7 +21,7 @@ class ConstantParameters(NamedTuple):
 def constant_update(
     parameters: ConstantParameters, state: EmptyRow, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, EmptyRow]:
-    """Command [-] from -1 to 1, which is the setting whatever is measured, and the state."""
+    """Constant command [-] from -1 to 1, independent of the measurement, and the state."""
     return parameters.command, state
 
 
@@ -38,14 +38,14 @@ CONSTANT = ControllerKind(
 
 
 class OrderedParameters(NamedTuple):
-    """Orders [-] from outside: the command, and the assistance level, from 0 to 3; at 3 a shut-off valve shuts."""
+    """Externally set command [-] and assistance level from 0 to 3; level 3 closes a shut-off valve."""
 
     command: Annotated[float, Number("", "command, above 0 feeds chamber 1", 1.0, -1.0, 2.0)]
     safe_state: Annotated[float, Number("", "assistance level, 3 has stopped", 0.0, 0.0, 3.0)]
 
 
 class Help(NamedTuple):
-    """Level of help, where the safety of a controller of walking has it."""
+    """Assistance level, in the same field as in the safety state of a walking controller."""
 
     level: float
 
@@ -59,7 +59,7 @@ class OrderedState(NamedTuple):
 def ordered_update(
     parameters: OrderedParameters, state: OrderedState, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, OrderedState]:
-    """Command [-] and state, which are what was ordered whatever is measured."""
+    """Externally set command [-] and assistance level, independent of the measurement."""
     return parameters.command, OrderedState(Help(parameters.safe_state))
 
 
@@ -76,7 +76,7 @@ ORDERED = ControllerKind(
 
 
 ROUNDING = 1.0e-9
-"""N m: an error this small counts as zero, so that rounding does not decide the first command."""
+"""Error [N m] below which an error counts as zero, so that rounding does not decide the first command."""
 
 
 def on_off_update(
@@ -88,7 +88,7 @@ def on_off_update(
     *,
     parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, EmptyRow]:
-    """Command: 1 (valve A) where the error [N m] is 0 or more, else -1 (valve B). Equation (14)."""
+    """Command by equation (14): 1 (valve A) for an error [N m] of 0 or more, else -1 (valve B)."""
     error = seen_error(reference, measurement, parts=parts)
     return (1.0 if error >= -ROUNDING else -1.0), state
 
@@ -107,7 +107,7 @@ ON_OFF = ControllerKind(
 
 
 class OnOffDeadZoneParameters(NamedTuple):
-    """Errors at which the valve opens and at which it closes again [N m]; command while it is open [-]."""
+    """Errors at which the valve opens and closes again [N m], and the command while open [-]."""
 
     dead_zone: Annotated[float, Number("N m", "error at which the valve opens", None, 0.0, 100.0, follows=(DEAD_ZONE,))]
     release: Annotated[
@@ -132,10 +132,10 @@ def dead_zone_update(
     *,
     parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, OnOffDeadZoneState]:
-    """Command: the opening, towards the reference, beyond the dead zone of the error [N m]; 0 inside.
+    """Command: ``opening`` in the direction of the error [N m] outside of the dead zone, 0 inside.
 
-    Once open, the valve stays so until the error is below ``release``. 0 closes a proportional valve and vents both
-    chambers of a solenoid pair.
+    An open valve stays open until the error falls below ``release``. A command of 0 closes a proportional valve and
+    vents both chambers of a solenoid pair.
     """
     error = seen_error(reference, measurement, parts=parts)
     # A release beyond the dead zone would open and close the valve in turn, sample by sample.
@@ -147,7 +147,7 @@ def dead_zone_update(
 
 
 def dead_zone_restart(state: OnOffDeadZoneState, requested: float, continues: float) -> OnOffDeadZoneState:
-    """The state, reset where another task begins (``continues`` 0, else 1); ``requested`` [N m] is not used."""
+    """State, reset after a change of task (``continues`` 0, else 1); ``requested`` [N m] is not used."""
     return OnOffDeadZoneState(direction=state.direction * continues)
 
 
@@ -166,7 +166,7 @@ ON_OFF_DEAD_ZONE = ControllerKind(
 
 
 class SlidingModeParameters(NamedTuple):
-    """Slope of the surface [1/s], half width of the boundary layer [N m], opening outside of it [-]; dead band [-]."""
+    """Slope of the surface [1/s], half width of the boundary layer [N m], opening outside it [-], dead band [-]."""
 
     surface_slope: Annotated[
         float,
@@ -198,8 +198,8 @@ def sliding_update(
 
         s = e + lambda (integral of e),    u = reaching_command min(1, max(-1, s / phi))
 
-    The opening u is made a command beyond the dead band. The integral stands still outside the layer, where a longer
-    error could not open the valve further.
+    The command compensates the dead band of the valve. The integral is frozen outside of the boundary layer, where the
+    valve is at its largest opening already (anti-windup).
     """
     error = seen_error(reference, measurement, parts=parts)
     integral = state.integral + period * error
@@ -211,7 +211,7 @@ def sliding_update(
 
 
 def sliding_restart(state: SlidingModeState, requested: float, continues: float) -> SlidingModeState:
-    """The state, reset where another task begins (``continues`` 0, else 1); ``requested`` [N m] is not used."""
+    """State, reset after a change of task (``continues`` 0, else 1); ``requested`` [N m] is not used."""
     return SlidingModeState(integral=state.integral * continues)
 
 

@@ -1,1 +1,1 @@
-"""Controllers of walking: they see forces under the foot beside angle and pressures. One module each."""
+"""Controllers of walking, which also measure the forces under the foot. One module each."""

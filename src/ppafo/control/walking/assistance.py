@@ -1,4 +1,4 @@
-"""Torque that a walking device requests in each phase of the gait, whatever law then tracks it.
+"""Torque that a walking device requests in each phase of the gait, independent of the law that tracks the torque.
 
 Landing: a profile in dorsiflexion that lets the foot down, about a spring and damper that hold it. Mid-stance: vented.
 Push-off: a profile in plantarflexion. Swing: a profile in dorsiflexion about the same spring and damper.
@@ -22,7 +22,7 @@ from ppafo.model.valves.kind import VENT
 
 
 class TorqueProfile(NamedTuple):
-    """Peak [N m], its time, and the times of rise and fall, in turns from the heel strike."""
+    """Peak torque [N m], and peak time, rise time and fall time [strides] after the heel strike."""
 
     peak_torque: float
     peak_time: float
@@ -31,7 +31,7 @@ class TorqueProfile(NamedTuple):
 
 
 def smooth(fraction: float) -> float:
-    """The cubic x^2 (3 - 2 x) from 0 to 1 with level ends, at a fraction x [-]."""
+    """Cubic x^2 (3 - 2 x) from 0 to 1 with zero slope at both ends, at a fraction x [-]."""
     inside = max(0.0, min(1.0, fraction))
     return inside * inside * (3.0 - 2.0 * inside)
 
@@ -90,13 +90,15 @@ PEAKS = ("peak_torque", "landing_peak_torque", "swing_peak_torque")
 """Settings that ``largest_torque`` limits."""
 
 ASSISTING_QUANTITIES = (*ASSISTANCE_QUANTITIES, *PHASE_QUANTITIES, *SAFETY_QUANTITIES)
-"""Settings that every law with ``assistance`` declares after its own."""
+"""Settings that every law with ``assistance`` declares after those of the law."""
 
 
 class Assistance(NamedTuple):
-    """Hold of the lifted foot, profiles of landing and swing (in dorsiflexion) and of push-off, largest torque [N m].
+    """Assistance settings: spring and damper for the lifted foot, torque profiles, and torque limit [N m].
 
-    The hold has an angle [rad], a stiffness [N m/rad], a damping [N m s/rad] and a filter of the angle's rate [s].
+    Spring and damper have an equilibrium ``swing_angle`` [rad], a ``stiffness`` [N m/rad], a ``damping`` [N m s/rad]
+    and a ``rate_filter`` on the angular rate [s]. The profiles ``landing`` and ``swing`` are in dorsiflexion,
+    ``push_off`` is in plantarflexion.
     """
 
     swing_angle: float
@@ -110,7 +112,7 @@ class Assistance(NamedTuple):
 
 
 class TorqueRequest(NamedTuple):
-    """Angle one sample ago [rad], 0 before the first, its filtered rate [rad/s], and the requested torque [N m]."""
+    """Previous angle [rad] (0 at the first sample), filtered angular rate [rad/s], and requested torque [N m]."""
 
     angle: float = 0.0
     rate: float = 0.0
@@ -118,7 +120,7 @@ class TorqueRequest(NamedTuple):
 
 
 class Assessment(NamedTuple):
-    """Assessment of one sample by a walking controller, before its law computes the command."""
+    """Assessment of one sample by a walking controller, before the law computes the command."""
 
     phase: PhaseState
     clock: Any
@@ -128,7 +130,7 @@ class Assessment(NamedTuple):
     safety: SafetyState
     request: TorqueRequest
     continues: float
-    """1 where the task of the sample before goes on, 0 where another begins."""
+    """1 where the task of the previous sample continues, 0 where another task starts."""
     acts: float
     """1 where the law commands the valve, 0 where both chambers are vented."""
 
@@ -136,19 +138,20 @@ class Assessment(NamedTuple):
 START = TorqueRequest()
 
 EASING_TIME = 0.1
-"""Time [s] after a landing on the toes in which a torque in plantarflexion is taken off by the law; it vents after."""
+"""Time [s] after a landing on the toes in which the law removes a torque in plantarflexion; later the chambers vent."""
 
 EASED = 0.3
-"""Torque in plantarflexion [N m] above which the law takes it off: of the wearer, and so the same of any actuator."""
+"""Torque in plantarflexion [N m] above which the law removes it; it depends on the wearer, not on the actuator."""
 
 LARGEST_PRESS = 0.7
-"""Largest torque in plantarflexion [N m] that is requested in the swing: about the weight of a foot in its shoe."""
+"""Largest torque in plantarflexion [N m] requested in the swing: about the weight of a foot with its shoe."""
 
 
 def requested_torque(rules: Assistance, phase: PhaseState, time: GaitTime, angle: float, rate: float) -> float:
-    """Requested torque [N m], above 0 in plantarflexion, at an angle q [rad] and its rate [rad/s]; 0 in mid-stance.
+    """Requested torque [N m], positive in plantarflexion, at an angle q [rad] and its rate [rad/s]; 0 in mid-stance.
 
-    Landing and swing: stiffness (swing_angle - q) - damping dq/dt, less their profile. Push-off: its profile.
+    Landing and swing: stiffness (swing_angle - q) - damping dq/dt, minus the profile of the phase. Push-off: its
+    profile.
     """
     fraction = time.since_strike / phase.stride_time
     hold = rules.stiffness * (rules.swing_angle - angle) - rules.damping * rate
@@ -164,7 +167,7 @@ def requested_torque(rules: Assistance, phase: PhaseState, time: GaitTime, angle
 
 
 def same_task(before: float, after: float) -> bool:
-    """True where two phases (0 to 3) have the same task: landing and swing both hold the foot."""
+    """Return whether two phases (0 to 3) have the same task; landing and swing share the task of lifting the foot."""
     return phases.lifts(before) == phases.lifts(after) and (before == PUSH_OFF) == (after == PUSH_OFF)
 
 
@@ -177,7 +180,7 @@ def timed_phase(
     *,
     parts: TimingParts,
 ) -> tuple[PhaseState, Any, GaitTime]:
-    """Phase, clock and gait phase as a time after a sample every ``period`` [s], by the functions of a timing."""
+    """Phase, clock and gait time after a sample taken every ``period`` [s], by the functions of a timing."""
     passed = parts.gait_time(parameters.timing, clock, phase).since_strike + period
     heel, toe = measurement.heel_force, measurement.toe_force
     after = phases.timed_phase_state(parameters.phases, phase, heel, toe, passed, period)
@@ -188,7 +191,7 @@ def timed_phase(
 def assess(
     parameters: Any, state: Any, measurement: GaitMeasurement, period: float, *, parts: TimingParts
 ) -> Assessment:
-    """Phase, safety and requested torque [N m] after a sample, taken every ``period`` [s], and whether to act on it.
+    """Assess a sample taken every ``period`` [s]: gait phase, safety, requested torque [N m], and permission to act.
 
     ``parameters`` and ``state`` are rows with the fields of ``LawParameters`` and ``LawState`` (``frame.py``).
     """
@@ -218,9 +221,6 @@ def assess(
 
 
 def valve_command(assessment: Assessment, command: float, period: float) -> tuple[float, SafetyState]:
-    """Command to the valve [-], the law's where the device acts and otherwise ``VENT``, and the next safety state.
-
-    ``period`` [s] is the time until the next command.
-    """
+    """Valve command [-] and next safety state: the command of the law where the device acts, else ``VENT``."""
     sent = command if assessment.acts > 0.5 else VENT
     return safety.safe_command(assessment.safety, assessment.phase.phase, sent, period)

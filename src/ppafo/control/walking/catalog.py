@@ -1,4 +1,4 @@
-"""Every controller of walking by name.
+"""Controllers of walking by name.
 
 A torque law of ``control.catalog`` walks by its own name, with no line here; a line gives it a name of its own and says
 what it is in walking. A law with ideas of its own of the phases is a module of this folder with a ``ControllerKind``,
@@ -23,7 +23,7 @@ from ppafo.model.sensors import GaitMeasurement, Measurement
 
 
 class ProportionalParameters(NamedTuple):
-    """Gains on the torque error [1/(N m)] and its integral [1/(N m s)]; believed dead band of the valve [-]."""
+    """Gains on the torque error [1/(N m)] and its integral [1/(N m s)], and assumed dead band of the valve [-]."""
 
     torque_gain: Annotated[
         float, Number("1/(N m)", "opening per torque error", None, 0.0, 1.0e3, follows=(PROPORTIONAL_GAIN,))
@@ -48,9 +48,9 @@ def proportional_update(
     measurement: Measurement,
     period: float,
 ) -> tuple[float, ProportionalState]:
-    """Command from -1 to 1 and the next state, at a torque error e [N m] every ``period`` [s].
+    """Command from -1 to 1 and next state for a torque error e [N m], once every ``period`` [s].
 
-    The opening u = torque_gain e + torque_integral_gain (integral of e), beyond the dead band of the valve.
+    The opening is u = torque_gain e + torque_integral_gain (integral of e), with dead-band compensation.
     """
     error = reference - measurement.torque
     proposed = parameters.torque_gain * error + state.integral
@@ -62,7 +62,7 @@ def proportional_update(
 
 
 def proportional_restart(state: ProportionalState, requested: float, continues: float) -> ProportionalState:
-    """The state, reset where another task begins (``continues`` 0, else 1); ``requested`` [N m] is not used."""
+    """State, reset after a change of task (``continues`` 0, else 1); ``requested`` [N m] is not used."""
     return ProportionalState(integral=state.integral * continues)
 
 
@@ -89,7 +89,7 @@ _EVENT_BASED = {
         (model_based.FEEDBACK_LINEARISATION, "inverting the chamber dynamics"),
     )
 }
-"""Torque laws that have a name of their own in walking, as they walk."""
+"""Torque laws with a separate name and summary in walking."""
 
 _COMPETING = (
     event_on_off.EVENT_ON_OFF,
@@ -105,15 +105,15 @@ _COMPETING = (
 WALKING_CONTROLLERS: Kinds[ControllerKind] = Kinds(
     "ppafo.walking_controllers", "controller of walking", ControllerKind, {kind.name: kind for kind in _COMPETING}
 )
-"""Controllers that compete with each other in walking, in the order of tables."""
+"""Alternative controllers of walking, in the order of tables."""
 
 
 def walking_controllers() -> dict[str, ControllerKind]:
-    """Return all controllers that a walk file can name: those of walking, and every torque law by its own name.
+    """Return all controllers that a walk file can name: controllers of walking and every suitable torque law.
 
-    A law that is one of walking is so under its own name too: ``pid`` is ``event_pid``. A constant command follows no
-    torque and does not walk, nor does a law that holds an angle, a fixed-point law, or one whose settings have names
-    that walking has taken.
+    A law with a separate name in walking has both names: ``pid`` is also ``event_pid``. Not suitable are a constant
+    command, which tracks no torque, a law that controls an angle, a fixed-point law, and a law with a setting whose
+    name is already used in walking.
     """
     laws = {
         name: law
@@ -128,7 +128,7 @@ def walking_controllers() -> dict[str, ControllerKind]:
 
 
 def load_walking_controller(name: str) -> None:
-    """Load a controller of another package by its name, so that ``walking_controllers`` has it; KindError if broken."""
+    """Load a controller of another package by name for ``walking_controllers``. Raises KindError if it is broken."""
     if ":" not in name:
         if WALKING_CONTROLLERS.get(name) is None:
             CONTROLLERS.get(name)
@@ -140,12 +140,12 @@ def load_walking_controller(name: str) -> None:
 
 
 def reads_gait(kind: ControllerKind) -> bool:
-    """Return whether the law of a controller takes a ``GaitMeasurement``, and has gait phases of its own."""
+    """Return whether the law of a controller takes a ``GaitMeasurement`` and has its own gait phases."""
     return kind.update.__annotations__.get("measurement") in (GaitMeasurement, GaitMeasurement.__name__)
 
 
 def law_that_walks(law: ControllerKind) -> ControllerKind:
-    """Return any torque law as a controller of walking."""
+    """Return a torque law as a controller of walking."""
     # Looked up by the law, for one of another package may have the name of one of ours.
     listed = _EVENT_BASED.get(law)
     return listed or walking_law(law, law.name, f"Torque profiles for each phase, tracked by the law {law.name}.")

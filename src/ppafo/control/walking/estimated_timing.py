@@ -1,4 +1,4 @@
-"""State estimation: a window of ankle angle, heel and toe force is fitted to a stride that was learnt.
+"""State estimation of the gait phase: a window of ankle angle, heel and toe force is fitted to a learnt stride.
 
 The stride is learnt at equal fractions of it ("knots") from the first good strides, by fractional timing. Then, knot
 after knot, the last readings are compared with the learnt stride at the fractions where the clock has taken them, and
@@ -28,23 +28,22 @@ from ppafo.model.sensors import GaitMeasurement
 KNOTS = 32
 WINDOW = 8
 FURTHEST = 3
-"""Knots of a stride, of the window that is compared, and by which the learnt stride is shifted at most either way."""
+"""Number of knots of a stride, number of knots in the window, and largest shift of the learnt stride in knots."""
 
 
 EVEN = 0.05
-"""A stride that is longer or shorter than recent ones by less than this fraction may be learnt from."""
+"""Largest relative deviation of a stride time from recent ones for which the stride is learnt."""
 
 
 KEEPS = 0.2
-"""Correction of the clock per detected strike once a stride is learnt [-]: the two cannot drift apart."""
+"""Correction of the clock per detected strike after a stride is learnt [-], which prevents drift."""
 
 
 class EstimatedRules(NamedTuple):
     """Estimator parameters: known delays, correction per detected event before a stride is learnt [-], adaptation.
 
-    Strides to learn from, weight of a later one, misfits that count as one [rad], [N], and how they are used.
-    ``clock_trust`` is the sum of squares that a shift by one knot costs: what the readings say of time has to outweigh
-    it, which forces that rise and fall do, and the angle of the swing alone hardly does.
+    ``clock_trust`` is the sum of squares that a shift by one knot costs. The measured misfit has to outweigh this cost:
+    rising and falling forces do, the ankle angle of the swing alone hardly does.
     """
 
     delays: Delays
@@ -66,7 +65,7 @@ _NO_STRIDE, _NO_WINDOW = (0.0,) * KNOTS, (0.0,) * WINDOW
 
 
 class LearntStride(NamedTuple):
-    """Ankle angle [rad], heel and toe force [N] at the knots of a stride, the next one first."""
+    """Ankle angle [rad], heel force and toe force [N] at the knots of a stride, starting with the next knot."""
 
     angle: Annotated[tuple[float, ...], KNOTS] = _NO_STRIDE
     heel_force: Annotated[tuple[float, ...], KNOTS] = _NO_STRIDE
@@ -74,7 +73,7 @@ class LearntStride(NamedTuple):
 
 
 class Window(NamedTuple):
-    """Angle and forces at the last knots, the latest one last, and how far estimates had moved the clock [turns]."""
+    """Ankle angle [rad] and forces [N] at recent knots, oldest first, and sum of clock corrections then [turns]."""
 
     angle: Annotated[tuple[float, ...], WINDOW] = _NO_WINDOW
     heel_force: Annotated[tuple[float, ...], WINDOW] = _NO_WINDOW
@@ -83,9 +82,10 @@ class Window(NamedTuple):
 
 
 class EstimatedClock(NamedTuple):
-    """Fractional timing, the learnt stride, the window and the next knot.
+    """Estimated gait phase: fractional clock, learnt stride, window of recent knots.
 
-    Knots in the window, strides learnt from, and by how much estimates have moved the clock since the start [turns].
+    ``next_knot`` is the number of the next knot, ``filled`` the number of knots in the window, ``learnt`` the number of
+    strides in the learnt stride, and ``moved`` the sum of all corrections of the clock by estimates [turns].
     """
 
     clock: GaitClock = CLOCK_START
@@ -101,7 +101,7 @@ START = EstimatedClock()
 
 
 def misfit(stride: LearntStride, window: Window, rules: EstimatedRules, shift: int) -> float:
-    """Mean square misfit [-] of the window to the learnt stride ``shift`` knots on."""
+    """Mean square misfit [-] between the window and the learnt stride shifted by ``shift`` knots."""
     total = 0.0
     for back in range(WINDOW):
         place, knot = WINDOW - 1 - back, (KNOTS - 1 - back + shift) % KNOTS
@@ -113,7 +113,7 @@ def misfit(stride: LearntStride, window: Window, rules: EstimatedRules, shift: i
 
 
 def finer_shift(stride: LearntStride, window: Window, rules: EstimatedRules, shift: int) -> float:
-    """Rest of the shift [knots] beyond a whole number of them: one Gauss-Newton step, at most a knot."""
+    """Fractional part of the shift [knots] in addition to ``shift``, by one Gauss-Newton step of at most one knot."""
     # The cost of a shift is one more residual, and 1e-12 keeps a flat stride without trust from dividing by 0.
     along, square = -rules.clock_trust * shift, 1.0e-12 + rules.clock_trust
     for back in range(WINDOW):
@@ -131,7 +131,7 @@ def finer_shift(stride: LearntStride, window: Window, rules: EstimatedRules, shi
 
 
 def estimated_shift(stride: LearntStride, window: Window, rules: EstimatedRules) -> float:
-    """Fraction of a stride [turns] by which the wearer is ahead of the clock; 0 where no shift fits well."""
+    """Estimated lead of the wearer over the clock [turns]; 0 if no shift fits well."""
     least, best = misfit(stride, window, rules, 0), 0
     for distance in range(1, FURTHEST + 1):
         # Small shifts first, and only a better one replaces the best: ties stay near the clock.
@@ -146,7 +146,7 @@ def estimated_shift(stride: LearntStride, window: Window, rules: EstimatedRules)
 
 
 def next_stride(stride: LearntStride, measurement: GaitMeasurement, weight: float) -> LearntStride:
-    """The learnt stride a knot on; the knot that is passed moves towards the readings by a weight [-]."""
+    """Learnt stride advanced by one knot; the passed knot moves towards the measurement with a weight [-]."""
     angle = stride.angle[0] + weight * (measurement.angle - stride.angle[0])
     heel = stride.heel_force[0] + weight * (measurement.heel_force - stride.heel_force[0])
     toe = stride.toe_force[0] + weight * (measurement.toe_force - stride.toe_force[0])
@@ -158,7 +158,7 @@ def next_stride(stride: LearntStride, measurement: GaitMeasurement, weight: floa
 
 
 def knots_passed(fraction: float, next_knot: float) -> float:
-    """Knots by which a fraction of the stride [turns] is beyond the next one, from minus to plus half of them."""
+    """Distance in knots from the next knot to a fraction of the stride [turns], from minus to plus half a stride."""
     within = fraction - 1.0 if fraction >= 1.0 else fraction
     ahead = within * KNOTS - next_knot
     # From minus to plus half a stride, across its end.
@@ -167,14 +167,14 @@ def knots_passed(fraction: float, next_knot: float) -> float:
 
 
 def is_learnt(rules: EstimatedRules, clock: EstimatedClock) -> bool:
-    """True once enough strides were seen to tell the gait phase from their course."""
+    """Return whether enough strides were learnt to estimate the gait phase."""
     return clock.learnt >= rules.learning_strides
 
 
 def passed_knot(
     rules: EstimatedRules, clock: EstimatedClock, at: GaitClock, learnt: float, measurement: GaitMeasurement
 ) -> EstimatedClock:
-    """The clock where its fraction passes a knot: learning, or moved by a part of the estimated shift."""
+    """Clock after passing a knot: the stride is learnt, and the clock corrected by a part of the estimated shift."""
     ready = is_learnt(rules, clock)
     # The first strides are averaged evenly, later ones fade in.
     stride = next_stride(clock.stride, measurement, rules.relearning if ready else 1.0 / (clock.learnt + 1.0))
@@ -216,7 +216,7 @@ def follow(
     measurement: GaitMeasurement,
     period: float,
 ) -> EstimatedClock:
-    """The clock after a sample, taken every ``period`` [s]: fractional until a stride is learnt, then estimated."""
+    """Clock after a sample taken every ``period`` [s]: fractional timing until a stride is learnt, then estimated."""
     ready = is_learnt(rules, clock) & (clock.filled >= WINDOW)
     # Once estimated, single events no longer move the clock, and the strike only a little.
     weight, strike_weight = 0.0 if ready else rules.anchor_weight, KEEPS if ready else 1.0
@@ -234,7 +234,7 @@ def follow(
 
 
 def gait_time(rules: EstimatedRules, clock: EstimatedClock, phase: PhaseState) -> GaitTime:
-    """The time since the heel strike [s], ahead by the delay of the valve."""
+    """Time since the heel strike [s], advanced by the delay of the valve."""
     return place_in_stride(clock.clock, rules.delays.valve_delay, phase)
 
 

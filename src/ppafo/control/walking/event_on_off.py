@@ -1,4 +1,4 @@
-"""Event-based control of a pair of solenoid valves: each phase of the gait has its valve configuration.
+"""Event-based control of a pair of solenoid valves: one valve configuration for each phase of the gait.
 
 Landing: the dorsiflexion side, which lets the foot down. Swing: the same side keeps it up, at an angle within a band.
 Mid-stance: both chambers vented, free motion. Push-off: the plantarflexion side, vented again before the toes leave
@@ -23,9 +23,9 @@ from ppafo.model.valves.kind import VENT
 
 
 class EventOnOffParameters(NamedTuple):
-    """Angle of the lifted foot [rad], band about it [rad], end of push-off [turns], largest torque [N m].
+    """Angle of the lifted foot and band about it [rad], end of push-off [turns], largest torque [N m].
 
-    Then rules of phases, safety and timing.
+    ``phases``, ``safety`` and ``timing`` are the rules of phases, safety and timing.
     """
 
     swing_angle: Annotated[float, Number("rad", "angle at which the foot is kept in the swing", 1.68, 0.5, 2.5)]
@@ -52,7 +52,7 @@ class EventOnOffParameters(NamedTuple):
 
 
 class EventOnOffState(NamedTuple):
-    """Phase, clock, safety, whether the foot is to be lifted (1), and whether a torque too large is let go (1)."""
+    """Phase, clock and safety; ``lifting`` is 1 for a lifted foot, ``resting`` is 1 while excess torque is vented."""
 
     phase: PhaseState = PhaseState()
     clock: EmptyRow = EmptyRow()
@@ -114,7 +114,7 @@ EVENT_ON_OFF = ControllerKind(
 def off_update(
     parameters: EmptyRow, state: EmptyRow, reference: float, measurement: GaitMeasurement, period: float
 ) -> tuple[float, EmptyRow]:
-    """Command of a device that is switched off: always ``VENT``, and the state."""
+    """Command ``VENT`` of a device that is switched off, and the unchanged state."""
     return VENT, state
 
 

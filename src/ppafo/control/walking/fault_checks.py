@@ -1,10 +1,10 @@
-"""Plausible ranges of a walk's readings, the state of their checks, and the fault flags that they raise.
+"""Plausibility checks of the sensor readings of a walk, their state, and the fault flags that they raise.
 
-A reading raises a flag where it is out of range, lost, frozen while others change, or late. That forces are late is
-seen at the ankle: a foot on its heel turns down until it is flat, and up from then on. A foot that has turned up before
-the heel is detected, and goes on until the toes are, was on the ground long before.
+A reading raises a flag if it is out of range, lost, frozen while others change, or delayed. Delayed forces are detected
+at the ankle: a foot that lands on its heel turns down until it is flat, and up from then on. A foot that turns up
+before the heel is detected, and continues to do so until the toes are, was already on the ground.
 
-Flags are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep runs from running side by side.
+Conditions are combined by ``&`` and ``|``: ``and`` and ``or`` are branches, which prevent vector code over runs.
 """
 
 from typing import Annotated, NamedTuple
@@ -31,11 +31,11 @@ from ppafo.model.sensors import GaitMeasurement
 
 
 class SafetyRules(NamedTuple):
-    """Plausible ranges of readings, and the longest duration of a contradiction.
+    """Plausible ranges of sensor readings, and the longest duration of a contradiction.
 
     Force [N], angles [rad], times in stride times (``longest_phase``, ``flat_from``, ``flat_to``, ``shortest_swing``)
-    or [s], strides, and absolute pressures [Pa]. ``fill_time`` holds for a valve fully open; half open it takes twice
-    as long. ``nominal`` is what the observer of the chambers believes of the device.
+    or [s], strides, and absolute pressures [Pa]. ``fill_time`` applies to a fully open valve; a half open valve takes
+    twice as long. ``nominal`` is the nominal device of the chamber observer.
     """
 
     lowest_force: Annotated[float, Number("N", "a force below this is not a valid reading", -40.0, -1.0e5, 0.0)]
@@ -99,12 +99,13 @@ SAFETY_QUANTITIES = (*quantities_of(SafetyRules), *LINE_QUANTITIES)
 
 
 class LastReadings(NamedTuple):
-    """Last readings of heel, toe [N], angle [rad] and both pressures [Pa].
+    """Last readings of heel and toe force [N], angle [rad] and both pressures [Pa].
 
-    Of the first three how long each stayed the same [s], and each filtered.
+    ``heel_unchanged``, ``toe_unchanged`` and ``angle_unchanged`` are the times [s] for which a reading has been
+    constant; ``slow_heel``, ``slow_toe`` and ``slow_angle`` are the filtered readings.
 
-    Only time in which another sensor moves, or the wearer steps, counts as time in which one stayed the same; for the
-    angle only since the strike before, for a foot that hangs or sits may show one angle for long.
+    A time counts only while another sensor changes or the wearer steps. The angle is counted from the previous strike
+    only, because a hanging or sitting foot may have a constant angle for long.
     """
 
     heel_force: float = 0.0
@@ -121,10 +122,12 @@ class LastReadings(NamedTuple):
 
 
 class LandingCheck(NamedTuple):
-    """Lowest ankle angle of this swing, or since the strike [rad]; highest after it, which fades; strikes in doubt.
+    """Check of the landing against delayed forces.
 
-    ``in_doubt`` is the angle of a strike [rad], 0 where the foot lands in time; ``late`` are late ones in a row, and
-    ``late_toes`` push-offs in a row at whose end the foot had turned down as it does in the air only.
+    ``lowest`` is the lowest ankle angle of this swing, or since the strike [rad]; ``highest`` is the highest angle
+    after that, which decays with time [rad]. ``in_doubt`` is the angle at a doubtful strike [rad], 0 for a timely one;
+    ``late`` is the number of consecutive late strikes. ``late_toes`` is the number of consecutive push-offs at whose
+    end the foot had turned down as only a foot in the air does.
     """
 
     lowest: float = 0.0
@@ -135,7 +138,7 @@ class LandingCheck(NamedTuple):
 
 
 class Emptying(NamedTuple):
-    """Lowest pressure of chamber 2 since it was joined to the atmosphere [Pa], angle then [rad], how long above [s]."""
+    """Lowest pressure of chamber 2 while vented [Pa], ankle angle at this pressure [rad], duration of a rise [s]."""
 
     lowest: float = 0.0
     angle: float = 0.0
@@ -143,23 +146,23 @@ class Emptying(NamedTuple):
 
 
 SLOW_TIME = 0.08
-"""Time constant [s] of the slow readings: a step has faded from them when a sensor counts as frozen."""
+"""Time constant [s] of the filtered readings: a step has decayed in them when a sensor counts as frozen."""
 
 MOVES, TURNS = 40.0, 0.04
-"""A force [N] and an angle [rad] move that are further than this from their slow reading: more than in standing."""
+"""Deviations of a force [N] and an angle [rad] from their filtered readings that count as motion, beyond standing."""
 
 IN_TIME = 0.06
 """Angle [rad] below ``highest_toe_off_angle``, 3.4 deg, up to which toes that are seen to leave the ground do so in
 time: between both nothing is known. A dropped foot that nobody pushes turns down in the air too, but more slowly."""
 
 GONE = 0.1
-"""Residual of a force that is lost, as a fraction of ``largest_drop``."""
+"""Residual force after a loss of the signal, as a fraction of ``largest_drop``."""
 
 QUICK_PERIOD = 0.005
-"""Sample period [s] above which a force may be gone within a sample: toes leave the ground in some 0.1 s."""
+"""Sample period [s] above which a force may vanish within one sample: toes leave the ground in about 0.1 s."""
 
 SQUEEZING_ANGLE = 2.09
-"""Ankle angle [rad] from which a foot may squeeze a full chamber 2 to any pressure: 30 deg in plantarflexion."""
+"""Ankle angle [rad] above which a foot may compress a full chamber 2 to any pressure: 30 deg in plantarflexion."""
 
 TURNED_UP = 0.05
 """Angle [rad] by which a foot has turned up when a strike is seen that is in doubt, 2.9 deg, less what fades of it.
@@ -178,22 +181,22 @@ One that is still lifted as it strikes turns up first, and then down: by more th
 """
 
 LATE_STRIDES = 1.5
-"""More strides in a row than this are late: the last step of a walk may be flat too."""
+"""Largest number of consecutive doubtful strides without a fault: the last step of a walk may be flat too."""
 
 RISES, LASTS = 1.2e4, 2.5e-3
-"""Pressure [Pa], more than one step of a converter of 1 psi, and time [s], of a rise that is not noise."""
+"""Pressure rise [Pa], larger than one converter step of 1 psi, and duration [s], beyond noise."""
 
 SHOWN = 0.1
-"""Time [s] after ``follow_time`` in which a vented chamber is watched: a foot that then moves pumps gas about."""
+"""Time [s] after ``follow_time`` in which a vented chamber is checked: a foot that moves later displaces gas."""
 
 COMPRESSES = 0.02
-"""Angle in plantarflexion [rad] from which the ankle compresses chamber 2 by enough to raise its pressure."""
+"""Change of angle in plantarflexion [rad] above which the ankle compresses chamber 2 enough to raise its pressure."""
 
 THIN, THIN_TIME = 6.0e4, 0.12
-"""Pressure [Pa] below which no chamber stays for longer than this time [s]: a moving foot may lower one so for less."""
+"""Pressure [Pa] below which no chamber stays longer than the time [s]; a moving foot may lower it for less."""
 
 FALL_TIME = 0.1
-"""Time constant [s] of the slow pressures, which tell whether a reading falls."""
+"""Time constant [s] of the filtered pressures that detect a falling reading."""
 
 FALLS = 0.03
 """A reading falls that is below the slow one by more than this fraction: a venting chamber at 140 kPa by 0.3, and one
@@ -204,24 +207,24 @@ DWELLS, TURNS_BACK = 0.235, 0.35
 stride the first one is ``frozen_time``, and slow strides turn back slowly."""
 
 LANDS = 0.3
-"""Fraction of the stride after heel strike that counts as stepping; later the wearer may stand on the heel."""
+"""Fraction of the stride after heel strike in which the wearer steps; later the wearer may stand on the heel."""
 
 MOST = 0.75
 """Fraction of a stride after which an angle has been the same for all of it, less where nothing else moved."""
 
 HALF = 0.5
-"""A stride of less than this fraction of the stride time, or of more than its inverse, is not a good one."""
+"""Smallest ratio of a good stride to the stride time; the inverse is the largest ratio."""
 
 
 def time_unchanged(last: float, reading: float, since: float, moves: bool, period: float) -> float:
-    """Time for which a reading has been bitwise constant [s] while another quantity ``moves``."""
+    """Time for which a reading has been bitwise constant [s], counted while another quantity ``moves``."""
     # Equal to the last bit: a live sensor has noise, or at least moves by a step.
     kept = since + period if moves else since
     return kept if reading == last else 0.0
 
 
 def slow_reading(last: float, reading: float, is_first: bool, period: float) -> float:
-    """A reading filtered with ``SLOW_TIME``, in its unit; the first one counts at once."""
+    """Reading filtered with ``SLOW_TIME``, in the unit of the reading; the first reading initialises the filter."""
     followed = last + (reading - last) * period / (period + SLOW_TIME)
     return reading if is_first else followed
 
@@ -229,11 +232,11 @@ def slow_reading(last: float, reading: float, is_first: bool, period: float) -> 
 def next_readings(
     last: LastReadings, measurement: GaitMeasurement, before: PhaseState, phase: PhaseState, period: float
 ) -> LastReadings:
-    """The last readings after a sample, taken every ``period`` [s]; ``before`` and ``phase`` are its phases.
+    """Last readings after a sample of ``period`` [s]; ``before`` and ``phase`` are the phases around the sample.
 
-    In standing with heel and toes on the ground no sensor moves, and the steps of a converter then keep a reading
-    for long: a sensor is still only while another one moves. On the toes alone nobody stands still, and nobody lands
-    for long; on the heel alone somebody stands whose toes the device holds up.
+    A sensor counts as frozen only while another sensor changes: in standing with heel and toes on the ground no sensor
+    changes, and the resolution of a converter keeps a reading constant for long. Nobody stands still on the toes alone,
+    or lands for long; a wearer whose toes are lifted by the device may stand on the heel alone.
     """
     # An ankle at exactly 0 rad does not occur: 0 marks that nothing was read yet.
     is_first = last.angle == 0.0
@@ -270,7 +273,7 @@ def next_readings(
 
 
 def range_flag(rules: SafetyRules, measurement: GaitMeasurement, thin: float) -> float:
-    """The fault flag of a reading that no foot and no chamber gives; one is thin for a time [s]."""
+    """Fault flag of a reading outside of its physical range; a pressure has been too low for the time ``thin`` [s]."""
     force = max(measurement.heel_force, measurement.toe_force) > rules.largest_force
     force = force | (min(measurement.heel_force, measurement.toe_force) < rules.lowest_force)
     angle = (measurement.angle < rules.lowest_angle) | (measurement.angle > rules.highest_angle)
@@ -283,21 +286,21 @@ def range_flag(rules: SafetyRules, measurement: GaitMeasurement, thin: float) ->
 
 
 def is_gone(rules: SafetyRules, last: float, force: float) -> bool:
-    """True where a force [N] was large one sample ago and is nearly none now."""
+    """Return whether a force [N] was large at the previous sample and is nearly zero now."""
     return (last > rules.largest_drop) & (force < GONE * rules.largest_drop)
 
 
 def gone_flag(rules: SafetyRules, last: LastReadings, measurement: GaitMeasurement, period: float) -> float:
-    """The fault flag of a loose contact: a foot takes many samples of ``period`` [s] to leave the ground."""
+    """Fault flag of a loose contact: a foot takes many samples of ``period`` [s] to leave the ground."""
     gone = is_gone(rules, last.heel_force, measurement.heel_force)
     gone = gone | is_gone(rules, last.toe_force, measurement.toe_force)
     return raised(FORCE_GONE, gone & (period < QUICK_PERIOD))
 
 
 def still_flag(rules: SafetyRules, readings: LastReadings, before: PhaseState, phase: PhaseState) -> float:
-    """The fault flag of a reading that does not change while another sensor moves; frozen where that shows a step.
+    """Fault flag of a reading that is constant while another sensor changes, or while the others show a step (frozen).
 
-    An unloaded force sensor shows the same for long, and so does the angle of a lifted foot.
+    An unloaded force sensor is constant for long, as is the angle of a lifted foot.
     """
     longest = max(rules.frozen_time, DWELLS * phase.stride_time)
     heel = (readings.heel_unchanged > longest) & (phase.heel.loaded > 0.5)
@@ -325,10 +328,10 @@ def next_landing(
     steady: float,
     period: float,
 ) -> LandingCheck:
-    """The landing after a sample of ``period`` [s].
+    """Landing check after a sample of ``period`` [s].
 
-    A strike is in doubt where the foot has turned up already, in a ``steady`` walk (1).
-    A foot that is lifted turns up in the air too, but down again on its heel.
+    In a ``steady`` walk (1) a strike is doubtful if the foot has already turned up at the strike. A lifted foot also
+    turns up in the air, but turns down again on its heel.
     """
     angle, swings = readings.angle, phase.phase == SWING
     # Lowest and highest begin anew with each swing and each stance.
@@ -357,14 +360,14 @@ def next_landing(
 
 
 def next_slow_pressure(last: float, pressure: float, period: float) -> float:
-    """Slow pressure [Pa] after a sample, taken every ``period`` [s]."""
+    """Filtered pressure [Pa] after a sample taken every ``period`` [s]."""
     return last + (pressure - last) * period / (period + FALL_TIME)
 
 
 def holds_pressure(rules: SafetyRules, pressure: float, expected: float, slow: float) -> bool:
-    """True where a vented chamber shows a pressure [Pa] that does not fall, and which its gas is not expected to have.
+    """Return whether a vented chamber shows a pressure [Pa] that does not fall and exceeds the expected pressure.
 
-    The ankle compresses the gas of a vented chamber, which then shows that pressure for as long as it flows out.
+    The ankle compresses the gas of a vented chamber, which keeps that pressure until the gas has flowed out.
     """
     # The ankle may compress what is left: only pressure beyond the expected counts.
     gauge = max(expected - rules.nominal.nominal_atmospheric_pressure, 0.0)
@@ -375,9 +378,9 @@ def holds_pressure(rules: SafetyRules, pressure: float, expected: float, slow: f
 def next_emptying(
     rules: SafetyRules, last: Emptying, vented: float, measurement: GaitMeasurement, period: float
 ) -> Emptying:
-    """Chamber 2 after a sample of ``period`` [s], joined to the atmosphere for ``vented`` [s].
+    """Check of chamber 2 after a sample of ``period`` [s], vented for the time ``vented`` [s].
 
-    It has no source then, and only the ankle could compress it: a pressure that rises shows what was before.
+    A vented chamber has no source, and only the ankle could compress it: a rising pressure is an old reading.
     """
     pressure, angle = measurement.pressure_2, measurement.angle
     lower = (vented <= rules.follow_time) | (pressure < last.lowest)

@@ -1,8 +1,8 @@
-"""Fault flags of a controller of walking: one table of their names, levels of help, causes, readings and settings.
+"""Fault flags of a walking controller: one table of names, assistance levels, causes, readings and settings.
 
-A flag reduces help to lifting, pauses it or stops it. Where the heel is missed the foot is still lifted in the swing,
-but not pushed. A pause vents both chambers and is for readings that walking can cause too: help comes back after some
-good strides. A stop is permanent, for what only a fault causes.
+A flag reduces the assistance to lifting, pauses it or stops it. If the heel is not detected, the foot is still lifted
+in the swing, but not pushed. A pause vents both chambers and is for readings that walking can cause too: assistance
+resumes after some good strides. A stop is permanent, for readings that only a fault causes.
 
 A flag is a number in the state of a run, in order of urgency: first the flags that stop, then pause, then lift.
 """
@@ -18,7 +18,7 @@ SEEN = ("nominal_flow", "nominal_supply_pressure")
 
 @dataclass(frozen=True, slots=True)
 class FaultFlag:
-    """Fault flag: its name, the assistance level that it requests, its cause, and the readings and settings used."""
+    """Fault flag: name, requested assistance level, cause, and the readings and settings that the check uses."""
 
     name: str
     level: float
@@ -29,7 +29,7 @@ class FaultFlag:
 
 NO_FLAG = 0.0
 NOT_RAISED = 1.0e3
-"""Number beyond every flag: the least of several checks is the flag that comes first."""
+"""Number larger than every flag: the smallest result of several checks is the most urgent flag."""
 
 FAULT_FLAGS = {
     (FORCE_RANGE := 1.0): FaultFlag(
@@ -156,7 +156,7 @@ FAULT_FLAGS = {
         ("highest_toe_off_angle",),
     ),
 }
-"""Every fault flag by its number, which has a name of its own for the functions that set it."""
+"""Fault flags by number; each number has a constant for the functions that raise the flag."""
 
 # Levels from the order of the numbers: a comparison in vector code instead of a table.
 _LAST_STOP = max(number for number, flag in FAULT_FLAGS.items() if flag.level == STOPPED)
@@ -164,12 +164,12 @@ _FIRST_LIFT = min(number for number, flag in FAULT_FLAGS.items() if flag.level =
 
 
 def level_of(flag: float) -> float:
-    """The level that a fault flag asks for: ``HELPS`` without one, ``STOPPED``, ``PAUSED`` or ``LIFTS``."""
+    """Assistance level requested by a fault flag: ``HELPS`` without a flag, ``STOPPED``, ``PAUSED`` or ``LIFTS``."""
     level = LIFTS if flag >= _FIRST_LIFT else PAUSED
     level = STOPPED if flag <= _LAST_STOP else level
     return level if flag > NO_FLAG else HELPS
 
 
 def raised(flag: float, is_contradicted: bool) -> float:
-    """A flag where its check is contradicted, else ``NOT_RAISED``: the least of several is the most urgent one."""
+    """Return the flag if its check is contradicted, else ``NOT_RAISED``; the smallest flag is the most urgent."""
     return flag if is_contradicted else NOT_RAISED

@@ -1,7 +1,7 @@
-"""The frame in which a torque law walks, one for all laws.
+"""Common frame of all torque laws in walking.
 
-The phases of the gait say which torque is requested, safety watches, the law follows the request. What differs is data:
-the law, and what it remembers where another task of the gait begins.
+The gait phase determines the requested torque, safety checks supervise, and the law tracks the request. Walking torque
+laws differ only in the law and in its state after a change of task.
 """
 
 import functools
@@ -24,7 +24,7 @@ from ppafo.model.sensors import GaitMeasurement, Measurement
 
 
 class LawParameters(NamedTuple):
-    """The law, what is requested, rules of phases, safety and timing; ``row_with`` makes one for each law."""
+    """Parameters of law, assistance, phases, safety and timing; ``row_with`` makes a class for each law."""
 
     law: Any
     assistance: Assistance
@@ -34,7 +34,7 @@ class LawParameters(NamedTuple):
 
 
 class LawState(NamedTuple):
-    """Phase, clock, safety, the requested torque, and the state of the law; ``row_with`` makes one for each law."""
+    """Phase, clock, safety, torque request, and state of the law; ``row_with`` makes a class for each law."""
 
     phase: PhaseState
     clock: Any
@@ -44,10 +44,10 @@ class LawState(NamedTuple):
 
 
 class WalkingParts(NamedTuple):
-    """Parts of a torque law that walks: functions of its timing, the class of the state, and the law.
+    """Parts of a walking torque law: functions of the timing, class of the state, and functions of the law.
 
-    ``update`` gives command [-] and next state, ``restart(state, requested, continues)`` the state at a requested
-    torque [N m] where another task may begin (``continues`` 0).
+    ``update`` returns command [-] and next state. ``restart(state, requested, continues)`` returns the state at a
+    requested torque [N m]; ``continues`` is 0 where another task starts.
     """
 
     timing: TimingParts
@@ -57,18 +57,18 @@ class WalkingParts(NamedTuple):
 
 
 class InitialStateParts(NamedTuple):
-    """State of a law at its start."""
+    """Initial state of a law."""
 
     start: Any
 
 
 def restart_anew(state: Any, requested: float, continues: float, *, parts: InitialStateParts) -> Any:
-    """The state of a law that starts again where another task begins (``continues`` 0, else 1)."""
+    """State of a law that is reset where another task starts (``continues`` 0, else 1)."""
     return state if continues > 0.5 else parts.start
 
 
 def keep_state(state: Any, requested: float, continues: float) -> Any:
-    """The state of a law that has no memory, and so nothing to reset."""
+    """Unchanged state of a law without memory."""
     return state
 
 
@@ -101,15 +101,15 @@ def law_that_walks_update(
 
 
 def shared_settings(law: ControllerKind) -> set[str]:
-    """Return the settings of a torque law whose names every controller of walking has, too."""
+    """Return the settings of a torque law whose names are also used by every controller of walking."""
     return {quantity.name for quantity in law.quantities} & {quantity.name for quantity in ASSISTING_QUANTITIES}
 
 
 @functools.cache
 def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
-    """Return a torque law in this frame as a controller of walking, with a name and a summary of its own.
+    """Return a torque law in this frame as a controller of walking, with the given name and summary.
 
-    ScenarioError where a setting of the law has the name of one of walking.
+    Raises ScenarioError if a setting of the law has the name of a setting of walking.
     """
     shared = shared_settings(law)
     # Settings of law and frame stand in one section of a file, where a name can mean only one thing.

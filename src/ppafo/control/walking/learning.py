@@ -1,13 +1,13 @@
-"""A table of commands over the push-off that is learnt from stride to stride, while walking.
+"""Table of commands over the push-off, learnt from stride to stride while walking.
 
 The law of Zhang, Cheah and Collins (2015) for a knot of the table, from one stride n to the next:
 
     table_{n+1} = (1 - forgetting) table_n + gain e_n
 
-Here e_n is the mean torque error over the time of the knot, which takes the place of their filter over strides, and
-the table is read a lead earlier than it was learnt, because the torque follows a command late. The knots learn while
-the stride passes over them, so no stride has to be kept; they are written out one by one, which in the lanes is one
-straight line of arithmetic for all runs at once.
+Here e_n is the mean torque error over the time of the knot, which replaces their filter over strides. The table is
+read a lead earlier than it was learnt, because the torque lags behind the command. Knots learn while the stride passes
+over them, so that no stride has to be stored. The knots are written out one by one, so that all runs are computed
+without branches.
 """
 
 from typing import Annotated, NamedTuple
@@ -52,17 +52,17 @@ class LearningRules(NamedTuple):
 
 
 Knots = Annotated[tuple[float, ...], KNOTS]
-"""Learnt commands [-] at knots that lie evenly from the beginning to the end of the torque profile."""
+"""Learnt commands [-] at knots spaced evenly from start to end of the torque profile."""
 EMPTY = (0.0,) * KNOTS
 
 
 def near(place: float, knot: float) -> float:
-    """Weight [-] of a knot at a place, both counted in knots: 1 at the knot, falling to 0 at its neighbours."""
+    """Weight [-] of a knot at a position, both in knots: 1 at the knot, decreasing linearly to 0 at its neighbours."""
     return max(0.0, 1.0 - abs(place - knot))
 
 
 def command_at(table: Knots, place: float) -> float:
-    """Command [-] at a place counted in knots: straight between knots, 0 outside of the table."""
+    """Command [-] at a position in knots: linear between knots, 0 outside of the table."""
     command = table[0] * near(place, 0.0)
     for knot in range(1, KNOTS):
         command = command + table[knot] * near(place, float(knot))
@@ -70,13 +70,13 @@ def command_at(table: Knots, place: float) -> float:
 
 
 def next_knot(knot: float, weight: float, step: float, forgetting: float) -> float:
-    """Command [-] of a knot after a sample of some weight: forgotten a little, moved by a step, within -1 to 1."""
+    """Command [-] of a knot after a weighted sample: reduced by forgetting, changed by a step, within -1 to 1."""
     # No command is larger, and a knot beyond it would take strides to come back.
     return max(-1.0, min(1.0, knot + weight * (step - forgetting * knot)))
 
 
 def place_in_table(profile: TorqueProfile, since_strike: float, stride_time: float) -> float:
-    """Place in the table, counted in knots, at a time since the heel strike in a stride of some length, both [s]."""
+    """Position in the table, in knots, for a time since the heel strike and a stride time, both [s]."""
     begun = since_strike / stride_time - profile.peak_time + profile.rise_time
     return begun / (profile.rise_time + profile.fall_time) * (KNOTS - 1.0)
 
@@ -90,9 +90,9 @@ def learn(
     error: float,
     duration: float,
 ) -> Knots:
-    """The table after a sample with a torque error [N m] that lasted ``duration`` [s], 0 where nothing is learnt.
+    """Table after a sample with a torque error [N m] of a duration [s]; a duration of 0 changes nothing.
 
-    While a stride passes over a knot, the weights of its samples add up to 1.
+    The weights of the samples of one stride add up to 1 at each knot.
     """
     # A sample counts by its share of the time that the stride spends on a knot.
     knot_time = (profile.rise_time + profile.fall_time) * stride_time / (KNOTS - 1.0)
@@ -102,9 +102,9 @@ def learn(
 
 
 def next_table(table: Knots, place: float, weight: float, step: float, forgetting: float) -> Knots:
-    """The table after a sample at a place, counted in knots.
+    """Table after a sample at a position in knots.
 
-    The two knots beside the place move, each by its part of the sample's ``weight`` [-] and of ``step`` [-].
+    The two neighbouring knots change, each by its part of the sample's ``weight`` [-] and of ``step`` [-].
     """
     return (
         next_knot(table[0], near(place, 0.0) * weight, step, forgetting),
@@ -127,7 +127,7 @@ def next_table(table: Knots, place: float, weight: float, step: float, forgettin
 
 
 class EventDampedLearningParameters(NamedTuple):
-    """Gains of law and learning, believed dead band [-], requested torque, rules of phases, safety and timing."""
+    """Gains of law and learning, assumed dead band [-], assistance, and rules of phases, safety and timing."""
 
     law: DampedGains
     learning: LearningRules
@@ -139,7 +139,7 @@ class EventDampedLearningParameters(NamedTuple):
 
 
 class EventDampedLearningState(NamedTuple):
-    """Phase, clock, safety, the requested torque, the torque's course, and what was learnt."""
+    """Phase, clock, safety, torque request, state of the torque law, and learnt table."""
 
     phase: PhaseState = PhaseState()
     clock: EmptyRow = EmptyRow()

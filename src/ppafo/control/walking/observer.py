@@ -1,16 +1,18 @@
 """Observer of the chamber contents from command, measured angle and nominal device, and the contradictions it finds.
 
-The gas content of a chamber is p V, its mass times R T, which no movement of the ankle changes: a residual in pressure
-would grow without bounds where a foot squeezes a chamber at its stop, the gas content stays. So from sample to sample
+The gas content of a chamber is p V, its mass times R T, which no movement of the ankle changes. The residual is formed
+in gas content: a residual in pressure would grow without bounds where a foot compresses a chamber at its stop. From
+sample to sample
 
-    content += residual h / ``FORGETS`` + flow h,    residual = (pressure shown - pressure expected) V
+    content += residual h / ``FORGETS`` + flow h,    residual = (measured pressure - expected pressure) V
 
-and the flow is the nominal valve's at the pressure *expected*, for an offset of a sensor would add up in it. An
-alarm is a residual beyond what devices, sensors and heat explain: a share of the gas that has passed lately, and an
-error of pressure and angle in a mean volume. Its sign names the likely cause: whether gas comes or goes, and where the
-valve is. A valve and a pressure sensor cannot be told apart at that moment, and both stop the device.
+and the flow is the flow of the nominal valve at the *expected* pressure, because the offset of a sensor would
+accumulate in it. An alarm is a residual larger than devices, sensors and heat explain: a fraction of the gas that has
+passed lately, and an error of pressure and angle in a mean volume. The sign of the residual and the state of the valve
+indicate the likely cause. A fault of a valve and a fault of a pressure sensor cannot be distinguished at that moment,
+and both stop the device.
 
-Every number is a setting whose default follows the device; ``nominal_flow`` 0 switches the observer off.
+Every parameter is a setting whose default follows the device; ``nominal_flow`` 0 switches the observer off.
 """
 
 import math
@@ -35,7 +37,7 @@ _CHAMBERS = {
     "dead_volume_1": "chamber_rest_1",
     "dead_volume_2": "chamber_rest_2",
 }
-"""Settings of both chambers for the observer; a torque law knows a vane by its mean chamber only."""
+"""Settings of both chambers for the observer; a torque law uses one mean chamber only."""
 
 
 def _nominal(name: str, unit: str, summary: str, maximum: float, lowest: float = 0.0) -> Quantity:
@@ -52,14 +54,13 @@ _JOINING = "time for which the chambers are joined after chamber 1 was fed"
 
 
 class NominalDevice(NamedTuple):
-    """The device that the observer believes in, SI units; absolute pressures.
+    """Nominal device of the observer, SI units; absolute pressures.
 
-    ``nominal_flow`` is R T times the valve's conductance [m^3/s]: content that a choked flow moves in a second, over
-    the pressure before it. ``nominal_pair`` is 1 for on/off valves that vent where they do not feed, else 0: a spool
-    with a vent valve, which both follow their command after ``nominal_delay``, the spool with ``nominal_lag`` beyond
-    ``nominal_dead_band``.
-    ``nominal_joining_time`` is how long both chambers are joined after chamber 1 was fed. ``nominal_lines`` count gas
-    as its content p V [J]; a volume of 0 stands for a supply that needs none.
+    ``nominal_flow`` is R T times the valve's conductance [m^3/s]: gas content per second of a choked flow, divided by
+    the upstream pressure. ``nominal_pair`` is 1 for on/off valves that vent while not energised, else 0: a spool with a
+    vent valve. Both follow their command after ``nominal_delay``, the spool with ``nominal_lag`` and beyond
+    ``nominal_dead_band``. ``nominal_joining_time`` is the time for which both chambers are joined after chamber 1 was
+    fed. ``nominal_lines`` count gas by its content p V [J]; a volume of 0 stands for a supply without lines.
     """
 
     nominal_flow: Annotated[float, _nominal("flow", "m^3/s", _FLOW, 1.0)]
@@ -124,7 +125,7 @@ class ObservedValve(NamedTuple):
 
 
 class CommandInTransit(NamedTuple):
-    """A command on its way to a spool or a vent valve [-], a third of the dead time behind it each."""
+    """Command on its way to a spool or a vent valve [-], after one, two and three thirds of the dead time."""
 
     first: float = 0.0
     second: float = 0.0
@@ -132,10 +133,12 @@ class CommandInTransit(NamedTuple):
 
 
 class ObservedChamber(NamedTuple):
-    """Content p V [J], pressure expected of its sensor [Pa], gas that passed lately [J], time of an alarm [s].
+    """Estimated gas of a chamber.
 
-    ``least`` [J] is the content measured when the chamber was connected to its supply, or the lowest one since it is no
-    longer: the lowest of many noisy readings would show gas that never came.
+    ``content`` p V [J], expected sensor ``pressure`` [Pa], gas ``passed`` lately [J], and duration ``contrary`` of an
+    alarm [s]. ``least`` [J] is the measured content when the chamber was connected to its supply, or the lowest
+    measured content since the supply was disconnected. While fed the minimum is not used: with noise it would indicate
+    gas that never came.
     """
 
     content: float = 0.0
@@ -146,9 +149,12 @@ class ObservedChamber(NamedTuple):
 
 
 class Observer(NamedTuple):
-    """Both chambers; the command in force; what the valve is believed to do; how long chambers are joined yet [s].
+    """Estimated state of both chambers, the valve and the lines.
 
-    ``lines`` are the gas contents [J] of the lines behind regulators.
+    ``command`` [-] is the present command. ``coil_1`` and ``coil_2`` are the on/off valves, ``on_the_way`` and
+    ``venting`` the commands to the spool and the vent valve in transit, and ``spool`` is the estimated opening [-].
+    ``joined`` [s] is the remaining time for which the chambers are joined. ``lines`` are the gas contents [J] of the
+    lines downstream of the regulators.
     """
 
     chamber_1: ObservedChamber = ObservedChamber()
@@ -166,42 +172,43 @@ class Observer(NamedTuple):
 START = Observer()
 
 FORGETS = 0.128
-"""Time [s] in which contents follow what is measured, and gas that has passed is forgotten."""
+"""Time constant [s] with which the contents follow the measurement and passed gas is forgotten."""
 
 WARM = 1.1
-"""Flow over isothermal flow: between isothermal gas and gas without walls."""
+"""Flow divided by isothermal flow: between isothermal and adiabatic gas."""
 
 OF_PASSED, KEPT = 0.5, 0.375
-"""Parts of the gas that has passed lately which errors of area, dead volume, supply and heat explain, and of it what a
-chamber that is not fed may have kept.
+"""Fractions of the gas passed lately that errors of area, dead volume, supply and heat explain, and that a chamber may
+have kept while not fed.
 
-A tenth of area, a twentieth of supply and heat are a quarter; a dead volume twice what is believed halves the pressure
-that gas gives, and one of half of it raises it by half, in vanes whose dead volume is three quarters of the mean one.
-A chamber that does not vent at all keeps 0.6 of what passed lately, for what is believed follows the sensor.
+A tenth of area and a twentieth each of supply and heat add up to a quarter. A dead volume twice the nominal one halves
+the pressure that gas gives, and half the nominal one raises it by half, in vanes whose dead volume is three quarters of
+the mean volume. A chamber that does not vent at all keeps 0.6 of the gas passed lately, because the estimate follows
+the sensor.
 """
 
 OFFSET, OF_PRESSURE, OF_ANGLE = 1.2e4, 0.05, 0.035
-"""Tolerances: pressure by offset and noise [Pa], by a regulator [fraction], angle for the volume [rad], 2 deg."""
+"""Tolerances: pressure offset and noise [Pa], relative regulator error [-], angle error for the volume [rad], 2 deg."""
 
 ALARM_TIME, ALARM_SAMPLES = 5.0e-3, 5.0
-"""Time [s], and samples, that a residual lasts before it counts."""
+"""Smallest duration of an alarm, in time [s] and in samples, before it counts."""
 
 LINEAR_RATIO = 0.95
-"""Pressure ratio above which the flow falls along a straight line."""
+"""Pressure ratio above which the flow function is a straight line to zero."""
 
 TINY = 1.0e-12
-"""A volume [m^3] and a droop that stand for none."""
+"""Replacement for a volume [m^3] and a droop of 0, which avoids a division by 0."""
 
 SAME = 1.0e-6
-"""Times [s] closer to each other than this are one."""
+"""Times [s] that differ by less than this are equal."""
 
 
 def flow_into(nominal: NominalDevice, pressure: float, node: float, is_relieving: float) -> float:
-    """Content [J/s] that enters a chamber at ``pressure`` from a node [Pa] through the open valve; below 0 it leaves.
+    """Flow of gas content [J/s] into a chamber at ``pressure`` from a node [Pa] through the open valve.
 
-    No gas flows back into a node with ``is_relieving`` 0. Equations (6), (7), with the flow function of ISO 6358-1:2013
-    at a pressure ratio r and the critical one b: psi(r) = sqrt(1 - ((r - b) / (1 - b))^2), 1 below b, and a straight
-    line to 0 at r = 1 above ``LINEAR_RATIO``.
+    A flow out of the chamber is negative. No gas flows back into a node with ``is_relieving`` 0. Equations (6), (7),
+    with the flow function of ISO 6358-1:2013 at a pressure ratio r and the critical ratio b:
+    psi(r) = sqrt(1 - ((r - b) / (1 - b))^2), 1 below b, and a straight line to 0 at r = 1 above ``LINEAR_RATIO``.
     """
     upstream = max(pressure, node)
     ratio, critical = min(pressure, node) / upstream, nominal.nominal_critical_ratio
@@ -212,7 +219,7 @@ def flow_into(nominal: NominalDevice, pressure: float, node: float, is_relieving
 
 
 def next_coil(nominal: NominalDevice, coil: ObservedValve, wanted: float, period: float) -> tuple[ObservedValve, float]:
-    """A coil after a sample [s] in which it was ordered to be at ``wanted``, and its mean position [-] in that time."""
+    """Coil after a sample [s] with the commanded position ``wanted``, and its mean position [-] in the sample."""
     accepts = (wanted != coil.target) & (coil.since >= nominal.nominal_switching_interval - SAME)
     delay = nominal.nominal_opening_delay if wanted > 0.5 else nominal.nominal_closing_delay
     target = wanted if accepts else coil.target
@@ -230,9 +237,9 @@ def next_coil(nominal: NominalDevice, coil: ObservedValve, wanted: float, period
 def next_on_the_way(
     nominal: NominalDevice, on_the_way: CommandInTransit, target: float, period: float
 ) -> CommandInTransit:
-    """A command on its way after a sample [s] with a ``target`` [-]: three lags, which together last the dead time.
+    """Command in transit after a sample [s] with a ``target`` [-]: three first-order lags that add up to the dead time.
 
-    So the gas that passes is right in the mean; a line of all samples of a dead time would have no end.
+    The mean flow is then correct, without a buffer for all samples of the dead time.
     """
     share = period / (period + nominal.nominal_delay / 3.0)
     first = on_the_way.first + (target - on_the_way.first) * share
@@ -250,10 +257,10 @@ def contradiction(
     fed: bool,
     supply: float,
 ) -> float:
-    """Residual of a chamber over what devices, sensors and heat explain [-]: above 1 too much gas, below -1 too little.
+    """Residual of a chamber divided by its tolerance [-]: above 1 there is too much gas, below -1 too little.
 
-    ``passed`` is the gas of the last seconds [J]; volumes [m^3] are present and mean ones, pressures [Pa] are measured,
-    expected, and of the ``supply``, which counts where the chamber is ``fed``.
+    ``passed`` is the gas passed lately [J]; ``volume`` and ``mean_volume`` [m^3] are the present and the mean volume.
+    The pressures [Pa] are measured, expected, and of the ``supply``, which matters only while the chamber is ``fed``.
     """
     at_rest = mean_volume * (OFFSET + OF_PRESSURE * abs(measured))
     at_rest = at_rest + OF_ANGLE * nominal.nominal_displacement_per_radian * abs(measured)
@@ -280,11 +287,12 @@ def next_chamber(
     blind: bool,
     period: float,
 ) -> tuple[ObservedChamber, float]:
-    """A chamber after a sample [s], by the gas that passes and then by a reading [Pa]; and what it took [J].
+    """Chamber after a sample [s], updated by the flow and then by a reading [Pa]; and gas taken from the supply [J].
 
-    ``source`` and ``vent`` [-] are the openings to a supply with a pressure [Pa], ``set_pressure`` by its regulator,
-    and to the atmosphere; ``was_fed`` before. Volumes [m^3] are those of the last reading [Pa] and of this one, and the
-    mean one. ``blind`` is True where the content is taken from the sensor: at first, and while the chambers are joined.
+    ``source`` and ``vent`` [-] are the openings to the supply and to the atmosphere. ``supply`` is the supply pressure
+    and ``set_pressure`` the set pressure of its regulator [Pa]; ``was_fed`` is True if the supply was connected before.
+    Volumes [m^3] belong to the previous reading [Pa], to this reading, and to mid-range. ``blind`` is True where the
+    content is taken from the sensor: at the start, and while the chambers are joined.
     """
     room = nominal.nominal_atmospheric_pressure
     before = chamber.content / last_volume
@@ -328,17 +336,17 @@ def volumes(nominal: NominalDevice, angle: float) -> tuple[float, float]:
 
 
 def believed_volumes(nominal: NominalDevice, angle: float, pressure_1: float, pressure_2: float) -> tuple[float, float]:
-    """Volumes of both chambers [m^3] at a measured angle [rad] and two readings [Pa], which widen no vane.
+    """Nominal volumes of both chambers [m^3] at a measured angle [rad]; for a vane independent of the pressures [Pa].
 
-    A program with an actuator of another kind calls that kind's own chambers here.
+    A program with an actuator of another kind calls the chamber function of that kind instead.
     """
     return volumes(nominal, angle)
 
 
 def mean_volumes(nominal: NominalDevice, pressure_1: float, pressure_2: float) -> tuple[float, float]:
-    """Gas content per pressure [m^3] of both chambers in the middle of the range, at two readings [Pa].
+    """Derivative of gas content with respect to pressure [m^3] in mid-range, for both chambers at two readings [Pa].
 
-    For another kind as ``believed_volumes``: of a chamber that gives, its volume and what it gives.
+    For a vane the derivative is the volume. For another kind, as in ``believed_volumes``, it includes the compliance.
     """
     return volumes(nominal, 0.5 * (nominal.nominal_angle_min + nominal.nominal_angle_max))
 
@@ -354,7 +362,7 @@ def next_observer(
     pressure_2: float,
     period: float,
 ) -> Observer:
-    """Both chambers after a sample [s] that the command in force has lasted; readings before it and after it.
+    """Observer after a sample [s] with the present command; ``last_`` readings are before the sample.
 
     Angles [rad], absolute pressures [Pa].
     """
@@ -437,13 +445,13 @@ def next_observer(
 
 
 def is_behind_lines(nominal: NominalDevice) -> bool:
-    """True where both lines have a volume and a droop of their regulators: one without either cannot be predicted."""
+    """Return whether both lines have a volume and their regulators a droop; other lines cannot be predicted."""
     given = nominal.nominal_lines
     return min(given.volume_1, given.volume_2, given.droop_1, given.droop_2) > 0.0
 
 
 def supplied(nominal: NominalDevice, lines: LineState) -> tuple[float, float]:
-    """Absolute pressures [Pa] before the valve: of both lines, or of a supply without lines."""
+    """Absolute pressures [Pa] upstream of the valve: of both lines, or of the supplies if there are no lines."""
     first, second = max(nominal.nominal_lines.volume_1, TINY), max(nominal.nominal_lines.volume_2, TINY)
     has_lines = is_behind_lines(nominal)
     return (
@@ -453,7 +461,7 @@ def supplied(nominal: NominalDevice, lines: LineState) -> tuple[float, float]:
 
 
 def next_lines(nominal: NominalDevice, lines: LineState, taken_1: float, taken_2: float, period: float) -> LineState:
-    """Lines after a sample [s] in which the chambers took two contents [J]; as they are where there are none."""
+    """Lines after a sample [s] in which the chambers took two gas contents [J]; zero if there are no lines."""
     has_lines = is_behind_lines(nominal)
     given = nominal.nominal_lines
     real = SupplyLines(
@@ -475,20 +483,20 @@ def next_lines(nominal: NominalDevice, lines: LineState, taken_1: float, taken_2
 
 
 def is_fed(nominal: NominalDevice, coil: ObservedValve, spool: float) -> bool:
-    """True where a valve is believed to feed its chamber; ``spool`` [-] is above 0 towards it."""
+    """Return whether the valve is estimated to feed its chamber; ``spool`` [-] is positive towards the chamber."""
     return (coil.position > 0.5) if nominal.nominal_pair > 0.5 else (spool > 0.0)
 
 
 SHOWS_GAS = 0.05
-"""Part of the gas that has passed by which a content must have grown to show that some came: half of what a tenth of
-the flow gives, and several times what a hose that is open to the atmosphere shows."""
+"""Fraction of the passed gas by which a content must grow to prove an inflow: half the growth at a tenth of the flow,
+and several times the growth with a hose that is open to the atmosphere."""
 
 NEARLY_FULL = 0.8
-"""Part of the supply's pressure above which a chamber that is vented stays open to it."""
+"""Fraction of the supply pressure above which a vented chamber is still connected to the supply."""
 
 
 def has_gas(chamber: ObservedChamber, volume: float, measured: float) -> bool:
-    """True where a chamber with a reading [Pa] in its volume [m^3] shows that some gas came since it is fed."""
+    """Return whether a chamber with a reading [Pa] in its volume [m^3] has received gas since it was connected."""
     # Against the content when the feeding began: an offset of the sensor is in both.
     return measured * volume - chamber.least > SHOWS_GAS * chamber.passed
 
@@ -505,10 +513,10 @@ def cause_of(
     lost_beside: float,
     period: float,
 ) -> float:
-    """The flag of a chamber with a reading [Pa] in its volume [m^3] and a supply [Pa]; ``NOT_RAISED`` for none.
+    """Fault flag of a chamber for a reading [Pa] in its volume [m^3] and a supply pressure [Pa]; else ``NOT_RAISED``.
 
-    ``coil``, ``spool`` [-], above 0 towards the chamber, and ``venting`` [-] are its valves as they are believed.
-    ``lost_beside`` [J] is by how much the other chamber, if gas came to it, has less than expected.
+    ``coil``, ``spool`` [-], positive towards the chamber, and ``venting`` [-] are the estimated valve states.
+    ``lost_beside`` [J] is the missing gas content of the other chamber, 0 if that chamber received no gas.
     """
     fed = is_fed(nominal, coil, spool)
     vented = (coil.position < 0.5) if nominal.nominal_pair > 0.5 else ((venting > 0.5) | (spool < 0.0))
@@ -532,9 +540,9 @@ def cause_of(
 def found_cause(
     nominal: NominalDevice, state: Observer, angle: float, pressure_1: float, pressure_2: float, period: float
 ) -> float:
-    """The flag of a sample [s] with an angle [rad] and absolute pressures [Pa], of chamber 1 before chamber 2.
+    """Fault flag of a sample [s] with an angle [rad] and absolute pressures [Pa]; chamber 1 is checked first.
 
-    ``NOT_RAISED`` where there is none.
+    ``NOT_RAISED`` if no fault is found.
     """
     if nominal.nominal_flow <= 0.0:
         return NOT_RAISED

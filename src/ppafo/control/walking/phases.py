@@ -1,8 +1,9 @@
-"""Detection of the gait phase from two force sensors: heel strike, mid-stance, push-off or swing.
+"""Detection of the gait phase from two force sensors: landing, mid-stance, push-off or swing.
 
-Each sensor is loaded above one threshold and unloaded below another (hysteresis), and a change counts only when it has
-lasted (debounce). The time between two heel strikes is followed by a moving average. The push-off begins at a fraction
-of it, once the heel is off the ground, and ends at the next heel contact: a standing wearer is not pushed.
+Each sensor is loaded above one threshold and unloaded below another (hysteresis), and a change counts only after it has
+lasted for a time (debounce). The stride time between two heel strikes is a moving average. The push-off starts at a
+fraction of the stride time, once the heel is off the ground, and ends at the next heel contact: a standing wearer is
+not pushed.
 """
 
 from typing import Annotated, NamedTuple
@@ -25,14 +26,14 @@ class PhaseRules(NamedTuple):
 
 
 class DebouncedSensor(NamedTuple):
-    """A debounced force sensor: loaded (1) or not (0), and how long it has contradicted that [s]."""
+    """Debounced force sensor: loaded (1) or not (0), and time for which the reading has contradicted this state [s]."""
 
     loaded: float = 0.0
     contradicted: float = 0.0
 
 
 class PhaseState(NamedTuple):
-    """Phase, both switches, time in the phase and since the last heel strike [s], stride time [s], strikes seen."""
+    """Phase, both sensors, time in the phase and since the last heel strike [s], stride time [s], number of strikes."""
 
     phase: float = SWING
     heel: DebouncedSensor = DebouncedSensor()
@@ -47,12 +48,12 @@ START = PhaseState()
 
 
 def lifts(phase: float) -> bool:
-    """True in the swing (0) and the landing (1), in which the foot is held up. Tasks 1 and 3 of the paper."""
+    """Return whether the foot is lifted in a phase: swing (0) or landing (1). Tasks 1 and 3 of the paper."""
     return phase < 1.5
 
 
 def next_switch(rules: PhaseRules, switch: DebouncedSensor, force: float, period: float) -> DebouncedSensor:
-    """The switch after a sample of its force [N]; ``period`` [s]."""
+    """Debounced sensor after a sample of its force [N], taken every ``period`` [s]."""
     # Between both thresholds the switch stays as it is.
     indicated = 0.0 if force < rules.unload_threshold else switch.loaded
     indicated = 1.0 if force > rules.load_threshold else indicated
@@ -63,7 +64,7 @@ def next_switch(rules: PhaseRules, switch: DebouncedSensor, force: float, period
 
 
 def next_phase(rules: PhaseRules, state: PhaseState, heel: float, toe: float, passed: float) -> float:
-    """Next phase [-] from the present one and both switches (0 or 1), ``passed`` [s] after the strike."""
+    """Next phase [-] from the present phase and both sensors (0 or 1), ``passed`` [s] after the strike."""
     on_heel = heel > 0.5
     on_toe = toe > 0.5
     late = passed >= rules.push_off_start * state.stride_time
@@ -82,9 +83,9 @@ def next_phase(rules: PhaseRules, state: PhaseState, heel: float, toe: float, pa
 def timed_phase_state(
     rules: PhaseRules, state: PhaseState, heel_force: float, toe_force: float, passed: float, period: float
 ) -> PhaseState:
-    """State after a sample of both forces [N]; ``period`` [s].
+    """Phase state after a sample of both forces [N], taken every ``period`` [s].
 
-    ``passed`` is the time since the heel strike [s] by which the push-off may begin, as known apart.
+    ``passed`` is the estimated time since the heel strike [s], which decides when the push-off may start.
     """
     heel = next_switch(rules, state.heel, heel_force, period)
     toe = next_switch(rules, state.toe, toe_force, period)

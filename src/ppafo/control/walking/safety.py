@@ -1,16 +1,16 @@
-"""When a controller of walking helps less: it lifts the foot only, vents until the wearer walks well, or for good.
+"""Safety of a walking controller: reduced assistance (lifting only), pause until the wearer walks well, or final stop.
 
-Only a fault gives readings that no foot and no chamber gives (out of range, gone at once), readings that contradict the
-valve (a chamber that was filled and shows no pressure, or was vented and shows one that does not fall), and a sensor
-that stays the same while the others show a step (frozen): these stop. Sitting, stumbles and rocking also give readings
-that contradict the gait: these pause. A wearer who stands or sits is not helped, but needs no pause. A foot whose heel
-is missed may be on a stair, or have a dead sensor: it is held up in the swing, which the toes tell, and not pushed. A
-pressure at rest may stay the same for long, most of all in the steps of a converter, so a frozen pressure is found by
-the valve: no single reading is right for a filled chamber and for a vented one.
+Only a fault causes readings outside of the physical range, sudden losses of a signal, readings that contradict the
+valve (a filled chamber without pressure, or a vented chamber whose pressure does not fall), or a frozen sensor while
+the others show a step: these faults stop the device. Sitting, stumbles and rocking also cause readings that contradict
+the gait: such readings pause the device. A wearer who stands or sits is not assisted, but needs no pause. If the heel
+is not detected, the foot may be on a stair or a sensor dead: the foot is lifted in the swing, which the toes indicate,
+and not pushed. A pressure at rest may be constant for long, in particular with a coarse converter, so a frozen pressure
+sensor is found by the valve: no constant reading fits both a filled and a vented chamber.
 
-Help comes back step by step: after one good stride the foot is held up, after ``resume_strides`` it is pushed too.
+Assistance resumes in steps: after one good stride the foot is lifted, after ``resume_strides`` it is pushed too.
 
-Flags are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep runs from running side by side.
+Conditions are combined by ``&`` and ``|``: ``and`` and ``or`` are branches, which prevent vector code over runs.
 """
 
 from typing import NamedTuple
@@ -25,7 +25,7 @@ from ppafo.model.valves.kind import VENT, VENTS_ABOVE
 
 
 class ValveTimes(NamedTuple):
-    """Times for which the valve is commanded to fill chambers 1 and 2, weighted by opening, and to vent both [s]."""
+    """Times [s] of the valve command to fill chambers 1 and 2, weighted by opening, and to vent both."""
 
     filling_1: float = 0.0
     filling_2: float = 0.0
@@ -33,12 +33,14 @@ class ValveTimes(NamedTuple):
 
 
 class Stance(NamedTuple):
-    """Loading of heel and toes since the strike (1 if loaded), time with both on the ground, and with only one [s].
+    """Loading of heel and toes in the present stance.
 
-    Both times end where the other one begins; the second one ends in the swing too. ``flat_angle`` [rad] is the ankle
-    angle while the heel carried last, 0 before the first sample; ``turned`` is 1 once the ankle has left it.
-    ``largest`` [N] is the larger force at most since the strike; ``rolled`` is 1 once the toes carry what the heel no
-    longer does, which tells both sensors from each other, until the foot stands flat again.
+    ``heel_seen`` and ``toe_seen`` are 1 if the sensor was loaded since the strike. ``together`` and ``apart`` are the
+    times [s] with both loaded and with only one loaded; each ends where the other starts, ``apart`` also in the swing.
+    ``flat_angle`` [rad] is the ankle angle when the heel was last loaded, 0 before the first sample; ``turned`` is 1
+    once the ankle has left this angle. ``largest`` [N] is the larger peak force since the strike. ``rolled`` is 1 once
+    the load has moved from the heel to the toes, which proves that the sensors are distinct, until the foot is flat
+    again.
     """
 
     heel_seen: float = 0.0
@@ -52,7 +54,7 @@ class Stance(NamedTuple):
 
 
 class VentingFault(NamedTuple):
-    """The last fault flag that vented the chambers, and the readings then: forces [N], angle [rad], pressures [Pa]."""
+    """Last fault flag that vented the chambers, and the readings then: forces [N], angle [rad], pressures [Pa]."""
 
     fault_flag: float = fault_flags.NO_FLAG
     heel_force: float = 0.0
@@ -63,11 +65,13 @@ class VentingFault(NamedTuple):
 
 
 class SafetyState(NamedTuple):
-    """Level of ``fault_flags``; good strides in a row; how often help got less, and the last; what the checks remember.
+    """Safety state: assistance level, strides, last fault, and states of the checks.
 
-    ``toe_strides`` are strides in a row on the toes alone, and ``steady`` is 1 where the last stride took about the
-    stride time. ``slow_pressure_1`` and ``_2`` [Pa] are above a reading that falls; ``thin`` [s] is how long one of
-    both has been below the pressure of a chamber at rest.
+    ``level`` is the assistance level of ``fault_flags``, ``good_strides`` the number of consecutive good strides,
+    ``ventings`` the number of reductions of assistance, and ``finding`` the last one. ``toe_strides`` are consecutive
+    strides on the toes alone. ``steady`` is 1 if the last stride took about the stride time. ``slow_pressure_1`` and
+    ``slow_pressure_2`` [Pa] are filtered pressures, which exceed a falling reading. ``thin`` [s] is the time for which
+    a pressure has been below the pressure of a chamber at rest.
     """
 
     level: float = HELPS
@@ -96,35 +100,35 @@ STANDS_UP = 0.5
 """Assistance resumes after sitting once heel and toes have been loaded for this time [s]."""
 
 STEADY = 0.1
-"""A stride that is longer or shorter than the stride time by less than this fraction of it is a usual one."""
+"""Largest relative deviation of a usual stride from the stride time."""
 
 LATE = 1.3
-"""Times ``vent_time`` after which chamber 2 shows no pressure: from 90 psig it takes that time itself."""
+"""Multiple of ``vent_time`` after which chamber 2 has no pressure: from 90 psig, venting takes ``vent_time``."""
 
 RESTS = 0.05
 """Angle [rad] within which an ankle rests: sitting unloads heel and toes too, but does not turn the ankle, and a foot
 that steps has turned by more before its toes leave the ground."""
 
 ROLLS = 0.33
-"""Fraction of the largest force by which toes carry more than the heel before they leave the ground: 0.98 and more on
-recorded gaits, for the heel is off the ground by then. Two channels that read one sensor have 0, swapped ones less
-than 0, toes that show 0.8 of the heel 0.3."""
+"""Fraction of the largest force by which the toe load exceeds the heel load before the toes leave the ground: 0.98 and
+more on recorded gaits, where the heel is off the ground by then. Two channels that read one sensor give 0, swapped
+channels less than 0, and toes that read 0.8 of the heel 0.3."""
 
 CARRIES = 100.0
-"""Force [N] in a stance below which rolling is not judged: a sitting wearer's foot carries less."""
+"""Force [N] in a stance below which rolling is not checked: the foot of a sitting wearer carries less."""
 
 SITS_DOWN = 1.0
-"""Stride times after a strike from which a foot may leave the ground without rolling over its toes: its wearer sits
-down. A step begins before, and nobody sits down so soon."""
+"""Time after a strike, in stride times, from which a foot may leave the ground without rolling over its toes, when the
+wearer sits down. A step starts earlier, and nobody sits down so soon."""
 
 MINIMUM_OPENING = 0.1
-"""Commands below this may lie within the overlap of a valve: they do not count as opening it."""
+"""Commands smaller than this may lie within the overlap of a valve and do not count as an opening."""
 
 
 def next_stance(
     last: Stance, before: PhaseState, phase: PhaseState, measurement: GaitMeasurement, period: float
 ) -> Stance:
-    """The stance after a sample of ``period`` [s]; a strike begins a new one."""
+    """Stance after a sample of ``period`` [s]; a strike starts a new one."""
     angle, heel_force, toe_force = measurement.angle, measurement.heel_force, measurement.toe_force
     # A strike is known some samples late: what loads the foot before belongs to the next stance.
     swings = phase.phase == SWING
@@ -153,7 +157,7 @@ def next_stance(
 
 
 def gait_flag(rules: fault_checks.SafetyRules, before: PhaseState, phase: PhaseState, stance: Stance) -> float:
-    """The fault flag of forces that do not follow each other as in a gait, at any pace."""
+    """Fault flag of forces whose order contradicts a gait, at any pace."""
     longest = rules.longest_phase * phase.stride_time
     endless = max(phase.in_phase if phase.phase == SWING else 0.0, stance.apart) > longest
     stays = (before.phase != SWING) & (phase.phase != SWING) & (before.since_strike > longest)
@@ -172,7 +176,7 @@ def gait_flag(rules: fault_checks.SafetyRules, before: PhaseState, phase: PhaseS
 
 
 def steady_flag(rules: fault_checks.SafetyRules, before: PhaseState, phase: PhaseState, angle: float) -> float:
-    """The fault flag of forces or an angle [rad] that do not fit a stride after one that took the usual time."""
+    """Fault flag of forces or an angle [rad] that contradict a stride after one of the usual duration."""
     flat = phase.since_strike > rules.flat_from * phase.stride_time
     flat = flat & (phase.since_strike < rules.flat_to * phase.stride_time)
     enters = (before.phase == SWING) & (phase.phase != SWING)
@@ -189,13 +193,15 @@ def steady_flag(rules: fault_checks.SafetyRules, before: PhaseState, phase: Phas
 def valve_flag(
     rules: fault_checks.SafetyRules, now: SafetyState, phase: PhaseState, measurement: GaitMeasurement
 ) -> float:
-    """The flag of a pressure that is not what the valve was commanded long enough, by limits that no device decides.
+    """Fault flag of a pressure that contradicts the command of the valve, by limits that do not depend on the device.
 
-    The observer of the chambers needs but one of them, against what it expects: a pressure that a vented chamber shows.
+    With an observer of the chambers only one of these checks is needed: a vented chamber whose pressure exceeds the
+    expected one.
 
-    A foot in the air or on its toes presses gas out of a vented chamber: those are judged while it stands flat. There
-    the ankle compresses chamber 1, which may vent for longer than ``vent_time`` through a narrow valve, but does vent.
-    Chamber 2 grows then: a pressure that is still seen in it comes late. So does one that rises once it is vented.
+    A foot in the air or on its toes displaces gas from a vented chamber, so vented pressures are checked while the foot
+    is flat. There the ankle compresses chamber 1, which may vent for longer than ``vent_time`` through a narrow valve,
+    but does vent. Chamber 2 expands then: a pressure still measured in it is delayed, as is one that rises after
+    venting.
     """
     valve_times = now.valve_times
     # Filled for longer than any device needs, and still no pressure.
@@ -213,9 +219,9 @@ def valve_flag(
 
 
 def next_good_strides(state: SafetyState, before: PhaseState, phase: PhaseState, flag: float) -> float:
-    """Good strides in a row after a sample: in about the stride time, on heel and toes, without a flag.
+    """Consecutive good strides after a sample: of about the stride time, on heel and toes, without a flag.
 
-    -1 after a flag, so that the rest of its stride does not count.
+    -1 after a flag, so that the rest of the stride does not count.
     """
     enters = (before.phase == SWING) & (phase.phase != SWING)
     usual = (before.since_strike > fault_checks.HALF * phase.stride_time) & (
@@ -235,7 +241,7 @@ def next_memory(
     measurement: GaitMeasurement,
     period: float,
 ) -> SafetyState:
-    """The state with what the checks remember of a sample of ``period`` [s]; the level is as it was."""
+    """Safety state with the states of the checks after a sample of ``period`` [s]; the level is unchanged."""
     readings = fault_checks.next_readings(state.readings, measurement, before, phase, period)
     enters = (before.phase == SWING) & (phase.phase != SWING)
     on_toes = (state.stance.heel_seen < 0.5) & (before.strikes > 0.5)
@@ -277,7 +283,7 @@ def found_flag(
     measurement: GaitMeasurement,
     period: float,
 ) -> float:
-    """The most urgent fault flag of a sample; ``last`` are the readings before it, ``now`` remembers it."""
+    """Most urgent fault flag of a sample; ``last`` are the readings before the sample, ``now`` is the updated state."""
     nominal, pressure_1, pressure_2 = rules.nominal, measurement.pressure_1, measurement.pressure_2
     steady = steady_flag(rules, before, phase, measurement.angle)
     late = max(now.landing.late, now.landing.late_toes) > fault_checks.LATE_STRIDES
@@ -304,7 +310,7 @@ def monitor(
     measurement: GaitMeasurement,
     period: float,
 ) -> SafetyState:
-    """The state after a sample of ``period`` [s]; ``before`` and ``phase`` are the phases before and after it."""
+    """Safety state after a sample of ``period`` [s]; ``before`` and ``phase`` are the phases before and after."""
     now = next_memory(rules, state, before, phase, measurement, period)
     flag = found_flag(rules, state.readings, now, before, phase, measurement, period)
     good_strides = next_good_strides(state, before, phase, flag)
@@ -334,15 +340,16 @@ def monitor(
 
 
 def feed_time(since: float, opening: float, period: float) -> float:
-    """Time for which a chamber has been supplied [s], weighted by its opening; 0 if the valve does not supply it."""
+    """Time for which a chamber has been supplied [s], weighted by the opening; 0 if the valve does not supply it."""
     return since + opening * period if opening > MINIMUM_OPENING else 0.0
 
 
 def permits(state: SafetyState, phase: float) -> bool:
-    """True where the device may act in a phase.
+    """Return whether the device may act in a phase.
 
-    A push needs a heel that was loaded in this stance and has risen, and toes that carry in its place; a foot that is
-    lifted has turned and left the ground by its toes, whereas a sitting wearer's is unloaded where it stands.
+    A push requires that the heel was loaded in this stance and the load has moved to the toes. Lifting requires that
+    the ankle has turned and the foot left the ground with the toes last; the foot of a sitting wearer is unloaded in
+    place.
     """
     rolled = state.stance.rolled > 0.5
     pushes = (state.level < LIFTS) & (state.stance.heel_seen > 0.5) & rolled
@@ -351,7 +358,7 @@ def permits(state: SafetyState, phase: float) -> bool:
 
 
 def safe_command(state: SafetyState, phase: float, command: float, period: float) -> tuple[float, SafetyState]:
-    """The command to the valve [-], ``VENT`` where none is permitted, and the state that records it for a time [s]."""
+    """Valve command [-], ``VENT`` where no action is permitted, and the safety state that records it for a time [s]."""
     sent = command if permits(state, phase) else VENT
     vents = sent > VENTS_ABOVE
     # How long a chamber has been fed counts by the opening: half open takes twice as long.

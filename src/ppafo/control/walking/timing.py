@@ -1,15 +1,15 @@
-"""Gait phase: time since the detected heel strike, or a clock that is anchored anew at each event.
+"""Gait phase: time since the detected heel strike, or a clock that is corrected at each detected event.
 
-A force sensor shows an event some known time after (or, where a force fades, before) it happens: the force has to pass
-its threshold, the sensor follows late, the change has to last, samples are taken. Fractional timing takes these delays
-off. Its clock runs at the pace of recent strides, and at each detected event (heel strike, toes on the ground, heel
-off, toes off) it is anchored anew at the fraction at which that event has come in recent strides, plus its delay. So an
-event is known when the clock passes its fraction, before the sensors show it.
+A force sensor detects an event some known time after (or, for a falling force, before) the event: the force has to
+cross its threshold, the sensor lags, the change has to last, samples are taken. Fractional timing subtracts these
+delays. Its clock runs at the pace of recent strides. At each detected event (heel strike, toes on the ground, heel off,
+toes off) the clock is corrected to the fraction at which the event occurred in recent strides, plus the delay. An event
+is thus known when the clock passes its fraction, before the sensors detect it.
 
-The clock waits for an event that does not come: for toe contact, heel-off, toe-off or the next strike. In standing
-there is no percent of gait. A stride whose heel and toes leave the ground late takes longer: the clock goes on at its
-pace. After a stride that was not even, as at starts, stops and stairs, nothing is predicted: events are known when they
-are detected.
+The clock waits for an event that does not occur: toe contact, heel-off, toe-off or the next strike. In standing
+there is no percent of gait. If heel and toes leave the ground late, the stride takes longer, and the clock continues at
+the pace of this stride. After an irregular stride, as at starts, stops and stairs, nothing is predicted: events are
+known when they are detected.
 """
 
 from collections.abc import Callable
@@ -24,7 +24,7 @@ from ppafo.model.sensors import GaitMeasurement
 
 
 class GaitTime(NamedTuple):
-    """Time since the heel strike [s] by which torque is requested, and 1 where the foot lands or is about to."""
+    """Time since the heel strike [s] for the requested torque, and 1 where the foot lands or is about to land."""
 
     since_strike: float
     lands: float
@@ -32,12 +32,12 @@ class GaitTime(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class TimingKind:
-    """A way to know the gait phase.
+    """Method of estimating the gait phase.
 
-    ``parameters`` is a NamedTuple class whose numbers are the quantities in order, ``initial`` the start of the state.
-    ``follow(rules, phase_rules, clock, before, phase, measurement, period)`` returns the state after a sample, with
-    the phases before and after it; ``gait_time(rules, clock, phase)`` where in the stride the wearer is. The safety
-    checks go by the detected phases, whichever way is chosen.
+    ``parameters`` is a NamedTuple class whose numbers are the quantities in order, ``initial`` the initial state.
+    ``follow(rules, phase_rules, clock, before, phase, measurement, period)`` returns the state after a sample, with the
+    phases before and after it; ``gait_time(rules, clock, phase)`` returns the present gait time. The safety checks use
+    the detected phases with every method.
     """
 
     name: str
@@ -59,24 +59,24 @@ def follow_thresholds(
     measurement: GaitMeasurement,
     period: float,
 ) -> EmptyRow:
-    """The clock after a sample, taken every ``period`` [s]: nothing."""
+    """Clock after a sample taken every ``period`` [s]: an empty state."""
     return clock
 
 
 def threshold_time(rules: EmptyRow, clock: EmptyRow, phase: PhaseState) -> GaitTime:
-    """The time since the detected heel strike [s]; the foot lands once that was detected."""
+    """Time since the detected heel strike [s]; the foot lands once the strike was detected."""
     return GaitTime(phase.since_strike, 1.0 if phase.phase == LANDING else 0.0)
 
 
 class TimingParts(NamedTuple):
-    """Functions of a timing, as ``TimingKind`` has them."""
+    """Functions of a timing, as in ``TimingKind``."""
 
     follow: Callable[[Any, PhaseRules, Any, PhaseState, PhaseState, GaitMeasurement, float], Any]
     gait_time: Callable[[Any, Any, PhaseState], GaitTime]
 
 
 class ClockParts(NamedTuple):
-    """Parts of a walking law that follow its timing: functions, and the class of the law's state with its clock."""
+    """Parts of a walking law that depend on its timing: functions, and class of the law's state with its clock."""
 
     timing: TimingParts
     state: Callable[..., Any]
@@ -97,16 +97,16 @@ THRESHOLDS = TimingKind(
 
 
 WAITS = 0.05
-"""Fraction of the stride by which the clock runs past an event that was not detected, before it waits."""
+"""Fraction of the stride by which the clock passes an undetected event before it waits."""
 
 TOO_FAR = 0.15
-"""Fraction of the stride: an event further from where it came in recent strides than this does not move the clock."""
+"""Largest deviation of an event from its fraction in recent strides that corrects the clock [turns]."""
 
 EVEN = 0.1
-"""A stride that takes longer or shorter than recent ones by more than this fraction is odd: nothing is predicted."""
+"""Largest relative deviation of a regular stride from recent ones; after an irregular one nothing is predicted."""
 
 FASTER = 0.3
-"""A stride is taken to be quicker or slower than recent ones by at most this fraction, by when the foot rises."""
+"""Largest relative change of the stride time that is predicted when the foot rises."""
 
 STRUCK = 0.0
 TOES_ON = 1.0
@@ -115,7 +115,7 @@ TOES_OFF = 3.0
 
 
 class Delays(NamedTuple):
-    """Rates at which the force rises or falls at each event [N/s], and lags of force sensor and valve [s]."""
+    """Loading and unloading rates of the forces at each event [N/s], and lags of force sensor and valve [s]."""
 
     heel_loading_rate: Annotated[
         float, Number("N/s", "how fast the heel is loaded after its strike", 5.6e3, 100.0, 1.0e6)
@@ -145,7 +145,7 @@ class Delays(NamedTuple):
 
 
 class Events(NamedTuple):
-    """Number for each event of a stride: heel strike, toes on the ground, heel off, toes off."""
+    """Values for the events of a stride: heel strike, toes on the ground, heel off, toes off."""
 
     strike: float = 0.0
     toes_on: float = 0.0
@@ -154,9 +154,10 @@ class Events(NamedTuple):
 
 
 class StrideTiming(NamedTuple):
-    """The mean of recent stride times [s], how many count, the last [s], 1 where that was even, time of this one [s].
+    """Stride times: mean of recent strides and their number, last stride, and prediction for the present stride.
 
-    ``this_time`` is what the stride will take that has begun, by when its heel and its toes have left the ground.
+    ``mean_time``, ``last`` and ``this_time`` in [s]; ``counted`` is the number of strides in the mean; ``even`` is 1 if
+    the last stride was regular. ``this_time`` is updated when heel and toes leave the ground.
     """
 
     mean_time: float = 0.0
@@ -167,9 +168,9 @@ class StrideTiming(NamedTuple):
 
 
 class GaitClock(NamedTuple):
-    """Fraction of the stride [turns], the last event that the clock has passed, and at which fraction each comes.
+    """Fraction of the stride [turns], last event that the clock has passed, and fractions of recent events.
 
-    ``come`` is from recent strides, 0 for an event that was not seen yet.
+    ``come`` is the fraction of each event in recent strides, 0 for an event not seen yet; ``strides`` the stride times.
     """
 
     fraction: float = 0.0
@@ -182,9 +183,10 @@ CLOCK_START = GaitClock()
 
 
 def detection_delays(delays: Delays, phase_rules: PhaseRules, period: float) -> Events:
-    """Delay of the detection of each event [s]; negative if the force falls below its threshold before the event.
+    """Detection delay of each event [s]; negative if the force falls below its threshold before the event.
 
-    A first-order sensor follows a ramp late by its time constant; an event falls half a sample before its sample.
+    A first-order sensor lags behind a ramp by its time constant; on average an event occurs half a period before its
+    sample.
     """
     late = delays.sensor_lag + phase_rules.debounce + 0.5 * period
     return Events(
@@ -196,7 +198,7 @@ def detection_delays(delays: Delays, phase_rules: PhaseRules, period: float) -> 
 
 
 def detected_events(before: PhaseState, phase: PhaseState) -> Events:
-    """1 for each event that is detected at this sample, else 0; heel and toes only where they can be that event."""
+    """1 for each event that is detected at this sample, else 0; heel and toes count only where possible."""
     enters = (before.phase == SWING) & (phase.phase != SWING)
     toes_on = (before.toe.loaded < 0.5) & (phase.toe.loaded > 0.5) & (before.phase == LANDING)
     # Only with loaded toes: a heel that unloads alone is a foot that leaves the ground.
@@ -219,7 +221,7 @@ def learnt_fraction(come: float, seen: float, found: float, weight: float) -> fl
 
 
 def anchored_fraction(fraction: float, seen: float, come: float, late: float, weight: float) -> float:
-    """Fraction [turns] after an event that comes at ``come`` may have been detected ``late`` [turns] after it."""
+    """Fraction [turns] corrected by an optional event at ``come``, detected ``late`` [turns] after the event."""
     missed = come + late - fraction
     # Far from where it came in recent strides it is another event, or another gait.
     usable = (seen > 0.5) & (come > 0.0) & (abs(missed) < TOO_FAR)
@@ -227,9 +229,9 @@ def anchored_fraction(fraction: float, seen: float, come: float, late: float, we
 
 
 def latest_fraction(phase: PhaseState, come: Events, predicts: bool) -> float:
-    """Fraction [turns] at which the clock waits for the event that the sensors have to show next.
+    """Fraction [turns] at which the clock waits for the next event to be detected.
 
-    It waits before a strike that it does not predict.
+    The clock stops before a strike that it does not predict.
     """
     on_ground = come.toes_off if phase.heel.loaded < 0.5 else come.heel_off
     on_ground = come.toes_on if phase.phase == LANDING else on_ground
@@ -240,7 +242,7 @@ def latest_fraction(phase: PhaseState, come: Events, predicts: bool) -> float:
 
 
 def last_event(clock: GaitClock, fraction: float, come: Events, seen: Events, phase: PhaseState) -> float:
-    """Last event that has been passed; one whose fraction is not known (0) is passed where it is detected."""
+    """Last event that has been passed; an event of unknown fraction (0) is passed when it is detected."""
     # A foot that lands on its toes has them on the ground at once.
     toes_on = (
         (seen.toes_on > 0.5)
@@ -262,11 +264,11 @@ def last_event(clock: GaitClock, fraction: float, come: Events, seen: Events, ph
 def next_strides(
     strides: StrideTiming, struck: bool, ends: bool, on_heel: bool, taken: float, first_time: float, weight: float
 ) -> StrideTiming:
-    """The mean of recent stride times after a sample at which a stride that has ``taken`` [s] may end.
+    """Stride times after a sample at which a stride of the duration ``taken`` [s] may end.
 
-    The first strides count evenly, then a new one with its ``weight``. An odd one does not count, until a second one
-    is like it, however long both are: the wearer walks at another pace. What begins with the toes, or does not end, is
-    no even stride.
+    The first strides have equal weights, later ones ``weight``. An irregular stride does not count until a second
+    stride has a similar duration, which indicates a new pace. A stride that starts with the toes, or does not end, is
+    not regular.
     """
     known = strides.mean_time if strides.counted > 0.5 else first_time
     # The first stride sets the mean if it is within half and twice the setting.
@@ -292,7 +294,7 @@ def next_strides(
 def predicted_time(strides: StrideTiming, seen: Events, found: Events, come: Events, weight: float) -> float:
     """Predicted duration of the present stride [s], corrected by an early or late heel-off or toe-off.
 
-    ``found`` are the fractions of the mean stride at which they did, ``come`` the fractions of recent strides.
+    ``found`` are the detected fractions of the events in the mean stride, ``come`` their fractions in recent strides.
     """
     heel = (seen.heel_off > 0.5) & (come.heel_off > 0.0)
     toes = (seen.toes_off > 0.5) & (come.toes_off > 0.0)
@@ -304,7 +306,7 @@ def predicted_time(strides: StrideTiming, seen: Events, found: Events, come: Eve
 
 
 def struck_fraction(fraction: float, target: float, weight: float) -> float:
-    """Fraction [turns] at a detected strike: moved towards ``target`` by a weight, all the way from far off."""
+    """Fraction [turns] at a detected strike: moved towards ``target`` by a weight, or set to it if far off."""
     missed = target + 1.0 - fraction
     return fraction + weight * missed - 1.0 if abs(missed) < TOO_FAR else target
 
@@ -319,7 +321,7 @@ def next_clock(
     strike_weight: float,
     period: float,
 ) -> GaitClock:
-    """The clock after a sample; a detected strike moves it by ``strike_weight``, the events after it by ``weight``."""
+    """Clock after a sample; a detected strike corrects it by ``strike_weight``, later events by ``weight``."""
     late, seen = detection_delays(delays, phase_rules, period), detected_events(before, phase)
     struck = seen.strike > 0.5
     # The first strike ends no stride, and the second one begins the first whole one: a walk may begin in mid-stance.
@@ -362,10 +364,11 @@ def next_clock(
 
 
 def place_in_stride(clock: GaitClock, lead: float, phase: PhaseState) -> GaitTime:
-    """Gait phase that a clock shows, a ``lead`` [s] ahead, as a time; the strike is expected, not awaited.
+    """Gait time of a clock, advanced by a ``lead`` [s]; after a regular stride the next strike is anticipated.
 
-    After an odd stride it is awaited, not expected. It is the fraction of the stride time that the phases go by, as a
-    law makes it of this time again; 0 s at the start, and where a detected strike is ahead of the clock.
+    After an irregular stride the strike is awaited. The time is the fraction times the stride time of the phases,
+    because the law divides by that stride time again; 0 s at the start, and where a detected strike is ahead of the
+    clock.
     """
     stride_time = phase.stride_time if phase.stride_time > 0.0 else 1.0
     ahead = clock.fraction + lead / stride_time
@@ -382,7 +385,7 @@ AnchorWeight = Annotated[
 
 
 class FractionalRules(NamedTuple):
-    """The known delays, and how far an event after the strike moves the clock [-]."""
+    """Known delays, and correction of the clock per event after the strike [-]."""
 
     delays: Delays
     anchor_weight: AnchorWeight
@@ -397,12 +400,12 @@ def follow_fraction(
     measurement: GaitMeasurement,
     period: float,
 ) -> GaitClock:
-    """The clock after a sample, taken every ``period`` [s]; a detected strike sets it anew."""
+    """Clock after a sample taken every ``period`` [s]; a detected strike resets it."""
     return next_clock(rules.delays, phase_rules, clock, before, phase, rules.anchor_weight, 1.0, period)
 
 
 def fractional_time(rules: FractionalRules, clock: GaitClock, phase: PhaseState) -> GaitTime:
-    """The time since the heel strike [s], ahead by the delay of the valve."""
+    """Time since the heel strike [s], advanced by the delay of the valve."""
     return place_in_stride(clock, rules.delays.valve_delay, phase)
 
 

@@ -1,4 +1,4 @@
-"""Ways to know the gait phase by name, and a controller of walking with another way than its own."""
+"""Methods of estimating the gait phase by name, and walking controllers with another method than their own."""
 
 import functools
 from dataclasses import replace
@@ -17,7 +17,7 @@ TIMINGS: Kinds[TimingKind] = Kinds(
     TimingKind,
     {kind.name: kind for kind in (THRESHOLDS, FRACTIONAL, ESTIMATED)},
 )
-"""The ways to know the gait phase. Every controller has the first one unless another is chosen."""
+"""Methods of estimating the gait phase. Every controller uses the first one by default."""
 
 
 def keeps_time(kind: ControllerKind) -> bool:
@@ -27,10 +27,10 @@ def keeps_time(kind: ControllerKind) -> bool:
 
 @functools.cache
 def with_timing(kind: ControllerKind, timing: TimingKind) -> ControllerKind:
-    """Return a controller of walking that knows the gait phase in another way.
+    """Return a walking controller with another estimation of the gait phase.
 
-    Its law is given the functions of ``timing`` in the place of those of ``THRESHOLDS``, whose settings and state its
-    own then have. ScenarioError if it uses no gait phase.
+    The functions, settings and state of ``timing`` replace those of ``THRESHOLDS``. Raises ScenarioError if the
+    controller uses no gait phase.
     """
     if timing is THRESHOLDS:
         return kind

@@ -1,4 +1,4 @@
-"""Import of recorded files as a gait: tables, meaning of their columns, events and strides."""
+"""Import of a gait from recorded files: tables, meaning of the columns, events and strides."""
 
 from ppafo.gait.recorded.importing import ImportedGait, import_gait
 from ppafo.gait.recorded.mapping import ImportSettings

@@ -1,6 +1,6 @@
-"""Curves over the stride: each brought to the same phases, their mean and deviation, and how far they scatter.
+"""Curves over the stride: time-normalised curves of single strides, mean, standard deviation and scatter.
 
-A curve is refused that scatters too much between strides, or that no series fits.
+A curve is rejected if it scatters too much between strides or if its Fourier series fits badly.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,9 +29,9 @@ _UNLOADED_PHASE = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CurveStatistics:
-    """Curves of single strides (strides x 101), and over them the mean and the standard deviation (101 each).
+    """Time-normalised curves of single strides (strides x 101), their mean and their standard deviation (101 each).
 
-    The deviation is 0 where there is only one stride. ``strides`` says which strides these are.
+    The deviation is 0 for a single stride. ``strides`` are the strides of the rows of ``curves``.
     """
 
     curves: Floats
@@ -41,14 +41,14 @@ class CurveStatistics:
 
     @property
     def spread(self) -> float:
-        """Standard deviation between strides, root mean square over the phases, in the unit of the curve [SI]."""
+        """RMS over the phases of the standard deviation between strides, in the unit of the curve [SI]."""
         return float(np.sqrt(np.mean(self.deviation**2)))
 
 
 def statistics(name: str, signal: Signal, strides: Sequence[Stride]) -> CurveStatistics:
-    """Return the curves of a signal over strides that it covers; between samples runs a cubic spline.
+    """Return the curves of a signal over strides that it covers, interpolated with a cubic spline.
 
-    Of a position the curves are its acceleration [m/s^2]; each stride has its own time.
+    For a position, the curves are the acceleration [m/s^2], computed with the duration of each stride.
     """
     from scipy.interpolate import CubicSpline
 
@@ -62,9 +62,9 @@ def statistics(name: str, signal: Signal, strides: Sequence[Stride]) -> CurveSta
 
 
 def over_strides(name: str, curves: Floats, strides: Sequence[Stride]) -> CurveStatistics:
-    """Return the curves (strides x 101) with mean and deviation over the strides, nan where there is none.
+    """Return curves (strides x 101) with mean and deviation over the strides, which are nan without strides.
 
-    A centre of pressure has a straight line over swing, where it has no meaning.
+    For a centre of pressure, which is undefined in swing, the mean is interpolated linearly over the swing.
     """
     if not strides:
         return CurveStatistics(curves, np.full(SAMPLES, np.nan), np.full(SAMPLES, np.nan), ())
@@ -84,7 +84,7 @@ def over_strides(name: str, curves: Floats, strides: Sequence[Stride]) -> CurveS
 def check_scatter(
     curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError], walk: Mapping[str, Signal]
 ) -> None:
-    """Raise DataError for curves that scatter by a quarter of their range, or that no series fits."""
+    """Raise DataError for curves that scatter by a quarter of their range, or whose Fourier series fits badly."""
     most = f"at most {100.0 * REFUSED_SPREAD:.0f} % and {100.0 * REFUSED_MISFIT:.0f} % are accepted"
     scatters = _scatters(curves, errors, REFUSED_SPREAD, REFUSED_MISFIT)
     raise_noted([DataError(f"{walk[name].file}: {said}; {most}; {_remedy()}") for name, said in scatters])
@@ -93,7 +93,7 @@ def check_scatter(
 def _scatters(
     curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError], most_spread: float, most_misfit: float
 ) -> Iterator[tuple[str, str]]:
-    """Yield the curves whose spread or misfit, as fractions of the range, is above these, and a sentence on each."""
+    """Yield each curve whose spread or misfit, as a fraction of the range, exceeds its limit, with a description."""
     for name, curve in curves.items():
         moved = float(np.ptp(curve.mean))
         if moved <= 0.0:
@@ -112,6 +112,6 @@ def _remedy() -> str:
 
 
 def scatter_remarks(curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError]) -> list[str]:
-    """Return a line on each curve that scatters more than a steady walk does, or that its series misses by more."""
+    """Return a remark on each curve with unusual scatter between strides or an unusual misfit of its series."""
     scatters = _scatters(curves, errors, REMARKED_SPREAD, REMARKED_MISFIT)
     return [f"{said}: that is noise, or the walk is not steady; {_remedy()}" for _, said in scatters]

@@ -1,4 +1,4 @@
-"""Delimited text tables of motion: rows of numbers below a header of any form, gaps as NaN."""
+"""Delimited text tables of motion: rows of numbers below a header of any layout; missing values are NaN."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +19,7 @@ UNSEEN = ("", "nan", "-nan", "n/a", "na", "null")
 
 
 class Cells(NamedTuple):
-    """Columns of a table by their place in a row: name ("" to skip) and unit ("" where the file does not state it)."""
+    """Columns of a table in their order: name ("" to skip the column) and unit ("" if the file does not state it)."""
 
     names: Sequence[str]
     units: Sequence[str]
@@ -28,8 +28,8 @@ class Cells(NamedTuple):
 class NumberBlock(NamedTuple):
     """Rows of numbers in a text file.
 
-    ``first`` is the index of the first row among the lines, ``decimal`` the decimal mark. With ``is_ragged`` cells may
-    be missing at the end of a row, as of markers that were not seen.
+    ``first`` is the index of the first row among the lines, ``decimal`` the decimal mark. With ``is_ragged``, cells at
+    the end of a row may be missing, for example of markers that were not visible.
     """
 
     lines: Sequence[str]
@@ -40,7 +40,7 @@ class NumberBlock(NamedTuple):
 
 
 def lines_of(path: str | Path) -> list[str]:
-    """Lines of a text file with any line ends; characters that are no UTF-8 are replaced."""
+    """Return the lines of a text file with any line ends; bytes that are not valid UTF-8 are replaced."""
     content = read_bytes(path)
     try:
         text = decoded(content)
@@ -50,15 +50,15 @@ def lines_of(path: str | Path) -> list[str]:
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
-    """Cells of a line without blanks and quotation marks around them."""
+    """Return the cells of a line without surrounding blanks and quotation marks."""
     return [cell.strip().strip('"').strip() for cell in line.split(delimiter)]
 
 
 def rows_of(block: NumberBlock, cells: Cells, clock: Sequence[int] = ()) -> tuple[Floats, list[int]]:
-    """Numbers of a block, shape (rows, named columns), NaN for a sample that was not recorded, and lines from 1.
+    """Return the numbers of a block, shape (rows, named columns), NaN for missing values, and line numbers from 1.
 
-    ``clock`` are the named columns in which every row needs a number. Raises DataError, with line and column, for a
-    cell that is no number.
+    ``clock`` are the indices of the named columns that must be complete. Raises DataError, with line and column, for a
+    cell that is not a number.
     """
     kept = [place for place, name in enumerate(cells.names) if name]
     labels = [cells.names[place] for place in kept]
@@ -90,7 +90,7 @@ def rows_of(block: NumberBlock, cells: Cells, clock: Sequence[int] = ()) -> tupl
 
 
 class PerFrame(NamedTuple):
-    """Clock of a table with a frame in each row, at a rate [Hz]; ``name`` is the column that counts from 1, if any."""
+    """Clock of a table with one frame per row at a rate [Hz]; ``name`` is the frame column (from 1), or empty."""
 
     name: str
     rate: float
@@ -110,9 +110,9 @@ def table_of(
     noun: str = "columns",
     kind: str = "measured",
 ) -> MotionTable:
-    """Motion table of a block, whose column of time is in units of ``seconds`` [s]. Columns need not have own names.
+    """Return the motion table of a block; ``seconds`` [s] is the unit of the time column.
 
-    Raises DataError, with file, line and column, for what cannot be read.
+    Duplicate column names are allowed. Raises DataError, with file, line and column, for values that cannot be read.
     """
     written = [name for name in cells.names if name]
     apart = told_apart(written)

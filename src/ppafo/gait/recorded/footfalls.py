@@ -1,7 +1,7 @@
-"""Detection of the strides of a recording: force, events of the file, the shank, or one repeated cycle.
+"""Detection of the strides of a recording: from force, events in the file, the shank, or one repeated cycle.
 
-Force plates do not say whose foot they carried: each contact is of the foot whose shank leans over it. A record little
-longer than a stride, which begins anywhere in it, is one cycle that wraps around.
+Force plates do not identify the foot: each contact belongs to the foot whose shank leans over it. A record slightly
+longer than a stride, starting anywhere in it, is treated as one periodic cycle.
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,7 +38,7 @@ _DEEPEST = np.radians(-15.0)
 
 @dataclass(frozen=True, slots=True)
 class Stride:
-    """Times [s] of a heel strike, of the toe-off after it and of the next heel strike of the same foot."""
+    """Stride: times [s] of a heel strike, of the following toe-off, and of the next heel strike of the same foot."""
 
     start: float
     toe_off: float
@@ -46,7 +46,7 @@ class Stride:
 
     @property
     def time(self) -> float:
-        """Length [s]."""
+        """Duration of the stride [s]."""
         return self.end - self.start
 
     @property
@@ -68,7 +68,7 @@ Contact = tuple[float | None, float | None]
 
 
 def contacts_of(force: Signal) -> list[Contact]:
-    """Return heel strike and toe-off of every contact; None at an end of the record that cuts one."""
+    """Return heel strike and toe-off of every contact [s]; None for an end that is outside the record."""
     # Between both thresholds the foot is as it was before.
     decided = np.where(force.values > LOADED, 1, np.where(force.values < UNLOADED, 0, -1))
     known = np.flatnonzero(decided >= 0)
@@ -97,18 +97,18 @@ def contacts_of(force: Signal) -> list[Contact]:
 
 
 def _crossing(signal: Signal, index: int, level: float) -> float:
-    """Return when a line between the samples before and at ``index`` passes a level [s]."""
+    """Return the time [s] at which the line between the samples before and at ``index`` crosses a level."""
     before, after = signal.values[index - 1], signal.values[index]
     fraction = 0.5 if after == before else float(np.clip((level - before) / (after - before), 0.0, 1.0))
     return float(signal.time[index - 1] + fraction * (signal.time[index] - signal.time[index - 1]))
 
 
 def strides_from_shank(shank: Signal) -> list[Stride]:
-    """Return the whole strides in a shank angle phi [rad], above 0 while the ankle is in front.
+    """Return the whole strides in a shank angle phi [rad], positive with the ankle in front of the knee.
 
-    Heel strike is where the forward swing of the shank ends, its largest angle. Toe-off is where it leans back fastest
-    before the swing, after Aminian et al. 2002, J Biomech 35:689, who find both in a gyroscope on the shank. DataError
-    where there is no toe-off.
+    Heel strike is the end of the forward swing of the shank, at its largest angle. Toe-off is the time of the fastest
+    backward lean before the swing. The method follows Aminian et al. 2002, J Biomech 35:689, who detect both events
+    with a gyroscope on the shank. Raises DataError if there is no toe-off.
     """
     smooth = low_pass(shank, _SMOOTH)
     high, low = float(np.max(smooth.values)), float(np.min(smooth.values))
@@ -132,7 +132,7 @@ def strides_from_shank(shank: Signal) -> list[Stride]:
 
 
 def _ends_of_swings(smooth: Signal) -> list[int]:
-    """Return the samples at which the forward swings of a smooth shank end."""
+    """Return the samples at which the forward swings of a smoothed shank angle end."""
     from scipy.signal import find_peaks
 
     high, low = float(np.max(smooth.values)), float(np.min(smooth.values))
@@ -141,7 +141,7 @@ def _ends_of_swings(smooth: Signal) -> list[int]:
 
 
 def heel_strikes(events: str, walk: Mapping[str, Signal]) -> list[float]:
-    """Return the times [s] of all heel strikes that a force or a shank shows, with a stride behind them or not."""
+    """Return the times [s] of all heel strikes in a force or shank angle, with or without a complete stride."""
     if events == FORCE:
         return [start for start, _ in contacts_of(walk[FORCE]) if start is not None]
     smooth = low_pass(walk[SHANK], _SMOOTH)
@@ -158,7 +158,7 @@ _LEAST_LEAN_OF_PART = 0.1
 def force_of_plates(
     tables: Sequence[MotionTable], names: Sequence[str], shank: Signal, body_mass: float
 ) -> tuple[Signal | None, list[str]]:
-    """Return the vertical force [body weights] of one foot, summed over its contacts on plates, and remarks."""
+    """Return the vertical force [body weights] of one foot, summed over its contacts on force plates, and remarks."""
     total: Signal | None = None
     chosen = []
     for table in tables:
@@ -210,7 +210,7 @@ strides of one healthy walk differ by 0.03."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Cycle:
-    """Three times the same cycle, its ``period`` [s], and what its ends differ by as a share of the ranges."""
+    """Cycle repeated three times, its ``period`` [s], and the misfit of its ends relative to the ranges [-]."""
 
     walk: Mapping[str, Signal]
     period: float
@@ -218,7 +218,7 @@ class _Cycle:
 
 
 def wrap_cycle(walk: Mapping[str, Signal]) -> _Cycle | None:
-    """Return a record of one cycle three times over, None where its start and end are not the same motion."""
+    """Return the record of one cycle repeated three times, or None if its start and end are not the same motion."""
     start = max(walk[name].time[0] for name in REQUIRED)
     end = min(walk[name].time[-1] for name in REQUIRED)
     # One even clock for both curves, whatever the rates of their files.
@@ -251,9 +251,10 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> _Cycle | None:
 
 
 def _repeat(signal: Signal, span: tuple[float, float], period: float, is_load: bool) -> Signal:
-    """Return three periods of what lies within a span [s]; where its start and end overlap one fades into the other.
+    """Return three periods of the signal within a span [s]; where start and end overlap, they are blended.
 
-    A load is taken from where the plate carried it, and a position goes on by its way.
+    For a load, the overlap uses the value of larger magnitude, because the other may be off the plate. A position
+    advances by the distance walked in each cycle.
     """
     start, end = span
     count = max(2, round(period * signal.rate))
@@ -282,7 +283,7 @@ _COVERED = 0.9
 
 
 def strides_within(signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
-    """Return the strides that lie within a signal, to half a sample, and in which no sample of it was lost."""
+    """Return the strides that lie within a signal, to half a sample, and that contain no lost sample."""
     slack = 0.5 / signal.rate
     return [
         stride
@@ -293,7 +294,7 @@ def strides_within(signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
 
 
 def lost_in(signal: Signal, stride: Stride) -> int:
-    """Number of samples of a motion that were lost in a stride."""
+    """Return the number of lost samples of a motion in a stride."""
     if signal.lost is None:
         return 0
     return int(np.count_nonzero(signal.lost & (signal.time >= stride.start) & (signal.time <= stride.end)))
@@ -309,7 +310,11 @@ FORCE, SHANK, FILE = "vertical_force", "shank_angle", "events of the file"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Footfalls:
-    """The walk, its strides, where these come from, remarks; ``is_overground``: some of them are off the plates."""
+    """Strides of a walk.
+
+    ``walk`` holds the signals by name, ``events`` names the source of the strides. ``is_overground`` is True if some
+    strides are off the plates, ``is_one_cycle`` if the record is one cycle that was repeated.
+    """
 
     walk: Mapping[str, Signal]
     strides: list[Stride]
@@ -325,7 +330,7 @@ def find_footfalls(
     side: Side,
     given_least: int | None,
 ) -> Footfalls:
-    """Return the strides of a walk: from the force where it has enough of them, else from where there are more."""
+    """Return the strides of a walk: from the force if it shows enough, otherwise from the source with more strides."""
     least = given_least or LEAST_STRIDES
     footfalls = _of_walk(walk, tables, side, least)
     usable = usable_strides(walk, footfalls.strides)
@@ -377,7 +382,7 @@ def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Si
 
 
 def _strides_of_file(tables: Sequence[MotionTable], side: Side) -> list[Stride]:
-    """Return the strides between the events that a C3D file has of a foot; a stride needs its toe-off."""
+    """Return the strides between the events of a foot in a C3D file; each stride needs exactly one toe-off."""
     trials = [table.trial for table in tables if table.trial is not None]
     # Events of two trials have two clocks.
     if len(trials) != 1:
@@ -389,7 +394,7 @@ def _strides_of_file(tables: Sequence[MotionTable], side: Side) -> list[Stride]:
 
 
 def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[list[Stride], str]:
-    """Return strides from the shank, whose strikes and toe-offs are moved by what contacts on plates show."""
+    """Return strides from the shank, with events shifted to match the contacts on plates, and a remark."""
     early = [
         (start - stride.start, end - stride.toe_off)
         for stride in strides
@@ -409,7 +414,7 @@ def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[li
 
 
 def strides_of_curve(footfalls: Footfalls, name: str, signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
-    """Return the strides that a curve covers: within its record, and for a load where it was measured."""
+    """Return the strides that a curve covers: within its record, and for a load with the stance measured."""
     inside = strides_within(signal, strides)
     if name not in LOADS or not (footfalls.is_overground or signal.absent is not None):
         return inside

@@ -1,4 +1,4 @@
-"""A form of gait recordings: how its files are known and read, and what their columns mean without a gait map."""
+"""File format of gait recordings: recognition, reading, and meaning of the columns without a gait map."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ from ppafo.gait.recorded.table import MotionTable
 class Convention:
     """Meaning of the columns of a file without a gait map.
 
-    ``columns`` is the map, ``plates`` are columns of force plates to choose from by the foot's motion, ``remarks``
-    sentences for whoever reads the file.
+    ``columns`` is the map, ``plates`` are force plate columns, to be assigned to the foot by its motion, and
+    ``remarks`` are sentences for the user.
     """
 
     columns: GaitMap
@@ -23,13 +23,13 @@ class Convention:
 
 @dataclass(frozen=True, slots=True)
 class GaitForm:
-    """A form of gait recordings: its name, a summary in a phrase, and suffixes in lower case, with their dot.
+    """File format of gait recordings: name, short summary, and suffixes in lower case, with the dot.
 
-    ``read`` gives time [s], columns and units of a file, the ``form`` of the table left empty, or a DataError;
-    ``convention`` the meaning of its columns for a foot and a body mass [kg], where no gait map of the user does;
-    ``recognises`` tells by its content whether a file is of the form, where others have the same suffix; ``arrange``
-    changes a table before its columns are interpreted. ``is_whole`` is true where a file has all curves of a foot, so
-    that no file of another form can add one.
+    ``read`` returns time [s], columns and units of a file, with an empty ``form``, or raises DataError. ``convention``
+    returns the meaning of the columns for a foot and a body mass [kg], used without a gait map of the user.
+    ``recognises`` detects the format by the content of a file, for suffixes that several formats share. ``arrange``
+    changes a table before its columns are interpreted. ``is_whole`` is True if a file contains all curves of a foot, so
+    that no file of another format can be combined with it.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Import of a gait from recorded files: strides found and chosen, checks, mean curves and their series."""
+"""Import of a gait from recorded files: selection of strides, checks, mean curves and their Fourier series."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -41,9 +41,12 @@ from ppafo.wording import count_of
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImportedGait:
-    """The gait, its strides, the curves of each stride by name, errors of the series, and remarks.
+    """Result of the import of a gait.
 
-    ``events`` says where the strides come from: ``vertical_force``, ``shank_angle`` or ``events of the file``.
+    ``strides`` are the strides used and ``left_out`` the strides rejected. ``curves`` holds the single strides by curve
+    name, ``fit_errors`` the errors of the Fourier series. ``events`` is the source of the strides: ``vertical_force``,
+    ``shank_angle`` or ``events of the file``. ``files`` are the names of the files, ``remarks`` the sentences for the
+    user.
     """
 
     gait: Gait
@@ -57,13 +60,13 @@ class ImportedGait:
 
 
 def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> ImportedGait:
-    """Return the mean stride in recorded files of one walk of one person on one clock.
+    """Return the mean stride of one walk of one person, from recorded files that share a clock.
 
-    They are of any form of ``reading.FORMS``: .mot, .sto, .csv, .txt, .tsv, .emt, .c3d, .trc, .mat.
+    The files may be of any format of ``reading.FORMS``: .mot, .sto, .csv, .txt, .tsv, .emt, .c3d, .trc, .mat.
 
-    Strides come from the vertical force where there is one, else from events of the file or from the shank. DataError
-    names all that is wrong with file, column and row, and what to do: what is wrong with one curve is noted, and the
-    others are looked at without it. What was mended is among the remarks.
+    Strides come from the vertical force if available, otherwise from events of the file or from the shank. Raises a
+    DataError that lists all problems with file, column, row and remedy: after a problem with one curve, the other
+    curves are still checked. Repaired values are listed in the remarks.
     """
     check_settings(settings)
     wrong: list[PpafoError] = []
@@ -102,7 +105,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
 
 
 def _steady_strides(footfalls: Footfalls, settings: ImportSettings, wrong: list[PpafoError]) -> StrideSelection:
-    """Return the strides within angles and events that take the usual time; DataError where there is none."""
+    """Return the strides of usual duration that both angles cover; raises DataError if there is none."""
     walk, events = footfalls.walk, footfalls.events
     least = settings.least_strides or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
     strides = of_usual_time(usable_strides(walk, footfalls.strides), least)
@@ -119,7 +122,7 @@ def _steady_strides(footfalls: Footfalls, settings: ImportSettings, wrong: list[
 def _curves(
     walk: Mapping[str, Signal], covered: Mapping[str, Sequence[Stride]], strides: StrideSelection, cut_off: float | None
 ) -> dict[str, CurveStatistics]:
-    """Return the curves of all signals over the strides taken that they cover, below a frequency [Hz] if any."""
+    """Return the curves of all signals over the selected strides that they cover, low-pass filtered if requested."""
     # Footfalls come from the unfiltered force, whose edges a low pass would move.
     smooth = walk if cut_off is None else {name: low_pass(signal, cut_off) for name, signal in walk.items()}
     return {
@@ -131,7 +134,7 @@ def _curves(
 def _over_taken_strides(
     curves: Mapping[str, CurveStatistics], walk: Mapping[str, Signal], strides: StrideSelection, wrong: list[PpafoError]
 ) -> dict[str, CurveStatistics]:
-    """Return the curves over the strides taken alone; one that covers none of them is noted and left out."""
+    """Return the curves over the selected strides only; a curve that covers none of them is reported and left out."""
     kept = {}
     for name, curve in curves.items():
         is_taken = [stride in strides.taken for stride in curve.strides]
@@ -158,7 +161,7 @@ def _finish(
     remarks: Sequence[str],
     wrong: list[PpafoError],
 ) -> ImportedGait:
-    """Return the gait of mean curves that legs can have; DataError where any cannot, with everything in ``wrong``."""
+    """Return the gait of the mean curves; raises DataError if any is implausible, with all problems in ``wrong``."""
     taken, walk, settings, signs_from = strides.taken, footfalls.walk, source.settings, source.signs_from
     share, time = (float(np.mean([getattr(each, name) for each in taken])) for name in ("stance_share", "time"))
     means = {name: curve.mean for name, curve in curves.items()}
@@ -209,7 +212,7 @@ def _finish(
 
 
 def _check_enough(strides: StrideSelection, usable: list[Stride], walk: Mapping[str, Signal]) -> None:
-    """Raise DataError for fewer strides than are needed; ``usable`` are all that the events show."""
+    """Raise DataError for too few strides; ``usable`` are all strides found in the events."""
     taken, least = len(strides.taken), strides.least
     if taken >= least:
         return
@@ -246,7 +249,7 @@ def _check_enough(strides: StrideSelection, usable: list[Stride], walk: Mapping[
 
 
 def _spread(values: Sequence[float]) -> float:
-    """Return the standard deviation, 0 of one value."""
+    """Return the standard deviation, 0 for a single value."""
     return float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
 
 
@@ -257,7 +260,7 @@ def _gait(
     curves: Mapping[str, Any],
     events: str,
 ) -> Gait:
-    """Return the gait of mean strides and their series, with where it comes from."""
+    """Return the gait with its series and its description of the source."""
     origin: Origin = "measured" if all(table.kind == "measured" for table in tables) else "synthetic"
     names = ", ".join(Path(table.file).name for table in tables)
     return Gait(
@@ -286,7 +289,7 @@ _WITHIN_SWING = 0.1
 
 
 def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> list[str]:
-    """Remarks on curves with few samples, and on the scatter of the force while the foot is in the air."""
+    """Return remarks on curves with few samples, and on noise of the force while the foot is in the air."""
     rates: dict[int, list[str]] = {}
     for name, signal in walk.items():
         if signal.rate < _COARSE_RATE:
@@ -312,7 +315,7 @@ def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> 
 
 
 def _remarks(curves: Mapping[str, CurveStatistics], strides: StrideSelection, events: str) -> list[str]:
-    """Remarks on strides that were left out or are not covered, and on the vertical force or its absence."""
+    """Return remarks on strides left out or not covered, and on the vertical force or its absence."""
     remarks = [
         f"stride from {stride.start:.4g} to {stride.end:.4g} s left out: {why}" for stride, why in strides.left_out
     ]

@@ -1,7 +1,7 @@
-"""Gait maps: which columns of recorded files make the curves of a gait, in which unit and with which sign.
+"""Gait maps: assignment of the columns of recorded files to the curves of a gait, with unit and sign.
 
-A map is a TOML file, or what the form of the files says where there is none. A term is the name of a column; ``-``
-before it subtracts it.
+A map is a TOML file; without one, the file format provides a default. A term is the name of a column; a leading ``-``
+subtracts the column.
 """
 
 import math
@@ -75,7 +75,7 @@ class AngleMap(StrictTable):
         return self
 
     def sign_and_neutral(self) -> tuple[float, float]:
-        """Return 1 where plantarflexion is positive, else -1, and ``neutral`` [rad]; DataError for its unit."""
+        """Return 1 if plantarflexion is positive, else -1, and ``neutral`` [rad]; raises DataError for its unit."""
         with refused_as(DataError, f"ankle_angle.neutral = {self.neutral!r}", UnitError):
             neutral = parse_quantity(self.neutral, "rad")
         return 1.0 if self.positive == "plantarflexion" else -1.0, neutral
@@ -128,7 +128,7 @@ class KneeMap(StrictTable):
 
 
 class GaitMap(StrictTable):
-    """Meaning of the columns of recorded files; a curve that is not named is not imported."""
+    """Meaning of the columns of recorded files; a curve that is not listed is not imported."""
 
     schema_version: SchemaVersion = 1
     shank_angle: ShankMap
@@ -140,7 +140,7 @@ class GaitMap(StrictTable):
 
 
 def column_names(mapped: object) -> tuple[str, ...]:
-    """Return the columns that the map of one curve names, a minus before those that are subtracted."""
+    """Return the columns named in the map of one curve, with a leading minus for subtracted columns."""
     if isinstance(mapped, KneeMap):
         return (*mapped.forward, *mapped.up, *(mapped.thigh or ()))
     if isinstance(mapped, ShankMap | AngleMap) and mapped.terms is None:
@@ -152,7 +152,7 @@ def column_names(mapped: object) -> tuple[str, ...]:
 
 
 def unsaid_axes(columns: GaitMap) -> list[str]:
-    """Remarks on the axes assumed for markers whose map does not give the axis along the walk, or the one upwards."""
+    """Return remarks on assumed axes, for markers whose map does not state the forward or the upward axis."""
     axes = []
     for name, mapped in (("shank_angle", columns.shank_angle), ("ankle_angle", columns.ankle_angle)):
         unsaid = [key for key in ("forward", "vertical") if key not in mapped.model_fields_set]
@@ -167,7 +167,7 @@ Side = Literal["right", "left"]
 
 
 def package_map() -> GaitMap:
-    """Return the map of a CSV file whose columns have the names and signs of the package."""
+    """Return the map of a CSV file with the column names and signs of the package."""
     return GaitMap(
         shank_angle=ShankMap(terms=("shank_angle",)),
         ankle_angle=AngleMap(terms=("ankle_angle",), positive="plantarflexion", neutral="90 deg"),
@@ -179,10 +179,10 @@ def package_map() -> GaitMap:
 
 
 def opensim_map(side: Side) -> GaitMap:
-    """Return the map of OpenSim's gait models: knee below 0 in flexion as in gait2392, ankle above 0 in dorsiflexion.
+    """Return the map of OpenSim's gait models: knee negative in flexion as in gait2392, ankle positive in dorsiflexion.
 
-    The shank angle is the sum of pelvis tilt, hip and knee flexion in the sagittal plane. So is the
-    lean of the thigh, which hangs at the origin of the pelvis here.
+    The shank angle is the sum of pelvis tilt, hip flexion and knee flexion in the sagittal plane. The lean of the thigh
+    is computed in the same way, with the hip at the origin of the pelvis.
     """
     foot = side[0]
     force = "ground_force_vy" if side == "right" else "l_ground_force_vy"
@@ -196,7 +196,7 @@ def opensim_map(side: Side) -> GaitMap:
 
 
 def load_map(path: str | Path) -> GaitMap:
-    """Return the map in a TOML file. DataError where it cannot be used."""
+    """Return the map in a TOML file; raises DataError if it cannot be used."""
     return read_model(_FILE, GaitMap, path)[0]
 
 
@@ -207,13 +207,14 @@ def json_schema() -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class ImportSettings:
-    """Settings of an import: body mass [kg], side, speed [m/s], map, low pass [Hz], least number of strides.
+    """Settings of the import of a gait.
 
-    The least number of strides is 2 unless given, and 1 overground and of one cycle that wraps around. ``body_mass``
-    may be None where a file states it. ``form`` names the form of the files, empty for what they look like. ``stature``
-    [m] gives the length of the thigh where no map does. ``start`` and ``end`` [s] cut the files, ``longest_gap`` [s] is
-    up to where gaps are filled, and ``ankle_neutral`` [rad] the reading of the file with the foot perpendicular to the
-    shank, where map and convention say another.
+    ``body_mass`` [kg] may be None if a file states it. ``columns`` is the gait map, ``walking_speed`` is in [m/s], and
+    ``low_pass`` [Hz] is the cut-off frequency. ``least_strides`` is the least number of strides; default 2, and 1
+    overground or for a single cycle. ``stature`` [m] gives the length of the thigh if no map does. ``start`` and
+    ``end`` [s] limit the files, and gaps up to ``longest_gap`` [s] are filled. ``ankle_neutral`` [rad] is the reading
+    with the foot perpendicular to the shank; it overrides map and convention. ``form`` names the file format; it is
+    detected if empty.
     """
 
     body_mass: float | None = None
@@ -237,7 +238,7 @@ _OPTIONS = {"columns": "--map", "least_strides": "--minimum-strides", "longest_g
 
 
 def setting_text(name: str, value: float | None = None, shown: str = "") -> str:
-    """Return a setting as who called writes it, with its value [SI], ``shown`` with a unit where it is an option.
+    """Return a setting as the caller would write it, with its value [SI], or ``shown`` with a unit for an option.
 
     >>> setting_text("least_strides"), setting_text("low_pass", 6.0, "6 Hz")
     ('least_strides', 'low_pass=6')
@@ -248,7 +249,7 @@ def setting_text(name: str, value: float | None = None, shown: str = "") -> str:
 
 
 def check_settings(settings: ImportSettings) -> None:
-    """Raise DataError for settings that are not plausible, which names all of them."""
+    """Raise DataError for implausible settings; the message lists all of them."""
     wrong: list[str] = []
     if settings.body_mass is not None and not 1.0 <= settings.body_mass <= 500.0:
         wrong.append(f"a body mass of {settings.body_mass:g} kg is not plausible; give it in kg, such as '62 kg'")

@@ -1,4 +1,4 @@
-"""Suggestions for a missing column: the same joint, marker and side in another spelling."""
+"""Suggestions for a missing column: same joint, marker and side in a different spelling."""
 
 import difflib
 import re
@@ -11,16 +11,16 @@ _AXIS = re.compile(r"(.*)\.([xyz])")
 
 
 def nearest_column(missing: str, known: Iterable[str]) -> str:
-    """Return ``, did you mean 'ankle_angle_r'?``, or nothing where no column is of the same kind, side and axis.
+    """Return ``, did you mean 'ankle_angle_r'?``, or an empty text without a column of the same kind, side and axis.
 
-    RKNE is no RTOE, and a knee is no ankle: every word of a name has to be near, and the side has to be the same.
+    All words of a name must be similar and the side must match: RKNE is not similar to RTOE, nor a knee to an ankle.
     """
     near = [(likeness, name) for name in known if (likeness := _likeness(missing, name)) > 0.0]
     return f", did you mean '{max(near)[1]}'?" if near else ""
 
 
 def _likeness(missing: str, name: str) -> float:
-    """Likeness of two names [-], 0 for two that cannot mean the same."""
+    """Return the similarity of two names [-], 0 if they cannot have the same meaning."""
     (wanted, axis), (found, other_axis) = _parts(missing), _parts(name)
     if axis != other_axis:
         return 0.0
@@ -41,7 +41,7 @@ def _parts(name: str) -> tuple[str, str]:
 
 
 def _words(name: str) -> tuple[list[str], str]:
-    """Return the words of a name without its side, and r or l where it says one."""
+    """Return the words of a name without its side, and the side: r, l or empty."""
     words: list[str] = re.findall(r"[a-z]+|\d+", name.lower())
     for index, word in enumerate(words):
         if word in ("r", "right", "l", "left"):

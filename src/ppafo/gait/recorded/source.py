@@ -1,4 +1,4 @@
-"""The recording that a gait is imported from: tables, map and signals of its files, gaps filled, with what they say."""
+"""Recording from which a gait is imported: tables, map and signals of its files, gaps filled, and remarks."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -41,7 +41,7 @@ FORMS: Kinds[GaitForm] = Kinds(
 
 
 def form_of(path: str | Path, name: str = "") -> GaitForm:
-    """Return the form of a file: the named one, else the first that recognises it. DataError where there is none."""
+    """Return the format of a file: the named one, else the first that recognises it; raises DataError if none does."""
     if name:
         form = FORMS.get(name)
         if form is None:
@@ -68,16 +68,16 @@ def read_table(
     end: float | None = None,
     form: str = "",
 ) -> MotionTable:
-    """Return the table in a file of any form, from ``start`` to ``end`` [s]; ``form`` names its form.
+    """Return the table in a file of any format, from ``start`` to ``end`` [s]; ``form`` names the format.
 
-    Its clock runs without a gap there: rows missing for no longer than ``longest_gap`` [s] are bridged and remarked.
+    Missing rows are interpolated up to a gap of ``longest_gap`` [s], which is remarked.
     """
     chosen = form_of(path, form)
     return cut_table(replace(chosen.read(path), form=form or chosen.name), longest_gap, start, end)
 
 
 def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float) -> Convention:
-    """Return the map of files by what is in them; ``body_mass`` [kg] tells moments from moments per mass."""
+    """Return the convention that fits the content of files; ``body_mass`` [kg] tells moments from moments per mass."""
     names = sorted({table.form for table in tables})
     if len(names) > 1 and any(FORMS[name].is_whole for name in names):
         raise DataError(
@@ -101,7 +101,7 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
 
 
 def _is_there(mapped: object, table: MotionTable) -> bool:
-    """True where a table has all columns of a curve that is mapped."""
+    """Return True if a table has all columns of a mapped curve."""
     return mapped is not None and all(name.removeprefix("-") in table.columns for name in column_names(mapped))
 
 
@@ -111,7 +111,12 @@ _SAME = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GaitSource:
-    """Tables, map and signals of a recording, settings with what the files say, and remarks on what was mended."""
+    """Recording for the import of a gait.
+
+    ``tables`` are the files, ``columns`` is the gait map, and ``walk`` holds the signals by curve. ``settings`` are
+    completed with the data of the files. ``signs_from`` is the source of the signs, and ``remarks`` list repaired
+    values.
+    """
 
     tables: Sequence[MotionTable]
     columns: GaitMap
@@ -122,9 +127,9 @@ class GaitSource:
 
 
 def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: list[PpafoError]) -> GaitSource:
-    """Return the signals in recorded files; what is wrong but leaves both angles usable is added to ``wrong``.
+    """Return the signals in recorded files; problems that leave both angles usable are added to ``wrong``.
 
-    DataError for what ends the import, with everything in ``wrong``.
+    Raises DataError for a problem that ends the import, including all problems in ``wrong``.
     """
     if not files:
         raise DataError("no file was given; a gait needs at least the angles of shank and ankle")
@@ -170,7 +175,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
 
 
 def of_largest_one(signal: Signal, is_upwards: bool = False) -> Signal:
-    """Return a load whose largest number is 1: its scale is wrong or not known, and the rest is looked at with it."""
+    """Return a load scaled to a largest value of 1, for checks that are independent of a wrong or unknown scale."""
     largest = float(signal.values[np.argmax(np.abs(signal.values))]) or 1.0
     return replace(signal, values=signal.values / (largest if is_upwards else abs(largest)))
 
@@ -178,9 +183,9 @@ def of_largest_one(signal: Signal, is_upwards: bool = False) -> Signal:
 def _with_subject(
     settings: ImportSettings, tables: Sequence[MotionTable], wrong: list[PpafoError]
 ) -> tuple[ImportSettings, list[str]]:
-    """Return the settings with body mass and stature that a C3D file states; what the user states wins.
+    """Return the settings, completed with body mass and stature from C3D files; values of the user take precedence.
 
-    A body mass that is stated nowhere is added to ``wrong``.
+    A missing body mass is added to ``wrong``.
     """
     masses, statures = (
         [(table.file, value) for table in tables if table.trial and (value := getattr(table.trial, name)) is not None]
@@ -210,7 +215,7 @@ def _with_subject(
 
 
 def _ends(walk: Mapping[str, Signal], tables: Sequence[MotionTable]) -> list[str]:
-    """Return a remark on each motion that was not seen at an end of its file, and on loads that were not measured."""
+    """Return remarks on motions that are missing at an end of their file, and on loads that were not measured."""
     spans = {table.file: (float(table.time[0]), float(table.time[-1])) for table in tables}
     seen: dict[tuple[float, float, float, float], list[str]] = {}
     loads: dict[int, list[str]] = {}

@@ -1,7 +1,7 @@
-"""Strides of a recording that are taken, and those that are left out: of unusual time, with drop-outs, or odd.
+"""Selection of strides: rejection of strides with unusual duration, sensor drop-outs or an odd shape.
 
-Left out is what no leg does: columns that stay constant while the wearer walks, drop-outs that were filled with the
-last value, and strides whose curve is unlike all others.
+Rejected are recordings that no leg can produce: columns that stay constant while the wearer walks, drop-outs filled
+with the last value, and strides whose curve differs from all others.
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,14 +39,17 @@ _MOST_ODD = 0.4
 
 @dataclass(frozen=True, slots=True)
 class StrideSelection:
-    """Strides taken, strides left out, each with the reason, and the least number to take."""
+    """Selected strides, rejected strides with the reason for each, and the least number of selected strides."""
 
     taken: tuple[Stride, ...]
     left_out: tuple[tuple[Stride, str], ...]
     least: int
 
     def without(self, odd: Sequence[Stride], why: str, else_refused: str = "") -> "StrideSelection":
-        """Return these without some; where too few remain all stay, or DataError with the words for that case."""
+        """Return the selection without some strides, or unchanged if too few would remain.
+
+        In the latter case, raises DataError with the message ``else_refused``, if given.
+        """
         kept = tuple(stride for stride in self.taken if stride not in odd)
         if len(kept) >= self.least:
             return StrideSelection(kept, (*self.left_out, *((stride, why) for stride in odd)), self.least)
@@ -56,7 +59,7 @@ class StrideSelection:
 
 
 def of_usual_time(strides: Sequence[Stride], least: int) -> StrideSelection:
-    """Return strides without those whose time differs from the median by more than LARGEST_STRIDE_CHANGE of it."""
+    """Return the strides whose duration differs from the median by at most the fraction LARGEST_STRIDE_CHANGE."""
     if not strides:
         return StrideSelection((), (), least)
     # The median: one stop among ten strides would move a mean.
@@ -75,11 +78,11 @@ def without_drop_outs(
     strides: StrideSelection,
     wrong: list[PpafoError],
 ) -> StrideSelection:
-    """Leave out strides in which a column keeps one value for more than 0.1 s; a load may in swing.
+    """Reject strides in which a column is constant for more than 0.1 s; in swing, a load may be constant.
 
-    Loads are looked at in the strides that they cover. A column that never moves is no drop-out, and a stretch that a
-    coarse sensor enters and leaves by its smallest step is none either. Where too few strides would be left all stay,
-    and that is added to ``wrong``.
+    Loads are checked in the strides that they cover. Two cases are no drop-outs: a column that never changes, and an
+    interval that a coarse sensor enters and leaves by its smallest increment. If too few strides would remain, all are
+    kept and the problem is added to ``wrong``.
     """
     by_file = {table.file: table for table in tables}
     for name, signal in walk.items():
@@ -108,7 +111,7 @@ def without_drop_outs(
 
 
 def constant_stretches(time: Floats, values: Floats, spans: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return start and end [s] of all stretches with one value that cover more than 0.1 s of the spans."""
+    """Return start and end [s] of all intervals with a constant value that cover more than 0.1 s of the spans."""
     steps = np.abs(np.diff(values))
     # A gap ends a stretch, too, but a column with gaps alone never moves.
     moves = np.flatnonzero(steps != 0.0)
@@ -132,7 +135,7 @@ def constant_stretches(time: Floats, values: Floats, spans: Sequence[tuple[float
 
 
 def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: StrideSelection) -> StrideSelection:
-    """Leave out strides whose curve is unlike all others: a stumble, a turn, markers that were exchanged."""
+    """Reject strides whose curve differs from all others: a stumble, a turn, or exchanged markers."""
     for name, curve in curves.items():
         if len(curve.strides) < _FEWEST_TO_COMPARE or name == "centre_of_pressure":
             continue

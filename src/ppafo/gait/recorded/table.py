@@ -1,4 +1,4 @@
-"""A recording of motion in one form: time, and columns with the unit of the file; gaps filled where that is honest."""
+"""Motion recording as a table: time, and columns in the units of the file; short gaps can be filled."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -20,7 +20,7 @@ _COORDINATES = (".x", ".y", ".z")
 
 
 def bare_label(label: str) -> str:
-    """Return a marker's label without the subject's name before a colon."""
+    """Return the label of a marker without the subject's name before a colon."""
     return label.rpartition(":")[2].strip()
 
 
@@ -29,9 +29,10 @@ Events = dict[tuple[str, str], list[float]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrialData:
-    """Data of a file beside its columns: subject (kg, m; None where not stated), events [s] by side and kind.
+    """Data of a file besides its columns: subject (mass [kg], stature [m]; None if not stated) and events.
 
-    ``remarks`` say how its events were read, or why they were not.
+    ``events`` holds times [s] by side and kind. ``remarks`` state how the events were read, or the reason that they
+    were not.
     """
 
     body_mass: float | None = None
@@ -42,10 +43,10 @@ class TrialData:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionTable:
-    """Columns over time [s] as a file has them; a unit is empty where the file does not say it.
+    """Columns over time [s] as stored in a file; a unit is empty if the file does not state it.
 
-    ``form`` is the name of its form, which the reader of any form fills in. ``kind`` is ``measured`` or ``synthetic``.
-    ``remarks`` say what was mended, ``trial`` is what the file says of subject and events.
+    ``form`` is the name of the file format, set by the caller of the reader. ``kind`` is ``measured`` or ``synthetic``.
+    ``remarks`` describe repairs, ``trial`` holds data on subject and events.
     """
 
     file: str
@@ -65,10 +66,10 @@ _LARGEST_JUMP = 3.0
 def cut_table(
     table: MotionTable, longest_gap: float = 0.0, start: float | None = None, end: float | None = None
 ) -> MotionTable:
-    """Return a table from ``start`` to ``end`` [s]; rows that are missing are remarked.
+    """Return a table from ``start`` to ``end`` [s], with a remark on missing rows.
 
-    Those missing for no longer than ``longest_gap`` [s] are bridged; a longer gap of the clock gets a row without
-    numbers, so that the strides across it are left out.
+    A gap of up to ``longest_gap`` [s] is bridged. A longer gap gets one row of NaN, so that strides across it are
+    rejected.
     """
     if table.time.size < 3:
         raise DataError(f"{table.file}: has {table.time.size} rows; a stride needs several tens")
@@ -107,11 +108,11 @@ _LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
 def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTable:
-    """Return the table with NaN where a marker of these columns was not seen, and a remark on each such marker.
+    """Return the table with NaN for frames in which a marker of these columns was lost, and a remark on each marker.
 
-    Not seen is a marker with a coordinate that is no number, with all coordinates exactly 0, or still at its last place
-    until it is found again: equal to the last bit for two frames or more, then further away than a marker at rest
-    comes in one interval, ``MOST_ACCELERATION`` times its square [m].
+    A marker is lost in three cases: a coordinate is not a number; all coordinates are exactly 0; or its position stays
+    bitwise equal for two frames or more and then jumps further than a marker at rest can move in one sample interval,
+    which is ``MOST_ACCELERATION`` times the interval squared [m].
     """
     columns, said = dict(table.columns), []
     labels = dict.fromkeys(name[:-2] for name in names if name[-2:] in _COORDINATES)
@@ -141,7 +142,7 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
 
 
 def _held(at: Floats, furthest: float) -> NDArray[np.bool_]:
-    """Return the frames in which a marker (coordinates, frames) [m] repeats its last place before it jumps."""
+    """Return the frames in which a marker (coordinates, frames) [m] repeats its last position before a jump."""
     steps = np.linalg.norm(np.diff(at, axis=1), axis=0)
     held = np.zeros(at.shape[1], dtype=np.bool_)
     moves = np.flatnonzero(steps != 0.0)
@@ -157,9 +158,9 @@ LONGEST_FILLED = 0.25
 
 
 def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> MotionTable:
-    """Return the table with gaps of no longer than ``longest`` [s] in these columns filled by a cubic spline.
+    """Return the table with gaps of up to ``longest`` [s] in these columns filled by a cubic spline.
 
-    What is missing at the ends stays so, and longer gaps too: the user of the column refuses them.
+    Gaps at the ends and longer gaps remain; the user of the column rejects them.
     """
     from scipy.interpolate import CubicSpline
 

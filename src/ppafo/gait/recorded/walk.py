@@ -1,7 +1,7 @@
-"""A recorded walk: the curves of a gait over time, in SI units and in the signs of the package.
+"""Recorded walk: curves of a gait over time, in SI units and in the signs of the package.
 
-Each is read from the one table that has its columns, from lines between markers (the lean of the shank, and the foot
-that turns against it), or, for the knee, from hip and thigh.
+Each curve is computed from the one table that contains its columns: directly, from lines between markers (shank lean,
+and ankle angle of the foot relative to the shank), or, for the knee, from hip and thigh.
 """
 
 import math
@@ -43,12 +43,11 @@ _DOUBLE_PASS = (2.0**0.5 - 1.0) ** 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signal:
-    """Values over time [s], evenly enough sampled, of one file.
+    """Signal over time [s] from one file, with nearly uniform sampling.
 
-    ``is_position``: a position [m], of which the gait has the acceleration.
-    ``columns`` are the file's columns behind it. ``absent`` tells where a load was not measured, and counts as 0; None
-    where it always was. ``lost`` tells where a motion was not recorded, and is bridged by a straight line; None where
-    it always was.
+    ``is_position`` marks a position [m], whose acceleration is a curve of the gait. ``columns`` are the columns of the
+    file that were used. ``absent`` marks samples of a load that were not measured and are set to 0, None if complete.
+    ``lost`` marks samples of a motion that were not recorded and are interpolated linearly, None if complete.
     """
 
     file: str
@@ -61,12 +60,12 @@ class Signal:
 
     @property
     def rate(self) -> float:
-        """Samples per second [Hz]."""
+        """Sampling rate [Hz]."""
         return float((self.time.size - 1) / (self.time[-1] - self.time[0]))
 
 
 def without_ends(signal: Signal) -> Signal:
-    """Return a motion from its first to its last number, with gaps bridged by straight lines and marked as lost."""
+    """Return a motion from its first to its last valid sample, with gaps interpolated linearly and marked as lost."""
     known = np.flatnonzero(np.isfinite(signal.values))
     inside = slice(int(known[0]), int(known[-1]) + 1)
     time, values = signal.time[inside], signal.values[inside]
@@ -77,15 +76,15 @@ def without_ends(signal: Signal) -> Signal:
 
 
 def with_absence(signal: Signal) -> Signal:
-    """Return a load that is 0 where it was not measured, and that says so."""
+    """Return a load set to 0 where it was not measured, with these samples marked as absent."""
     absent = ~np.isfinite(signal.values)
     return signal if not absent.any() else replace(signal, values=np.where(absent, 0.0, signal.values), absent=absent)
 
 
 def low_pass(signal: Signal, cut_off: float) -> Signal:
-    """Return the signal through a Butterworth filter passed forwards and backwards, -3 dB at ``cut_off`` [Hz].
+    """Return the signal filtered forwards and backwards by a Butterworth low pass, -3 dB at ``cut_off`` [Hz].
 
-    DataError where it has too few samples.
+    Raises DataError for a signal with too few samples.
     """
     from scipy.signal import butter, sosfiltfilt
 
@@ -113,7 +112,7 @@ _MOST_SHOWN, _LONGEST_SAID = 12, 160
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CurveColumns:
-    """The table of a curve, its columns with their signs, and the key that states their unit in a gait map."""
+    """Columns of a curve: unit key in a gait map, table, and terms as pairs of sign and column name."""
 
     unit_key: str
     table: MotionTable
@@ -121,7 +120,7 @@ class CurveColumns:
     may_be_absent: bool = False
 
     def in_unit(self, stated: str | None, si_units: Sequence[str]) -> tuple[Floats, str]:
-        """Return the sum of the terms in the first SI unit that fits, and that unit. DataError where none fits."""
+        """Return the sum of the terms in the first SI unit that fits, and this unit; raises DataError if none fits."""
         total = np.zeros(self.table.time.size)
         chosen = si_units[0]
         wrong: list[PpafoError] = []
@@ -156,7 +155,7 @@ class CurveColumns:
 
 
 def check_recorded(values: Floats, where: str) -> None:
-    """Raise DataError for a column without a number; ``where`` is its name in the message."""
+    """Raise DataError for a column without any number; ``where`` is its name in the message."""
     if not np.isfinite(values).any():
         raise DataError(f"{where} contains no numbers; use another file, or map another column")
 
@@ -164,7 +163,7 @@ def check_recorded(values: Floats, where: str) -> None:
 def find_columns(
     curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool
 ) -> CurveColumns | None:
-    """Return the one table that has every column of a curve; None where it may be missing and no table has one."""
+    """Return the columns of a curve from the one table that has all of them; None for an optional curve without any."""
     bare = [name.removeprefix("-") for name in names]
     # One table must have all terms: files need not share a clock to the sample.
     holders = [table for table in tables if all(name in table.columns for name in bare)]
@@ -181,7 +180,7 @@ def find_columns(
 
 
 def _why_missing(curve: str, bare: Sequence[str], tables: Sequence[MotionTable]) -> str:
-    """Column of a curve that no table has, and the nearest one, in words; DataError where several have its name."""
+    """Return a text on the missing column of a curve, with the nearest name; raises DataError for duplicates."""
     known = [name for table in tables for name in table.columns]
     missing = next((name for name in bare if name not in known), bare[0])
     twins = [name for name in known if re.fullmatch(re.escape(_whole(missing)) + r"#\d+(\.[xyz])?", name)]
@@ -199,7 +198,7 @@ def _why_missing(curve: str, bare: Sequence[str], tables: Sequence[MotionTable])
 
 
 def _said_of_columns(tables: Sequence[MotionTable]) -> str:
-    """Columns and remarks of files, cut to a readable length, and the place to name columns, in words."""
+    """Return the columns and remarks of files, shortened, and a hint to name columns in a gait map, as text."""
     # A marker counts once, not by its coordinates.
     names = list(dict.fromkeys(one_line(_whole(name)) for table in tables for name in table.columns))
     shown = ", ".join(names[:_MOST_SHOWN]) + (", ..." if len(names) > _MOST_SHOWN else "")
@@ -213,7 +212,7 @@ def _said_of_columns(tables: Sequence[MotionTable]) -> str:
 
 
 def _whole(name: str) -> str:
-    """Return the marker of a coordinate, or a column as it is."""
+    """Return the marker of a coordinate; any other column name is returned unchanged."""
     return name[:-2] if name[-2:] in (".x", ".y", ".z") else name
 
 
@@ -227,7 +226,7 @@ _LEAST_FLAT = 0.1
 def between_markers(
     columns: CurveColumns, mapped: ShankMap | AngleMap, first: str, second: str
 ) -> tuple[Floats, Floats]:
-    """Distances of the second marker ahead of the first and above it, in the unit of the file."""
+    """Return the distance of the second marker ahead of the first, and the height above it, in the unit of the file."""
     marker = {name: columns.table.columns[name] for _, name in columns.terms}
     for name, values in marker.items():
         check_recorded(values, f"{columns.table.file}: column {name!r}")
@@ -238,7 +237,10 @@ def between_markers(
 
 
 def foot_markers_angle(columns: CurveColumns, mapped: AngleMap, shank: Signal) -> Signal:
-    """Return the ankle angle [rad] of a line from heel to toes: flat, 90 deg plus the shank, less the neutral one."""
+    """Return the ankle angle [rad] from heel and toe markers; with a flat foot it is 90 deg plus the shank angle.
+
+    The neutral angle of the map is subtracted.
+    """
     ahead, up = between_markers(columns, mapped, str(mapped.heel), str(mapped.toe))
     pitch = Signal(columns.table.file, columns.table.time, np.arctan2(up, ahead))
     seen = without_ends(pitch)
@@ -280,8 +282,8 @@ def knee_signals(
 ) -> dict[str, Signal]:
     """Return ``knee_forward`` and ``knee_up``, each a position [m] or an acceleration [m/s^2].
 
-    With a thigh they are the motion of the hip and of the knee about it: in the plane, with the hip where the columns
-    of the map say it is. DataError where a column, unit or length is missing or does not fit.
+    With a thigh, they are the position of the knee, computed in the sagittal plane from the hip position in the columns
+    of the map and the lean of the thigh. Raises DataError if a column, unit or length is missing or inconsistent.
     """
     if mapped.thigh is not None and mapped.thigh_length is None and stature is None:
         if is_default:
@@ -323,9 +325,9 @@ def knee_signals(
 
 
 def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: float | None) -> list[str]:
-    """Remarks on the source of the knee's acceleration, or the reason that there is none; ``stature`` [m].
+    """Return remarks on the source of the knee's acceleration, or the reason for its absence; ``stature`` in [m].
 
-    DataError for a length of the thigh that is not plausible.
+    Raises DataError for an implausible length of the thigh.
     """
     if mapped is None:
         return []
@@ -347,7 +349,7 @@ def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: fl
 
 
 def check_way(walk: Mapping[str, Signal], signs_from: SignSource) -> None:
-    """Raise DataError for a knee that moves backwards; on a treadmill it stays about where it is."""
+    """Raise DataError for a knee that moves backwards; on a treadmill, the knee stays in about the same place."""
     knee = walk.get("knee_forward")
     if knee is None or not knee.is_position:
         return
@@ -361,14 +363,14 @@ def check_way(walk: Mapping[str, Signal], signs_from: SignSource) -> None:
 
 
 def knee_position(hip_forward: Floats, hip_up: Floats, lean: Floats, thigh_length: float) -> tuple[Floats, Floats]:
-    """Position of the knee, forward and up [m]; the thigh leans by this [rad], above 0 with the knee in front."""
+    """Return the knee position, forward and up [m]; ``lean`` of the thigh [rad], positive with the knee in front."""
     return hip_forward + thigh_length * np.sin(lean), hip_up - thigh_length * np.cos(lean)
 
 
 def acceleration_of(position: Floats, harmonics: int, stride_time: float) -> Floats:
-    """Return the acceleration [m/s^2] of a position [m] over one stride of this time [s], at as many phases.
+    """Return the acceleration [m/s^2] of a position [m] over one stride with this stride time [s], at the same phases.
 
-    The mean speed is taken out, a Fourier series fitted, and the series differentiated twice.
+    The mean speed is subtracted, a Fourier series is fitted, and the series is differentiated twice.
     """
     phase = np.linspace(0.0, 1.0, position.size)
     # A straight line through both ends leaves a periodic rest, which a series can follow.
@@ -398,13 +400,13 @@ def walk_signals(
     is_default: bool,
     wrong: list[PpafoError],
 ) -> dict[str, Signal]:
-    """Return the signals that a map finds in tables; all that is wrong with their columns is added to ``wrong``.
+    """Return the signals that a map finds in tables; all problems with their columns are added to ``wrong``.
 
-    Loads are per ``body_mass`` [kg], and the ``stature`` [m] gives the length of the thigh.
+    Loads are divided by ``body_mass`` [kg] or by the body weight; ``stature`` [m] gives the length of the thigh.
 
-    With a convention of the package (``is_default``) only both angles have to be there; what a map of the user names
-    has to be there. A motion goes from its first number to its last, a load is 0 where it was not measured. DataError
-    where an angle cannot be used, with everything in ``wrong``.
+    For a default convention (``is_default``), only both angles are required; all curves in a map of the user are
+    required. A motion starts at its first valid sample and ends at its last; a load is 0 where it was not measured.
+    Raises DataError if an angle cannot be used, with all problems in ``wrong``.
     """
     try:
         named = {
@@ -451,7 +453,7 @@ _LEAST_UPRIGHT = 0.5
 
 
 def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
-    """Raise DataError for a shank along wrong axes, or one that turns too little for anybody to walk."""
+    """Raise DataError for a shank with wrong axes, or with too small a rotation for walking."""
     if shank.time[-1] - shank.time[0] < _SHORTEST_WALK:
         return
     low, high = SHANK_RANGE
@@ -501,7 +503,7 @@ _POSITIVE = ("ankle_in_front", "plantarflexion", "up", "forward")
 
 
 def _curve_of(name: str, columns: CurveColumns, mapped: Any, body_mass: float) -> Signal:
-    """Return the signal of a curve in SI units, with the signs of the package; loads per ``body_mass`` [kg]."""
+    """Return the signal of a curve in SI units and package signs; loads are relative to ``body_mass`` [kg]."""
     if isinstance(mapped, ShankMap) and mapped.terms is None:
         ahead, up = between_markers(columns, mapped, str(mapped.knee), str(mapped.ankle))
         values, unit = np.asarray(np.arctan2(ahead, -up), dtype=np.float64), "rad"

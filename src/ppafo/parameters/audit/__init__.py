@@ -1,7 +1,7 @@
-"""Checks of any parameter set for contradictions, with whatever values it has.
+"""Consistency checks of a parameter set, with any values.
 
-All checks run, in the order of the report; reasons by which the set's author accepts a finding are taken into account.
-To add one: a function in the module of its subject and one line here.
+All checks run, in the order of the report. Reasons with which the author of the set accepts a finding are applied.
+To add a check, write a function in the module of its subject and list it here.
 """
 
 from collections.abc import Callable, Iterator
@@ -57,10 +57,10 @@ _ORDER = {"error": 0, "warning": 1, "note": 2}
 
 
 def findings_of(audited: ParameterSet, parent: ParameterSet | None = None) -> list[AuditFinding]:
-    """Return contradictions of a set and values that deserve attention, errors first; see ``ppafo.audit``.
+    """Return the contradictions and remarkable values of a set, errors first; see ``ppafo.audit``.
 
-    ``parent`` is the set that it was made from, the one that its file names unless given: a reason that stands there
-    too lapses where the set changes a value of the finding.
+    ``parent`` is the set from which this one was made, by default the one that its file names. An accepting reason that
+    the parent states too lapses if the set changes a value of the finding.
     """
     of_parent = set_or_load(parent or audited.parent or None)
     evidence = Evidence(with_followers(audited), audited.declarations())
@@ -84,7 +84,7 @@ def findings_of(audited: ParameterSet, parent: ParameterSet | None = None) -> li
 
 
 def changed_paths(parameter_set: ParameterSet, parent: ParameterSet | None) -> frozenset[str]:
-    """Return the paths whose values come from overrides, or differ from the parent's."""
+    """Return the paths of all values that come from overrides or differ from the parent's."""
     of_file = frozenset[str]() if parent is None else {change.path for change in changes(parameter_set, parent)}
     return overridden_paths(parameter_set) | of_file
 
@@ -92,7 +92,7 @@ def changed_paths(parameter_set: ParameterSet, parent: ParameterSet | None) -> f
 def _judge(
     finding: AuditFinding, parameter_set: ParameterSet, overridden: frozenset[str], parent: ParameterSet | None
 ) -> AuditFinding:
-    """Apply the set's reason, which holds for its author's values, not for overrides or changes in a copy."""
+    """Apply the author's accepting reason, unless an override or a change in a copy affects a value of the finding."""
     reason = parameter_set.accepted.get(finding.id, "")
     is_copied = parent is not None and parent.accepted.get(finding.id) == reason
     others = changed_paths(parameter_set, parent) if is_copied else overridden

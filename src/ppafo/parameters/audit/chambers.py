@@ -1,4 +1,4 @@
-"""Do the chambers agree with the torque, the range of angles and the measured gas? Equations (2) to (5)."""
+"""Checks of the chambers against torque, angle range and measured gas use. Equations (2) to (5)."""
 
 import math
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ _TOLERANCE = 0.1
 
 
 def check_virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a warning where the two differ by more than 10 %, a note where a stated efficiency explains it."""
+    """Yield a warning if torque constant and displacement differ by over 10 %, a note if the efficiency explains it."""
     numbers, efficiency = evidence.numbers(_TORQUE_CONSTANT, _DISPLACEMENT_PER_RADIAN), evidence.number(_EFFICIENCY)
     if numbers is None or min(numbers) <= 0.0:
         return
@@ -66,7 +66,7 @@ def check_virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
 def _gas_use(
     evidence: Evidence, torque_constant: float, displacement_per_radian: float
 ) -> tuple[tuple[str, ...], tuple[ComparedNumber, ...], str]:
-    """Return paths, numbers and a sentence on the volume that the gas of one filling occupies."""
+    """Return paths, numbers and a sentence on the volume occupied by the gas of one filling."""
     gas, supply, angles = evidence.gas(), evidence.number(_SUPPLY), evidence.angle_range()
     path = evidence.single_fill_gas()
     if gas is None or supply is None or supply <= evidence.atmosphere() or angles is None or path is None:
@@ -96,7 +96,7 @@ _DEAD = ("actuator.dead_volume_1", "actuator.dead_volume_2")
 
 
 def check_volumes(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for each chamber that has no volume left at one end of the range."""
+    """Yield an error for each chamber whose volume is not positive at one end of the angle range."""
     numbers, angles = evidence.numbers(_SLOPE, *_STOPS), evidence.angle_range()
     if numbers is None or angles is None or numbers[0] <= 0.0:
         return
@@ -107,7 +107,7 @@ def check_volumes(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_path: str) -> Iterator[AuditFinding]:
-    """Yield an error where a chamber, with ``travel`` [rad] left to a swept volume of zero, has no volume."""
+    """Yield an error if a chamber, ``travel`` [rad] before zero swept volume, has no volume left."""
     slope = evidence.number(_SLOPE) or math.inf
     dead_path, stop_path = _DEAD[chamber - 1], _STOPS[chamber - 1]
     dead = evidence.number(dead_path) or 0.0
@@ -143,7 +143,7 @@ _SAME_TURN = 1.01
 
 
 def check_rotation(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error where the stops are the wrong way round; a warning for a range larger than by the designation."""
+    """Yield an error for stops in the wrong order, a warning for a range larger than the actuator's designation."""
     rated, angles = evidence.number(_RATED), evidence.angle_range()
     stops = evidence.numbers("actuator.angle_min", "actuator.angle_max")
     if stops is not None and not stops[0] < stops[1]:
@@ -186,9 +186,9 @@ _LEAST, _MOST = 0.6, 1.1
 
 
 def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield the gas of a filling in the middle of the range: a note where the measured gas agrees, else a warning.
+    """Yield the gas of one filling at the middle of the range: a note if the measured gas agrees, else a warning.
 
-    Silent where the set reports no gas of a single filling.
+    Yields nothing if the set reports no gas use of a single filling.
     """
     gas, supply, angles = evidence.gas(), evidence.number(_SUPPLY), evidence.angle_range()
     path = evidence.single_fill_gas()
@@ -229,7 +229,7 @@ def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def check_rounded_table(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a note that says by how much the volumes of a rounded table were moved."""
+    """Yield a note on the distance by which the volumes of a rounded table were moved."""
     parameter_set = evidence.parameter_set
     path = Path(parameter_set.file).parent / parameter_set.actuator_file
     if parameter_set.actuator_table is None or not path.is_file():

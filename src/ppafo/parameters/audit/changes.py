@@ -1,4 +1,4 @@
-"""Changes of a parameter set against the set that it began as: value by value, whatever the unit."""
+"""Changes of a parameter set with respect to its parent set, value by value, in any units."""
 
 import math
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _SAME = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class ValueChange:
-    """A value that differs, as each set gives it; '' where a set has none. ``origin`` of the new value."""
+    """Changed value: text in the parent ('' if absent), text in the set ('' if absent), and origin of the new value."""
 
     path: str
     before: str
@@ -30,7 +30,7 @@ class ValueChange:
 def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[ValueChange]:
     """Return the differences of a set from its parent: kinds and choices first, then values in the set's order.
 
-    Numbers are compared in SI, so that a value in another unit is the same value; sources and notes do not count.
+    Numbers are compared in SI: the same value in another unit is no change. Sources and notes are not compared.
     """
     parameter_set, parent = with_followers(parameter_set), with_followers(parent)
     kinds, old_kinds = (

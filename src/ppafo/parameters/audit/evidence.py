@@ -1,4 +1,4 @@
-"""A finding of an audit, with the numbers on both sides, and the evidence that checks are given."""
+"""Finding of an audit with the compared numbers, and the read access of the checks to a parameter set."""
 
 import contextlib
 import math
@@ -25,7 +25,7 @@ Severity = Literal["error", "warning", "note"]
 
 @dataclass(frozen=True, slots=True)
 class NamedValue:
-    """A value of the set that a finding rests on, as it was given."""
+    """Value of the set on which a finding rests, in the unit given by the set."""
 
     path: str
     value: float | str
@@ -44,7 +44,7 @@ class ComparedNumber:
 
 @dataclass(frozen=True, slots=True)
 class AuditFinding:
-    """A contradiction (error), something to know before trusting a result (warning), or a check that holds (note).
+    """Finding of an audit: a contradiction (error), a caveat for users of results (warning), or a passed check (note).
 
     ``paragraph`` says in words what was compared and what would be consistent. ``accepted`` is the reason why the
     author of the set keeps a contradiction; it lowers an error to a warning and is empty otherwise.
@@ -59,7 +59,7 @@ class AuditFinding:
     accepted: str = ""
 
     def document(self) -> dict[str, Any]:
-        """Return the finding as plain data for JSON, which knows no infinite numbers: those become null."""
+        """Return the finding as plain data for JSON; infinite numbers become null."""
         plain = asdict(self)
         for side in plain["sides"]:
             side["value"] = side["value"] if math.isfinite(side["value"]) else None
@@ -73,38 +73,38 @@ _SMALLEST, _LARGEST = 1e-20, 1e20
 
 
 class ReportedRange(NamedTuple):
-    """The range of numbers that a reported number can stand for; SI, positive."""
+    """Interval of the numbers that round to a reported number; SI, positive."""
 
     low: float
     high: float
 
     def times(self, other: "ReportedRange") -> "ReportedRange":
-        """Return the range of the product."""
+        """Return the interval of the product."""
         return ReportedRange(self.low * other.low, self.high * other.high)
 
     def over(self, other: "ReportedRange") -> "ReportedRange":
-        """Return the range of the quotient."""
+        """Return the interval of the quotient."""
         return ReportedRange(self.low / other.high, self.high / other.low)
 
     def meets(self, other: "ReportedRange") -> bool:
-        """Return whether one number could be meant by both."""
+        """Return True if the two intervals overlap."""
         return self.low <= other.high and other.low <= self.high
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """A parameter set as the checks of an audit read it."""
+    """Parameter set as read by the checks of an audit."""
 
     parameter_set: ParameterSet
     declared: Mapping[str, Quantity]
 
     def number(self, path: str) -> float | None:
-        """Return the value at a path in SI, None where the set does not have it or it is beyond all measure."""
+        """Return the value at a path in SI; None if the set lacks it or its magnitude is not within 1e-20 to 1e20."""
         value = number_in_si(self.parameter_set, path)
         return value if value is None or value == 0.0 or _SMALLEST < abs(value) < _LARGEST else None
 
     def numbers(self, *paths: str) -> tuple[float, ...] | None:
-        """Return the values at all paths in SI, None where one is lacking."""
+        """Return the values at all paths in SI; None if any is missing."""
         values = [self.number(path) for path in paths]
         present = tuple(value for value in values if value is not None)
         return present if len(present) == len(paths) else None
@@ -115,7 +115,7 @@ class Evidence:
         return None if entry is None else entry.value
 
     def magnitude(self, path: str) -> ReportedRange | None:
-        """Return the range that the reported digits at a path leave open, without sign, in SI."""
+        """Return the interval [SI] of the magnitude at a path: its stated uncertainty, else its rounding."""
         value, entry = self.number(path), self.parameter_set.numbers.get(path)
         if value is None or entry is None or entry.value == 0.0:
             return None
@@ -142,20 +142,20 @@ class Evidence:
         return f"{number.removesuffix('.')} {unit}"
 
     def values_of(self, *paths: str) -> tuple[NamedValue, ...]:
-        """Return the values at those paths that the set has, as they were given."""
+        """Return the values at the given paths, as stated in the set; paths without a value are omitted."""
         numbers, texts = self.parameter_set.numbers, self.parameter_set.texts
         values = [NamedValue(p, numbers[p].value, numbers[p].unit, numbers[p].origin) for p in paths if p in numbers]
         return (*values, *(NamedValue(p, texts[p].value, "", texts[p].origin) for p in paths if p in texts))
 
     def gas(self) -> Gas | None:
-        """Return the gas, None where the set does not say enough or what it says is no gas."""
+        """Return the gas; None if the set lacks one of its numbers or a number is out of range."""
         values = self.numbers(*GAS_PATHS)
         if values is None or not all(is_within(values[i], self.declared[path]) for i, path in enumerate(GAS_PATHS)):
             return None
         return Gas(self.text("gas.species") or "gas", *values)
 
     def atmosphere(self) -> float:
-        """Return the ambient pressure [Pa absolute], the standard one where the set does not say."""
+        """Return the ambient pressure [Pa absolute]; the standard atmosphere if the set states none."""
         return self.number(ATMOSPHERE_PATH) or STANDARD_ATMOSPHERE
 
     def angle_range(self) -> tuple[str, float, str, float] | None:
@@ -177,14 +177,14 @@ class Evidence:
         return next((path for path in paths if self.number(path)), None)
 
     def chamber_1_volume(self, angle: float) -> float | None:
-        """Return the volume of chamber 1 [m^3] at an angle [rad], without a dead volume that the set does not have."""
+        """Return the volume of chamber 1 [m^3] at an angle [rad]; a dead volume missing in the set counts as 0."""
         values = self.numbers("actuator.displacement_per_radian", "actuator.angle_min")
         dead_volume = self.number("actuator.dead_volume_1") or 0.0
         return None if values is None else chamber_1_volume(angle, values[1], values[0], dead_volume)
 
 
 def digits(value: float) -> ReportedRange:
-    """Return the range that the digits of a reported positive number leave open."""
+    """Return the interval of the numbers that round to a reported positive number."""
     return ReportedRange(value - _half_digit(value), value + _half_digit(value))
 
 

@@ -1,4 +1,4 @@
-"""Do flows and constants of flow follow from orifices and gas? Equations (6) and (7), and ISO 6358."""
+"""Checks of flows and flow constants against orifices and gas. Equations (6) and (7), and ISO 6358."""
 
 import ast
 import math
@@ -21,7 +21,7 @@ _GRAMS = 1e3
 
 
 def check_orifices(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for an orifice in two forms, and a note with the flow of each valve in the set's gas."""
+    """Yield an error for an orifice in two forms, and a note on each valve's flow with the gas of the set."""
     valves = {name: f"valves.{name}" for name in evidence.parameter_set.valve_kinds}
     for section in ("actuator.leak", *valves.values()):
         names = both_forms(evidence.parameter_set, section)
@@ -59,7 +59,7 @@ _SAME_BORE = 0.005
 
 
 def check_bores(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a note for each valve whose area is a tube's: its coefficient is then no property of an orifice."""
+    """Yield a note for each valve whose area is the bore of a tube: its Cd then describes no orifice."""
     for valve in evidence.parameter_set.valve_kinds:
         path = f"valves.{valve}.area"
         area = evidence.number(path) or 0.0
@@ -134,7 +134,7 @@ _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
 
 
 def evaluate(formula: str, heat_capacity_ratio: float) -> float | None:
-    """Return the value of a formula such as ``(k + 1)/(k - 1)``, None where it is no such thing."""
+    """Return the value of a formula such as ``(k + 1)/(k - 1)``; None for any other text."""
     # The formula comes from a file: neither its length nor its value may hold up the audit.
     if len(formula) > _LONGEST:
         return None
@@ -168,7 +168,7 @@ _ROUNDING = 1e-3
 
 
 def check_choked_flow(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a finding for each reported constant, a note where it holds, and one for the reported exponent."""
+    """Yield a finding for each reported constant, a note if it agrees, and a finding for the reported exponent."""
     gas = evidence.gas()
     if gas is None:
         return
@@ -251,7 +251,7 @@ _MODEL = 0.02
 
 @dataclass(frozen=True, slots=True)
 class _ValveFlow:
-    """A measured flow beside what the set's orifice passes, SI; ``per_area`` is the flow of Cd A = 1 m^2."""
+    """Reported and computed flow of a valve, in SI; ``per_area`` is the flow of an orifice with Cd A = 1 m^2."""
 
     name: str
     area: float
@@ -263,7 +263,7 @@ class _ValveFlow:
 
 
 def check_flow(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for each valve whose reported flow its Cd A does not pass, and for a shared Cd that cannot be."""
+    """Yield an error for each valve whose reported flow contradicts its Cd A, and for an impossible common Cd."""
     flows = [flow for name in evidence.parameter_set.valve_kinds if (flow := _flow(evidence, name)) is not None]
     for flow in flows:
         if not flow.agrees:
@@ -322,7 +322,7 @@ def _flow(evidence: Evidence, name: str) -> _ValveFlow | None:
 
 
 def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> Iterator[AuditFinding]:
-    """Compare the first valve with every other one that has the same Cd; then flows must be as areas."""
+    """Compare the first valve with every other of the same Cd: their flows must then be in the ratio of the areas."""
     for other in flows[1:]:
         first = flows[0]
         areas = first.area / other.area
@@ -352,7 +352,7 @@ def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> It
 
 
 def check_sonic_flow(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for each valve whose reported flow its sonic conductance does not pass."""
+    """Yield an error for each valve whose reported flow contradicts its sonic conductance."""
     gas = evidence.gas()
     for name in evidence.parameter_set.valve_kinds:
         valve, entry = f"valves.{name}", f"reported.valves.{name}"

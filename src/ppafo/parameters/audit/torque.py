@@ -1,4 +1,4 @@
-"""Do torques, damping, friction and inertia agree with each other and with publications? Equations (1), (2), (10)."""
+"""Checks of torques, damping, friction and inertia against each other and publications. Equations (1), (2), (10)."""
 
 import math
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ _SHIFTS = (-3, -2, -1, 1, 2, 3)
 
 
 def check_inertia(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for each product that does not hold, and a note on one inertia that would make both hold."""
+    """Yield an error for each product that does not hold, and a note on a single inertia for which both would hold."""
     inertia = evidence.magnitude(_INERTIA)
     decay_path, decay = _decay_rate(evidence)
     if inertia is None:
@@ -67,7 +67,7 @@ def check_inertia(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def _decay_rate(evidence: Evidence) -> tuple[str, ReportedRange | None]:
-    """Return beta/I [1/s] and its path, from the ratio or its inverse; an inverse in 1/s is the ratio itself."""
+    """Return beta/I [1/s] and its path, from the ratio or its inverse; an inverse given in 1/s is the ratio."""
     direct = evidence.magnitude(_DECAY)
     inverse = evidence.magnitude(_DECAY_INVERSE)
     if direct is not None or inverse is None:
@@ -86,7 +86,7 @@ def _middle(interval: ReportedRange) -> float:
 def _one_inertia(
     evidence: Evidence, damping: ReportedRange, friction: ReportedRange, decay_path: str
 ) -> Iterator[AuditFinding]:
-    """Look for one inertia within the reported digits of both products, first the reported one with a moved point."""
+    """Search an inertia that fits both products within their digits, first the reported one with a shifted point."""
     if not damping.meets(friction):
         return
     common = ReportedRange(max(damping.low, friction.low), min(damping.high, friction.high))
@@ -128,7 +128,7 @@ _SUPPLIES = ("supply.pressure", "supply.dorsiflexion_pressure", "reported.other_
 
 
 def check_torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield the ceiling for each supply: a note, a warning below the demand, an error below static friction."""
+    """Yield the torque ceiling for each supply: a note, a warning below the demand, an error below static friction."""
     constant = evidence.number(_TORQUE_CONSTANT)
     supplies = {path: value for path in _SUPPLIES if (value := evidence.number(path)) is not None}
     if supplies and evidence.parameter_set.actuator_kind != VANE:
@@ -157,7 +157,7 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def check_vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield for each supply below the atmosphere how deep it is: a warning where its unit is an absolute one."""
+    """Yield the depth of each supply below the atmosphere as a vacuum: a warning if its unit is an absolute one."""
     for path in _SUPPLIES[:2]:
         entry, pressure = evidence.parameter_set.numbers.get(path), evidence.number(path)
         if entry is None or pressure is None or not 0.0 < pressure < evidence.atmosphere():
@@ -179,7 +179,7 @@ def check_vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def _ceiling_by_angle(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield the ceiling of a kind whose torque depends on the angle: the most between the stops, and the least."""
+    """Yield the ceiling of an actuator whose torque depends on the angle: its maximum and minimum between the stops."""
     from ppafo.parameters.building import build_device
 
     try:
@@ -248,9 +248,9 @@ _PARTS = 200
 
 
 def check_published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield for each published torque whether the pressure gives it, and for walking whether it comes in time.
+    """Yield, for each published torque, a comparison with the torque at the supply, and in walking with the fill time.
 
-    Notes where it does, warnings where not; silent without published torques.
+    Agreement gives a note, disagreement a warning. Yields nothing without published torques.
     """
     for name in ("rated", "walking"):
         paths = f"reported.{name}_torque", f"reported.{name}_torque_pressure"
@@ -281,7 +281,7 @@ def check_published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def _while_walking(evidence: Evidence, torque: float, pressure: float) -> Iterator[AuditFinding]:
-    """Yield for each valve how long chamber 1, as large as it is at toe-off, needs for the torque."""
+    """Yield, for each valve, the time that chamber 1 with its volume at toe-off takes to reach the torque."""
     gas, volume = evidence.gas(), evidence.chamber_1_volume(_TOE_OFF)
     constant, atmosphere = evidence.number(_TORQUE_CONSTANT) or 0.0, evidence.atmosphere()
     target = atmosphere + _REACHED * min(torque / constant, pressure - atmosphere)

@@ -1,4 +1,4 @@
-"""Are the values of a set possible: dimensions, ranges, the named gas, and the error of the ideal gas law?"""
+"""Checks of the values of a set: dimensions, ranges, data of the named gas, and error of the ideal gas law."""
 
 import contextlib
 import math
@@ -20,7 +20,7 @@ from ppafo.wording import count_of
 
 
 def check_statements(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for each value whose key names no published number, or one of another size."""
+    """Yield an error for each value whose key names no published number, or a number of another value."""
     for path, entry in evidence.parameter_set.numbers.items():
         name, _, identifier = entry.key.partition("/")
         if not entry.key:
@@ -44,7 +44,7 @@ def check_statements(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
-    """Return number and unit of each statement of a publication by its id, and of its arguments by ``ID.ARGUMENT``."""
+    """Return number and unit of each statement of a publication by id, and of each argument by ``ID.ARGUMENT``."""
     numbers = {}
     for claim in read_publication(name)[0].claims:
         if claim.published is not None:
@@ -62,7 +62,7 @@ def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
 
 
 def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a warning with the values that a device still lacks, unless the set names one that completes it."""
+    """Yield a warning with the values missing for a device, unless the set names another set that completes it."""
     parameter_set = evidence.parameter_set
     if parameter_set.completed_by:
         return
@@ -91,7 +91,7 @@ def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield one finding for values of a foreign dimension, and one for each whose unit belongs to its inverse."""
+    """Yield one finding for values of a wrong dimension, and one for each value in the unit of its inverse."""
     foreign = []
     for path, entry in evidence.parameter_set.numbers.items():
         quantity = evidence.declared[path]
@@ -148,7 +148,7 @@ def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def check_ranges(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for each value that no device can have."""
+    """Yield an error for each value outside its declared range."""
     for path, entry in evidence.parameter_set.numbers.items():
         quantity, value = evidence.declared[path], number_in_si(evidence.parameter_set, path)
         if value is None or is_within(value, quantity):
@@ -179,7 +179,7 @@ _TOLERANCE = 0.02
 
 
 def check_gas_data(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for each gas constant that is more than 2 % off the named gas."""
+    """Yield an error for each gas constant that deviates more than 2 % from the named gas."""
     name = evidence.text("gas.species")
     if name is None:
         return

@@ -1,1 +1,1 @@
-"""Bottles of gas with their regulators: files, properties of what is in them, and the bottle in SI units."""
+"""Gas bottles with regulators: files, fluid properties, and the bottle in SI units."""

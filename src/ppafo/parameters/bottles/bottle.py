@@ -1,8 +1,8 @@
-"""Bottles of gas: their files, with the fluids in them, and bottles of the catalogue of parts.
+"""Gas bottles: their files and fluids, and bottles of the catalogue of parts.
 
-Fluids are property tables by name, made from CoolProp. A catalogue of parts knows the gas in a bottle and its mass.
-The bottle of the paper, filled to the same density, stands in for the rest: volume with the content, heat of the wall
-with the mass, surfaces with its two thirds power.
+Fluids are property tables by name, made from CoolProp. The catalogue of parts states only the gas of a bottle and its
+mass. All other values are scaled from the paper's bottle at the same filling density: volume in proportion to the gas,
+heat capacity of the wall to the mass, surfaces to the 2/3 power of the volume.
 """
 
 import functools
@@ -50,7 +50,7 @@ _SUFFIX = ".json"
 
 @dataclass(frozen=True, slots=True)
 class Fluid:
-    """A fluid: name, table of its properties, and where the numbers come from."""
+    """Fluid: name, table of properties, and source of the numbers."""
 
     name: str
     table: FluidTable
@@ -58,13 +58,13 @@ class Fluid:
 
 
 def list_fluids() -> tuple[str, ...]:
-    """Return the names of the fluids that have a table."""
+    """Return the names of the fluids that have a property table."""
     return tuple(sorted(file.name.removesuffix(_SUFFIX) for file in _FOLDER.iterdir() if file.name.endswith(_SUFFIX)))
 
 
 @functools.cache
 def load_fluid(name: str) -> Fluid:
-    """Return a fluid by name; ParameterError where there is no table of it."""
+    """Return a fluid by name; ParameterError if it has no property table."""
     known = list_fluids()
     if name not in known:
         raise ParameterError(
@@ -91,12 +91,12 @@ _WALL = 885.0
 
 @functools.cache
 def bottle_parts() -> Mapping[str, Part]:
-    """Return the bottles of the catalogue that comes with the package, by name."""
+    """Return the bottles of the bundled catalogue, by name."""
     return load_catalogue().groups["bottles"]
 
 
 def scaled_entries(part: Part, paper: Mapping[str, Entry]) -> dict[str, Entry]:
-    """Return the values of a bottle with the content [kg] and the empty mass [kg] of a part, from the ``paper``'s."""
+    """Return the values of a bottle scaled from the ``paper``'s to the gas mass [kg] and empty mass [kg] of a part."""
     content, empty = part.values["content"], part.values["empty_mass"]
     # The same density of filling: content over the paper's, and the volume with it.
     ratio = 1000.0 * content / paper["bottle.gas_mass"].value
@@ -153,7 +153,7 @@ REGULATOR = (
 
 
 def _passed(part: str, short: str) -> tuple[Quantity, ...]:
-    """Return the quantities of a part that the gas passes, in the order of ``Passage``."""
+    """Return the quantities of a component in the gas path, in the order of ``Passage``."""
     warms = f"share of the way to the {short}'s temperature that the gas warms"
     return (
         Quantity("heat_capacity", "J/K", f"heat capacity of the {part}", minimum=1e-3, maximum=1e6),
@@ -202,7 +202,7 @@ WARMING = (*(f"regulator.{quantity.name}" for quantity in BODY), *(f"hose.{quant
 
 @functools.cache
 def bottle_file() -> type[BaseModel]:
-    """Return the layout of the file of a bottle."""
+    """Return the model of a bottle file."""
     fields: dict[str, Any] = {
         "schema_version": (SchemaVersion, ...),
         "name": (str, Field(pattern=NAME)),
@@ -218,15 +218,15 @@ def bottle_file() -> type[BaseModel]:
 
 
 def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a file of a bottle."""
+    """Return the JSON Schema of a bottle file."""
     return make_schema(bottle_file(), "ppafo bottle")
 
 
 @dataclass(frozen=True, slots=True)
 class Bottle:
-    """A full bottle with its regulator, in SI: volume [m^3], mass of gas [kg], temperature of the room [K].
+    """Full bottle with its regulator, in SI: volume [m^3], mass of gas [kg], room temperature [K].
 
-    ``entries`` are the values as they were given, with their sources, by dotted path.
+    ``entries`` maps each dotted path to its value as given, with the source.
     """
 
     name: str
@@ -245,7 +245,7 @@ class Bottle:
 
     @property
     def supply(self) -> ColdSupply:
-        """The bottle with its regulator and hose as the model takes it."""
+        """Bottle, regulator and hose as parameters of the model."""
         return ColdSupply(
             volume=self.volume,
             wall=self.wall,
@@ -259,12 +259,12 @@ class Bottle:
 
 
 def is_of_catalogue(name_or_path: str | Path) -> bool:
-    """Tell whether this is a part of a catalogue file, ``CATALOGUE.toml/PART``."""
+    """Return True if a name is a part of a catalogue file, ``CATALOGUE.toml/PART``."""
     return Path(name_or_path).parent.suffix == ".toml"
 
 
 def _part_of(name_or_path: str | Path) -> Part | None:
-    """Return the part that a bottle is, by name or ``CATALOGUE.toml/PART``; None for one with a file of its own."""
+    """Return the catalogue part of a bottle by name or ``CATALOGUE.toml/PART``; None for a bottle with a file."""
     path = Path(name_or_path)
     if is_of_catalogue(path):
         return load_catalogue(path.parent).part("bottles", path.name)
@@ -273,12 +273,12 @@ def _part_of(name_or_path: str | Path) -> Part | None:
 
 
 def list_bottles() -> tuple[str, ...]:
-    """Return the names of the bottles that come with the package: bottle files, and bottles of the catalogue."""
+    """Return the names of the bundled bottles: bottle files, and bottles of the catalogue."""
     return tuple(dict.fromkeys((*FILE.names(), *bottle_parts())))
 
 
 def described_bottles() -> list[dict[str, Any]]:
-    """Return name and title of each bottle that comes with the package."""
+    """Return name and title of each bundled bottle."""
     titles = {
         name: f"{part.title}, {1000.0 * part.values['content']:.0f} g, of the catalogue of parts"
         for name, part in bottle_parts().items()
@@ -289,10 +289,10 @@ def described_bottles() -> list[dict[str, Any]]:
 
 
 def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bottle:
-    """Return a bottle by its name, a part's name, or the path of a TOML file, with values replaced.
+    """Return a bottle by name, part name or path of a TOML file, with overrides applied.
 
-    A part of a catalogue of one's own is ``CATALOGUE.toml/PART``. ``overrides`` are texts such as
-    ``bottle.gas_mass=567 g`` or ``room.temperature=5 degC``.
+    A part of your own catalogue is ``CATALOGUE.toml/PART``. ``overrides`` are texts such as ``bottle.gas_mass=567 g``
+    or ``room.temperature=5 degC``.
     """
     name, known, part = label(str(name_or_path)), list_bottles(), _part_of(name_or_path)
     if not (name in known or Path(name_or_path).suffix == ".toml" or "/" in name):
@@ -324,7 +324,7 @@ def _given(parsed: Any) -> dict[str, Entry]:
 
 
 def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
-    """Return the bottle of these values, or report what is missing or cannot be."""
+    """Return the bottle with the given values; ParameterError for missing or impossible ones."""
     missing = [path for path in NEEDED if path not in entries]
     if missing:
         raise ParameterError(f"{file}: {said_missing(missing)}")
@@ -359,7 +359,7 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
 
 
 def _mass_of_fill(values: Mapping[str, float], entries: Mapping[str, Entry], fluid: Fluid, file: str) -> float:
-    """Return the mass of gas [kg] in a full bottle, given as such or by pressure and temperature."""
+    """Return the mass of gas [kg] in a full bottle, given directly or by pressure and temperature."""
     by_pressure = [f"bottle.{quantity.name}" for quantity in FILL_BY_PRESSURE]
     stated = [path for path in by_pressure if path in values]
     # Exactly one form: by mass, or by pressure and temperature.
@@ -395,7 +395,7 @@ def _check_temperature(path: str, temperature: float, fluid: Fluid, file: str) -
 
 
 def _check_content(bottle: Bottle, file: str) -> None:
-    """Refuse a bottle that is overfull, or whose regulator has too little pressure from the start."""
+    """Raise ParameterError for an overfull bottle, or a fill pressure too low for the regulator."""
     fluid, temperature = bottle.fluid, bottle.room_temperature
     _check_temperature("room.temperature", temperature, fluid, file)
     # Liquid can fill the whole bottle; a gas without liquid ends where its table does.
@@ -424,9 +424,9 @@ def _check_content(bottle: Bottle, file: str) -> None:
 
 
 def bottle_part(name_or_path: str | Path) -> tuple[Part, str]:
-    """Return a bottle as a part with the masses of gas and empty bottle, and the name of its fluid.
+    """Return a bottle as a part with gas mass and empty mass, and the name of its fluid.
 
-    A bottle file says nothing of the empty mass: it is what has the heat capacity of the wall.
+    A bottle file states no empty mass: it is computed from the heat capacity of the wall.
     """
     bottle, known = load_bottle(name_or_path), _part_of(name_or_path)
     if known is not None:

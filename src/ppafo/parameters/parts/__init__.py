@@ -1,4 +1,4 @@
-"""Real parts that a device can be built from: figures of data sheets, each with its origin, and what is not known."""
+"""Commercial parts for a device: data-sheet figures, each with its origin, and unknown figures."""
 
 from ppafo.parameters.parts.catalogue import Catalogue, Part, load_catalogue, rated_pressure
 

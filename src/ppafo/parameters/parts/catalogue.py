@@ -1,4 +1,4 @@
-"""The catalogue of parts: layout of its file, real parts with figures of data sheets, and how it is read."""
+"""Catalogue of parts: file layout, commercial parts with data-sheet figures, and loading."""
 
 import math
 from collections.abc import Mapping
@@ -63,7 +63,7 @@ The displacement of an actuator per radian is its torque constant where it is no
 
 
 def figures_of(group: str, kind: str) -> tuple[Quantity, ...]:
-    """Return the figures that a part of a group can have; ``kind`` of a valve, an empty text for others."""
+    """Return the figures of a part of a group; ``kind`` is the kind of a valve, '' for other groups."""
     return VALVE + VALVES[kind].quantities if group == "valves" else GROUPS[group]
 
 
@@ -73,7 +73,7 @@ DOUBTFUL: tuple[Origin, ...] = ("quoted", "assumed")
 
 
 class Figure(StrictTable):
-    """A figure of a part as it was given, in its own unit."""
+    """Figure of a part in its given unit, with origin and source."""
 
     value: Annotated[float, Field(description="the number, in the unit beside it")]
     unit: Annotated[str, Field(description="such as 'mm^2', 'g', 'bar_g'; '' for a number")]
@@ -92,10 +92,10 @@ class Figure(StrictTable):
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A part of the catalogue.
+    """Part of the catalogue.
 
-    ``kind`` of a valve, else an empty text. ``figures`` as written and ``values`` in SI units (pressures
-    absolute), by name; ``unknown`` names figures that are known to exist and that nobody could name.
+    ``kind`` is the kind of a valve, else ''. ``figures`` are as written and ``values`` in SI units (pressures
+    absolute), by name. ``unknown`` lists figures for which no source states a value.
     """
 
     name: str
@@ -116,18 +116,18 @@ class Part:
 
     @property
     def doubtful(self) -> tuple[str, ...]:
-        """Names of the figures that are quoted or assumed."""
+        """Names of the figures of origin quoted or assumed."""
         return tuple(name for name, figure in self.figures.items() if figure.origin in DOUBTFUL)
 
     @property
     def full_mass(self) -> float:
-        """Mass [kg] of the part as it is carried: of a bottle, with its gas."""
+        """Mass [kg] of the part in use; for a bottle including its gas."""
         # Only a bottle has no mass of its own: it is empty mass and content.
         return self.values["mass"] if "mass" in self.values else self.values["empty_mass"] + self.values["content"]
 
     @property
     def model_numbers(self) -> dict[str, float]:
-        """Numbers of a valve by path, in SI; what its maker does not state is ideal, by the defaults."""
+        """Numbers of a valve by path, in SI; a number not stated by its maker has the ideal default."""
         # A figure that is not given is left at the model's default, which is the ideal valve.
         settings = {
             quantity.name: quantity.default for quantity in VALVES[self.kind].quantities if quantity.default is not None
@@ -138,9 +138,9 @@ class Part:
 
 
 def rated_pressure(*parts: Part) -> float:
-    """Return the highest pressure [Pa, absolute] that each of some parts is rated for; infinity where none states one.
+    """Return the lowest of the rated pressures [Pa absolute] of some parts; infinity if no part states one.
 
-    A part whose maker states none sets no limit.
+    A part without a rated pressure sets no limit.
     """
     return min(part.values.get(RATING.name, math.inf) for part in parts)
 
@@ -213,7 +213,7 @@ _NEEDS_A_REASON = ("derived", "assumed")
 
 @dataclass(frozen=True, slots=True)
 class Catalogue:
-    """Parts by group and name; ``file`` is what messages call it."""
+    """Parts by group and name; ``file`` is the label used in messages."""
 
     file: str
     name: str
@@ -224,7 +224,7 @@ class Catalogue:
     def part(self, group: str, name: str) -> Part:
         """Return a part by its group (``valves``, ``bottles``, ...) and name.
 
-        ParameterError with the nearest name where there is none.
+        Raises ParameterError with the nearest name for an unknown part.
         """
         parts = self.groups[group]
         if name not in parts:
@@ -251,9 +251,9 @@ def load_catalogue(catalogue: str | Path = DEFAULT) -> Catalogue:
 
 
 def parse_catalogue(content: bytes, file: str) -> Catalogue:
-    """Return the catalogue in the bytes of a TOML file; ``file`` is what messages call it.
+    """Return the catalogue in the bytes of a TOML file; ``file`` is the label used in messages.
 
-    ParameterError for one that is not usable.
+    Raises ParameterError if the catalogue is not usable.
     """
     parsed: Any = validate(CATALOGUE_FILE, _FILE.parse(content, file), file, ParameterError)
     groups = {

@@ -1,1 +1,1 @@
-"""Statements of publications on this device and its kin, one file each: all that a simulation could meet."""
+"""Published statements on this device and similar ones, one file each, that a simulation can test."""

@@ -1,7 +1,7 @@
-"""A publication as a file: every number and sentence that a simulation could contradict, and how firmly it is meant.
+"""File of a publication: every number and sentence that a simulation could contradict, with its degree of commitment.
 
-What a publication says (``published``, ``words``) and what is arithmetic on it (``own``) are kept apart. Claims,
-observations and the audit read the file of the paper that this package starts from.
+Statements of the publication (``published``, ``words``) are kept apart from arithmetic on them (``own``). Claims,
+observations and the audit read the file of the paper on which this package is based.
 """
 
 from collections.abc import Mapping
@@ -66,7 +66,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def read_publication(name_or_path: str | Path) -> tuple[PublicationFile, str]:
-    """Return a publication by its name or file, and what messages call the file; ScenarioError where it is wrong."""
+    """Return a publication by name or file, and the label of the file for messages; ScenarioError if it is invalid."""
     read, file = read_model(FILE, PublicationFile, name_or_path)
     twice = first_twice(entry.id for entry in read.claims)
     if twice is not None:
@@ -85,5 +85,5 @@ def read_publication(name_or_path: str | Path) -> tuple[PublicationFile, str]:
 
 @cache
 def paper_entries() -> Mapping[str, ClaimEntry]:
-    """Return every statement of the paper by its id."""
+    """Return all statements of the paper by id."""
     return MappingProxyType({entry.id: entry for entry in read_publication(PAPER)[0].claims})

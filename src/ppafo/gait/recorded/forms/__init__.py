@@ -1,1 +1,1 @@
-"""Forms of gait recordings that the package reads, a file each; ``reading.py`` has the catalogue of them."""
+"""File formats of gait recordings, one module each; ``reading.py`` has the catalogue."""

@@ -1,4 +1,4 @@
-"""C3D files: points, outputs of models, analog channels and force plates, subject and events."""
+"""C3D files: points, model outputs, analog channels, force plates, subject and events."""
 
 from collections.abc import Iterable, Iterator
 from itertools import count
@@ -40,10 +40,11 @@ _BODY, _HEIGHT = ("Bodymass", "BODYMASS", "BodyMass"), ("Height", "HEIGHT")
 
 
 def read_c3d(path: str | Path) -> MotionTable:
-    """Return the columns of a C3D file and what it says of subject and events.
+    """Return the columns of a C3D file, with its data on subject and events.
 
-    Analog channels are faster; the samples at the times of the points are taken. Where a point was not seen it is NaN,
-    to be filled or refused where the column is used. The clock is the trial's, which may begin before the file.
+    Analog channels have a higher rate and are sampled at the times of the points. A point that was not visible is NaN,
+    to be filled or rejected by the user of the column. The clock is the one of the trial, which may start before the
+    file.
     """
     try:
         import ezc3d  # noqa: F401  # its absence is reported before the file is looked at
@@ -97,7 +98,7 @@ def read_c3d(path: str | Path) -> MotionTable:
 
 
 def open_c3d(path: str | Path) -> Any:
-    """Return the content of a file read by ezc3d, with force plates where possible; damage can end the process."""
+    """Return the content of a file read by ezc3d, with force plates if possible; a damaged file can end the process."""
     import ezc3d
 
     try:
@@ -110,7 +111,7 @@ def open_c3d(path: str | Path) -> Any:
 
 
 def _plates(content: Any, frames: int) -> Iterator[tuple[str, Floats]]:
-    """Yield the forces [N] of every plate in the axes of the laboratory, upwards above 0, as often as the points."""
+    """Yield the forces [N] of every plate in laboratory axes, positive upwards, at the times of the points."""
     for number, plate in enumerate(content["data"].get("platform", ()), start=1):
         force: Floats = np.asarray(plate["force"], dtype=np.float64)
         if frames == 0 or force.ndim != 2 or force.shape[1] < frames:
@@ -125,7 +126,7 @@ def _plates(content: Any, frames: int) -> Iterator[tuple[str, Floats]]:
 
 
 def _units(group: Any, labels: Iterable[str]) -> dict[str, str]:
-    """Return the unit of every point's coordinates; units of model outputs stand in groups of their own."""
+    """Return the unit of every point's coordinates; units of model outputs are in separate parameter groups."""
     usual = _unit_name(next(iter(_texts(group, "UNITS")), ""))
     units = {label: usual for label in labels}
     for names, unit in _GROUPS:
@@ -139,7 +140,7 @@ def _unit_name(unit: str) -> str:
 
 
 def _texts(group: Any, key: str) -> list[str]:
-    """Return the texts of a parameter; one with more than 255 goes on in KEY2, KEY3 and so on."""
+    """Return the texts of a parameter; with more than 255 texts it continues in KEY2, KEY3 and so on."""
     keys = [key]
     for number in count(2):
         if f"{key}{number}" not in group:
@@ -149,7 +150,7 @@ def _texts(group: Any, key: str) -> list[str]:
 
 
 def _trial(parameters: Any) -> TrialData:
-    """Return subject and events; an unknown spelling, or an implausible value, counts as absent."""
+    """Return subject and events; an unknown spelling or an implausible value is treated as absent."""
     group = parameters.get("PROCESSING", {})
     mass, height = _number(group, _BODY), _number(group, _HEIGHT)
     # Plug-in Gait keeps the height in mm.
@@ -171,9 +172,10 @@ def _number(group: Any, names: Iterable[str]) -> float | None:
 
 
 def _events(group: Any) -> tuple[Events, tuple[str, ...]]:
-    """Return the times of strikes and offs, and remarks on them.
+    """Return the times [s] of heel strikes and toe-offs, and remarks on them.
 
-    A time is stored as minutes and seconds, in two rows; some programs write a flat list, of such pairs or of seconds.
+    A time is stored as minutes and seconds, in two rows. Some programs write a flat list instead, of such pairs or of
+    seconds.
     """
     present = [name for name in ("CONTEXTS", "LABELS", "TIMES") if name in group]
     if len(present) < 3:

@@ -1,6 +1,6 @@
-"""CSV files: of this package, with its names and units, and plain ones with any usual delimiter.
+"""CSV files: of this package, with its names and units, and plain files with any usual delimiter.
 
-A CSV file need not have the header ``name [unit]``: names alone or with the unit in brackets will do.
+The header of a CSV file need not be ``name [unit]``: a name alone, or with the unit in other brackets, is accepted.
 """
 
 import re
@@ -29,19 +29,19 @@ _LONGEST_SHOWN = 40
 
 
 def _recognises(path: str | Path) -> bool:
-    """Recognise a table by its suffix; a .txt file may be one of markers, which says so in its first line."""
+    """Return True for a CSV suffix; a .txt file is excluded if its first line marks it as a file of markers."""
     return Path(path).suffix.lower() != ".txt" or not _header(path).startswith("PathFileType")
 
 
 def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Convention:
-    """Return the map of columns with the names and signs of the package, which do not name the foot."""
+    """Return the map of the package's column names and signs; raises DataError for a left foot."""
     if side != "right":
         raise DataError(f"a CSV file without a gait map has the columns of one foot; omit {setting_text('side')} left")
     return Convention(package_map())
 
 
 def is_plain(path: str | Path) -> bool:
-    """True for a CSV file with other delimiters than the package's, or a column without unit in square brackets."""
+    """Return True for a CSV file with a foreign delimiter, or with a column without a unit in square brackets."""
     header = _header(path)
     return _delimiter(header) != "," or not all("[" in cell for cell in header.split(","))
 
@@ -62,10 +62,10 @@ def _delimiter(header: str) -> str:
 
 
 def read_plain_csv(path: str | Path) -> MotionTable:
-    """Motion table of a CSV file; units are empty where the header does not state one, gaps are NaN.
+    """Return the motion table of a CSV file; units are empty if the header does not state them, gaps are NaN.
 
-    Columns before the time that count rows, of pandas or of frames, are not read. Raises DataError with the line of
-    what cannot be read.
+    Row counters before the time column, such as a pandas index or frame numbers, are skipped. Raises DataError with the
+    line of a value that cannot be read.
     """
     lines = lines_of(path)
     first = next((number for number, line in enumerate(lines) if line.strip() and not line.startswith("#")), 0)

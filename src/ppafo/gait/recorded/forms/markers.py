@@ -1,4 +1,4 @@
-"""Markers and outputs of models as laboratories name them, the axes they stand in, and TRC files with markers."""
+"""Markers and model outputs under their usual laboratory names, detection of the laboratory axes, and TRC files."""
 
 import re
 from collections.abc import Sequence
@@ -57,7 +57,7 @@ _MOST_OBLIQUE = 25.0
 
 
 def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Convention:
-    """Return the map of markers and outputs of Plug-in Gait, with the axes of the laboratory found in the markers."""
+    """Return the map of Plug-in Gait markers and outputs, with the laboratory axes detected from the markers."""
     foot = side[0]
     labels = _recorded_labels(table)
     pairs = (tuple(_label(labels, f"{foot}{name}") for name in names) for names in zip(_KNEES, _ANKLES, strict=True))
@@ -88,9 +88,9 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
 
 
 def convention_of_map(columns: GaitMap, tables: Sequence[MotionTable], side: Side) -> Convention:
-    """Return the map of a user with what it does not say, found in the markers: axes of the laboratory, force plates.
+    """Return a user's map, completed from the markers with laboratory axes and force plates.
 
-    Plates are offered where the map names no vertical force.
+    Force plates are added only if the map names no vertical force.
     """
     shank = columns.shank_angle
     table = next((table for table in tables if f"{shank.knee}.x" in table.columns), None)
@@ -119,27 +119,27 @@ def convention_of_map(columns: GaitMap, tables: Sequence[MotionTable], side: Sid
 
 
 def _recorded_labels(table: MotionTable) -> list[str]:
-    """Return the labels of points with a number in some frame: a model may leave a joint centre without any."""
+    """Return the labels of points that have a value in at least one frame; a joint centre of a model may have none."""
     names = [name for name in table.columns if "." in name and _is_measured(table, name)]
     return list(dict.fromkeys(name.rpartition(".")[0] for name in names))
 
 
 def _label(labels: Sequence[str], pattern: str) -> str | None:
-    """Return the shortest label that matches, whatever its case; points and lines in it do not count."""
+    """Return the shortest label that matches a pattern, or None; case, punctuation and blanks are ignored."""
     # The shortest: model outputs often add a suffix to the plain name.
     matching = [label for label in labels if re.fullmatch(pattern, re.sub(r"[.\s_-]", "", label), re.IGNORECASE)]
     return min(matching, key=len, default=None)
 
 
 def _first(labels: Sequence[str], foot: str, names: Sequence[str]) -> str | None:
-    """Return the label of a foot's marker by the first of its usual names that is there."""
+    """Return the label of a foot's marker by the first usual name that is present, or None."""
     return next(filter(None, (_label(labels, foot + name) for name in names)), None)
 
 
 def _load_maps(
     table: MotionTable, labels: Sequence[str], foot: str, vertical: str, body_mass: float
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return the maps of the measured loads, each with the unit that its size shows, and remarks."""
+    """Return the maps of the measured loads, each with the unit inferred from its magnitude, and remarks."""
     maps: dict[str, Any] = {}
     remarks: list[str] = []
     moment = _label(labels, foot + _MOMENTS)
@@ -166,10 +166,11 @@ def _is_measured(table: MotionTable, name: str) -> bool:
 def _axes(
     table: MotionTable, knee: str, ankle: str, foot: str, labels: Sequence[str]
 ) -> tuple[Axis, Vertical, tuple[str, ...]]:
-    """Return the axes along the walk and upwards, and a remark where they are not x and z.
+    """Return the axes along the walk and upwards, and a remark if these are not x and z.
 
-    Upwards is from ankle to knee; the walk follows the ankle's travel, or the foot where the ankle hardly travels. The
-    foot gives the sign: over part of a stride on a treadmill the ankle may travel backwards.
+    Upwards is the direction from ankle to knee. The direction of walking follows from the ankle's travel, or from the
+    foot if the ankle hardly travels. The foot determines the sign, because over a part of a stride on a treadmill the
+    ankle may travel backwards.
     """
     at_knee, at_ankle = _point(table, knee), _point(table, ankle)
     if at_knee is None or at_ankle is None:
@@ -229,9 +230,10 @@ _PLAUSIBLE = {"moment": (0.35, 2.6), "force": (5.5, 20.0)}
 
 
 def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tuple[str, list[str]]:
-    """Return the unit of a column of ``kind`` "moment" or "force", and a remark where it is not what the file states.
+    """Return the unit of a column of ``kind`` "moment" or "force", and a remark if it differs from the file's.
 
-    The stated unit is taken where the numbers can be walking in it, else the only one in which they can.
+    The stated unit is used if the values are plausible for walking in that unit; otherwise the only plausible unit is
+    used.
     """
     values = np.abs(table.columns[name][np.isfinite(table.columns[name])])
     stated = table.units.get(name, "")
@@ -256,7 +258,7 @@ def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tup
 
 
 def is_trc(path: str | Path) -> bool:
-    """Recognise a file of markers by its suffix, or another by how it begins."""
+    """Return True for a file of markers, detected by its suffix or by its first line."""
     return Path(path).suffix.lower() == ".trc" or read_bytes(path).startswith(b"PathFileType")
 
 

@@ -1,4 +1,4 @@
-"""MATLAB files whose variables are curves over a time: by their names, or by the labels beside a matrix."""
+"""MATLAB files with curves over time, named by their variables or by labels stored beside a matrix."""
 
 import re
 from collections.abc import Iterable
@@ -21,9 +21,9 @@ _THREE = re.compile(r"(?P<name>.*)\(:,(?P<number>[123])\)")
 
 
 def _read(path: str | Path) -> MotionTable:
-    """Return the variables that are as long as the time; a matrix of three columns is a marker, ``RKNE.x`` too.
+    """Return the variables that are as long as the time; a matrix of three columns is also available as a marker.
 
-    DataError where nothing is called time.
+    Its columns are named ``RKNE.x``, ``.y`` and ``.z``. Raises DataError if no variable is a time.
     """
     file = read_matlab(path)
     name = next((name for name in file.columns if name.rpartition(".")[2].lower() in _TIMES), None)
@@ -53,7 +53,7 @@ def _has_opensim(names: Iterable[str]) -> bool:
 
 
 def _convention(table: MotionTable, side: Side, body_mass: float) -> Convention:
-    """Return the map of OpenSim's labels where they are there, else of the names of the package."""
+    """Return the map of OpenSim's labels if the table has them, otherwise of the names of the package."""
     if _has_opensim(table.columns):
         return opensim_convention(table, side, body_mass)
     return Convention(package_map())

@@ -1,7 +1,7 @@
 """Text exports of motion capture: Vicon Nexus CSV, Qualisys TSV, OptiTrack Motive CSV, D-Flow text and BTS EMT.
 
-Each is known by its first line, which states the frame rate or the clock; markers become columns ``LABEL.x``, ``.y``
-and ``.z``, without the subject's name before a colon.
+Each format is recognised by its first line, which states the frame rate or the clock. Markers become columns
+``LABEL.x``, ``.y`` and ``.z``, without the subject's name before a colon.
 """
 
 import re
@@ -41,7 +41,7 @@ _DFLOW_COLUMN = re.compile(r"(.+)\.(Pos|Cop|For|Mom)([XYZ])")
 
 
 def _head_of(line: str) -> str:
-    """Cell of a line that has one cell alone, without the delimiters behind it."""
+    """Return the only cell of a line, without trailing delimiters."""
     return line.strip().rstrip(",;\t").strip('"').strip()
 
 
@@ -58,7 +58,7 @@ def _rate_in(path: str | Path, cell: str, line: int) -> float:
 
 
 class _NexusBlock(NamedTuple):
-    """Block of a Nexus export: rate [Hz], label, axis and unit of every column, and its rows."""
+    """Block of a Nexus export: rate [Hz], label, axis and unit of every column, and the rows of numbers."""
 
     rate: float
     labels: list[str]
@@ -68,9 +68,10 @@ class _NexusBlock(NamedTuple):
 
 
 def _read_nexus(path: str | Path) -> MotionTable:
-    """Return markers, outputs of models and force plates of a Vicon Nexus CSV export.
+    """Return markers, model outputs and force plates of a Vicon Nexus CSV export.
 
-    A block has its kind, its rate [Hz], labels, ``Frame, Sub Frame, X, Y, Z, ...``, units, and rows up to a blank line.
+    A block consists of its kind, rate [Hz], labels, ``Frame, Sub Frame, X, Y, Z, ...``, units, and rows up to a blank
+    line.
     """
     lines = lines_of(path)
     blocks = [
@@ -105,7 +106,7 @@ def _joined(table: MotionTable, columns: Mapping[str, Floats], units: Mapping[st
 
 
 def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBlock:
-    """Return the block that begins at the line of its kind; DataError where its header is no header."""
+    """Return the block whose kind is on line ``start``; raises DataError for an invalid header."""
     head = lines[start + 1 : start + 5]
     delimiter = max(",;\t", key=head[2].count) if len(head) == 4 else ","
     axes = cells_of(head[2], delimiter) if len(head) == 4 else []
@@ -125,7 +126,7 @@ def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBl
 
 
 def _nexus_forces(path: str | Path, block: _NexusBlock, time: Floats) -> dict[str, Floats]:
-    """Return the forces [N] of plates at the times of the frames [s], upwards above 0, by ``force plate 1.x``."""
+    """Return the plate forces [N] at the times of the frames [s], positive upwards, by ``force plate 1.x``."""
     plates = list(dict.fromkeys(label for label in block.labels if label.lower().endswith("force")))
     names = [
         f"{PLATE}{plates.index(label) + 1}.{axis[1].lower()}"
@@ -151,7 +152,7 @@ def _nexus_forces(path: str | Path, block: _NexusBlock, time: Floats) -> dict[st
 
 
 def _read_qualisys(path: str | Path) -> MotionTable:
-    """Return the markers of a Qualisys TSV export: keys and values, names of markers, and rows [mm]."""
+    """Return the markers of a Qualisys TSV export: header of keys and values, marker names, and rows [mm]."""
     lines = lines_of(path)
     keys = {cells[0]: (number, cells[1:]) for number, cells in enumerate(cells_of(line, "\t") for line in lines)}
     if "MARKER_NAMES" not in keys:
@@ -174,7 +175,7 @@ def _read_qualisys(path: str | Path) -> MotionTable:
 
 
 def _read_motive(path: str | Path) -> MotionTable:
-    """Return the markers of an OptiTrack Motive CSV export; bones and rigid bodies are not read."""
+    """Return the markers of an OptiTrack Motive CSV export; bones and rigid bodies are skipped."""
     lines = lines_of(path)
     head = cells_of(lines[0], ",")
     stated = dict(zip(head[::2], head[1::2], strict=False))
@@ -220,7 +221,7 @@ def _read_dflow(path: str | Path) -> MotionTable:
 
 
 def _read_bts(path: str | Path) -> MotionTable:
-    """Return the markers of a BTS text file: its kind, unit and rate, and ``Frame, Time, LABEL.X, LABEL.Y, ...``."""
+    """Return the markers of a BTS text file: kind, unit and rate, then ``Frame, Time, LABEL.X, LABEL.Y, ...``."""
     lines = lines_of(path)
     at = next((n for n, line in enumerate(lines) if cells_of(line, "\t")[:2] == ["Frame", "Time"]), -1)
     stated = dict(cells_of(line, "\t")[:2] for line in lines[: max(at, 0)] if line.count("\t") >= 1)

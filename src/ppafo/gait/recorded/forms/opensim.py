@@ -1,4 +1,4 @@
-"""OpenSim's tables of motion and force, .mot and .sto, and CSV files whose columns have OpenSim's names."""
+"""OpenSim's tables of motion and force (.mot, .sto), and CSV files with OpenSim's column names."""
 
 import re
 from dataclasses import replace
@@ -19,7 +19,7 @@ _STATE = re.compile(r".*/([^/]+)/value")
 
 
 def _is_table(path: str | Path) -> bool:
-    """True for a table with a header line alone: by the suffix of the file, or the content of a .txt file."""
+    """Return True for a table with a single header line, by the suffix of the file or the content of a .txt file."""
     suffix = Path(path).suffix.lower()
     if suffix == ".txt":
         return re.search(rb"(?mi)^\s*endheader\s*$", read_bytes(path)) is None
@@ -27,16 +27,16 @@ def _is_table(path: str | Path) -> bool:
 
 
 def _recognises(path: str | Path) -> bool:
-    """Recognise OpenSim's own files, and a plain CSV file by an ankle that OpenSim names."""
+    """Return True for OpenSim's own files, and for a plain CSV file with OpenSim's name of an ankle coordinate."""
     if not _is_table(path):
         return True
     return is_plain(path) and any(name.startswith("ankle_angle_") for name in plain_names(path))
 
 
 def _read(path: str | Path) -> MotionTable:
-    """Return the table with the units that OpenSim's labels imply; angles are as the header says.
+    """Return the table with the units implied by OpenSim's labels; the header states the unit of angles.
 
-    A coordinate that is named by its path among the states is there by its own name too.
+    A coordinate that is named by its path among the states is also available under its own name.
     """
     if _is_table(path):
         plain = read_plain_csv(path)
@@ -54,7 +54,7 @@ def _read(path: str | Path) -> MotionTable:
 
 
 def unit_of_label(path: str, label: str, angle: str) -> str:
-    """Return the unit that a label implies, ``angle`` for a coordinate; ``path`` is its path where it is a state."""
+    """Return the unit implied by a label, ``angle`` for a coordinate; ``path`` is the path of a state."""
     if path != label:
         # States are in radians and metres whatever the header says of other columns.
         angle = angle or "rad"
@@ -73,7 +73,7 @@ _KNEE = "knee_angle_"
 
 
 def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Convention:
-    """Return the map of OpenSim's labels; a force plate with a number only is of the foot that moves with it."""
+    """Return the map of OpenSim's labels; a force plate known only by number belongs to the foot that moves with it."""
     usual = opensim_map(side)
     terms = []
     for name in usual.shank_angle.terms or ():
@@ -115,7 +115,7 @@ _ALONG = np.radians(5.0)
 
 
 def _turned_forward(table: MotionTable) -> MotionTable:
-    """Return an OpenSim table with ``pelvis_tx``, ``_tz`` and ``_tilt`` of a walk along x, whichever way it goes.
+    """Return an OpenSim table with ``pelvis_tx``, ``_tz`` and ``_tilt`` rotated such that the walk is along x.
 
     The pelvis is turned about z by the tilt t, about x by the list l, then about y by the rotation. A walker who faces
     by r (its mean) to the left of x goes along h = (cos r, 0, -sin r) and leans against it by what the upright of the
