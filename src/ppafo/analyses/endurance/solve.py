@@ -18,11 +18,11 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import bottle_life
 
 BETWEEN_RESTS = 600.0
-"""Time of walking between two rests [s], unless it is given."""
+"""Default walking time between two rests [s]."""
 STRIDE_TIME = 1.1
-"""Time of one stride [s], unless it is given."""
+"""Default stride time [s]."""
 LONGEST = 24.0 * 3600.0
-"""Time that is simulated at most [s], unless it is given: a day."""
+"""Default of the longest simulated time [s]: one day."""
 WITHOUT_REST = Schedule(LONGEST, 0.0, LONGEST)
 
 
