@@ -39,12 +39,12 @@ CURVES: dict[str, str] = {
     "knee_forward": "m/s^2",
     "knee_up": "m/s^2",
 }
-"""The curves of a gait and the unit of each; the first two are always there."""
+"""Curves of a gait with their units; the first two are mandatory."""
 
 REQUIRED = ("shank_angle", "ankle_angle")
 
 KNEE = ("knee_forward", "knee_up")
-"""Curves that are accelerations: they go with the square of the cadence."""
+"""Curves that are accelerations, which scale with the square of the cadence."""
 
 
 def clinical_angle(angle: Floats) -> Floats:
@@ -184,7 +184,7 @@ HARMONICS: dict[str, int] = {
     "knee_forward": 6,
     "knee_up": 6,
 }
-"""Harmonics of each curve: enough for a fit well below the spread between strides; more roughen the acceleration."""
+"""Number of harmonics of each curve: the fit error is well below the spread; more would make the acceleration noisy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,11 +216,11 @@ def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[G
 
 
 LARGEST_CHANGE = 0.2
-"""Fraction of the recorded speed; further away angles and moments change too much to be left as they are."""
+"""Largest relative change of the recorded speed; beyond it, angles and moments would change too much."""
 
 SLOWEST_CONSTANT_WALK_RATIO = 1.03
-"""Speed [m/s] below which step length over cadence is no longer constant: Murakami and Otaka (2017),
-J Phys Ther Sci 29:819 (62 m/min)."""
+"""Speed [m/s] below which step length divided by cadence is no longer constant: Murakami and Otaka (2017), J Phys Ther
+Sci 29:819 (62 m/min)."""
 
 
 def speed_range(gait: Gait) -> tuple[float, float]:
@@ -272,9 +272,9 @@ def _recorded_speed(gait: Gait) -> float:
 
 
 _RATE = 200.0
-"""Samples a second of the recording of a gait, unless another rate is given."""
+"""Default sampling rate of the recording of a gait [Hz]."""
 _MAXIMUM_STRIDES = 100_000
-"""Strides of such a recording at most."""
+"""Largest number of strides of such a recording."""
 
 
 def walk_recording(gait: Gait, strides: int) -> Recording:

@@ -224,13 +224,13 @@ def with_device_off(configuration: Scenario) -> Scenario:
 
 
 ANKLE_RANGE = math.radians(45.0), math.radians(140.0)
-"""Range [rad] of an ankle without a device: 45 deg in dorsiflexion, of a loaded foot, to 50 deg in plantarflexion.
+"""Ankle range [rad] without a device: 45 deg in dorsiflexion, of a loaded foot, to 50 deg in plantarflexion.
 
-The second is a usual norm of passive motion; the first is assumed, beyond what any gait here asks.
+The second is a usual norm of passive motion; the first is assumed, beyond the range of any gait here.
 """
 
 _NO_CHAMBER = 1.0e-3
-"""Volume [m^3] that stands for no chamber: at rest, and too large for its gas to ask for short steps."""
+"""Chamber volume [m^3] of a leg without a device: gas at rest, in a volume large enough not to require short steps."""
 
 
 def without_device(configuration: Scenario) -> Scenario:
@@ -274,10 +274,10 @@ def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
 
 
 MAXIMUM_WEARERS = 1_000_000
-"""Wearers of a population at most."""
+"""Largest number of wearers of a population."""
 
 STEPS_AT_ONCE = 1.0e8
-"""Steps of all wearers of one group together, a few seconds."""
+"""Total number of steps of a group of wearers that is simulated at once, a few seconds of computing time."""
 
 SHOWN = {
     "gas": ("Gas per stride", "gas mass", 3),
@@ -290,7 +290,7 @@ SHOWN = {
     "stride_time": ("Stride time", "time", 3),
     "stance_share": ("Stance", "fraction", 1),
 }
-"""Title, kind of quantity, and digits behind the point of what is known of every wearer."""
+"""Title, kind of quantity and number of decimals of the quantities shown for every wearer."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -234,7 +234,7 @@ class ImportSettings:
 
 
 _OPTIONS = {"columns": "--map", "least_strides": "--minimum-strides", "longest_gap": "--fill-gaps"}
-"""Options of ``ppafo gait import`` that are not called as the settings."""
+"""Options of ``ppafo gait import`` with names different from the settings."""
 
 
 def setting_text(name: str, value: float | None = None, shown: str = "") -> str:

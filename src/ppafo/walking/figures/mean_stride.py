@@ -30,7 +30,7 @@ _CHANNELS = {
     PRESSURE: ("pressure_1", "pressure_2"),
     TOES: ("toe_height",),
 }
-"""Panels from top to bottom, and the channels in each of them that are drawn for every walk."""
+"""Panels from top to bottom, each with the channels that are drawn for every walk."""
 
 
 def walk_figure(walks: Mapping[str, Any]) -> "Figure":

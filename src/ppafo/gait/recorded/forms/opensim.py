@@ -15,7 +15,7 @@ from ppafo.storage.opensim import GAPS, read_opensim
 
 _CSV = ".csv"
 _STATE = re.compile(r".*/([^/]+)/value")
-"""A coordinate among OpenSim's states, such as ``/jointset/ankle_r/ankle_angle_r/value``; its speed is beside it."""
+"""Pattern of a coordinate among OpenSim's states, such as ``/jointset/ankle_r/ankle_angle_r/value``."""
 
 
 def _is_table(path: str | Path) -> bool:
@@ -109,9 +109,9 @@ def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Con
 
 
 _TURN = 45.0
-"""Degrees; the pelvis of a straight walk turns by 5 to 30 from side to side."""
+"""Rotation of the pelvis [deg] above which a walk is not straight; a straight walk has 5 to 30 deg."""
 _ALONG = np.radians(5.0)
-"""Mean rotation of the pelvis up to which a walk counts as one along x."""
+"""Mean rotation of the pelvis [rad] up to which a walk counts as parallel to x."""
 
 
 def _turned_forward(table: MotionTable) -> MotionTable:
