@@ -1,1 +1,1 @@
-"""Time stepping: the lane scheme that runs many devices at once."""
+"""Time stepping: integration scheme and compiled programs that advance many runs at once."""

@@ -1,4 +1,4 @@
-"""Channels that can be traced at a sample, and where a lane has their numbers."""
+"""Channels that can be traced at a sample, and the paths of their numbers in a run."""
 
 from collections.abc import Mapping
 
@@ -12,7 +12,7 @@ TRACED: dict[str, str] = {
     **{kind.reference: "sample.reference" for kind in CONTROLLED.values()},
     **{name: f"sample.gas.{name}" for name in ("mass_1", "mass_2", "supplied_mass", "vented_mass", "leaked_mass")},
 }
-"""Channels that can be traced, and where a lane has them."""
+"""Channels that can be traced, with their paths in a run."""
 TRACED_IN_WALKS: dict[str, str] = {
     "strides": "walk.strides",
     "phase": "walk.now.phase",
@@ -28,13 +28,13 @@ TRACED_IN_WALKS: dict[str, str] = {
     "safe_state": "controller_state.safety.level",
     "gait_fraction": "clock.fraction",
 }
-"""Further ones of a walk: how the path of a number of its state ends, which not every controller has."""
+"""Additional channels of a walk: end of the path of a state variable, which not every controller has."""
 REQUEST = "controller_state.request.torque"
 """Path of the torque that a walking controller requests."""
 
 
 def paths_of_traces(states: Mapping[str, type], walks: bool) -> dict[str, str]:
-    """Path of each traceable channel in a lane that is not a state variable of that name."""
+    """Return the path in a run of each traceable channel that is not a state variable of the same name."""
     if not walks:
         return TRACED
     paths = [path for name, row in states.items() for path in leaf_paths(row, name)]

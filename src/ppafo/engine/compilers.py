@@ -1,7 +1,7 @@
-"""Protocol of a compiler of programs, and the compilers available.
+"""Protocol of a compiler of programs, and the registered compilers.
 
-The engine writes the text of a program and knows no other language than Python. What compiles it through C lies above
-and is offered by the package as a whole, where it is imported.
+The engine generates the text of a program and knows no language other than Python. Compilers that translate to C are in
+other packages, which register them when the package is imported.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,23 +12,23 @@ from typing import Protocol
 from ppafo.errors import ProgramError, SimulationError
 
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
-"""Flags of gcc and clang for strict arithmetic; without the second last gcc is up to 20 times slower."""
+"""Flags of gcc and clang for reproducible arithmetic; without the second last, gcc code is up to 20 times slower."""
 LIBRARY = frozenset({"exp", "log", "pow"})
-"""Functions that every C library has, with last bits of its own."""
+"""Functions of every C library whose last bits depend on the library."""
 
 
 class Effort(StrEnum):
-    """Optimisation of a compiled program; the results have the same bits."""
+    """Optimisation level of a compiled program; the results are bit-identical."""
 
     QUICK = "-O1"
-    """Compiled in half the time, three times slower in a run: for a run that takes less than its compilation."""
+    """Half the compilation time, but three times slower code: for runs that are shorter than the compilation."""
     FULL = "-O3"
 
 
 class CompilerError(SimulationError):
-    """A compiler does not work on this computer, whatever the program; ``names`` are all that fail for this reason.
+    """Error of a compiler that does not work on this computer for any program; ``names`` are all compilers affected.
 
-    ``passing`` says that the reason may be gone in the next run, such as a disk that is full.
+    ``passing`` marks a temporary cause, such as a full disk.
     """
 
     def __init__(self, problem: str, *names: str, passing: bool = False) -> None:
@@ -37,45 +37,45 @@ class CompilerError(SimulationError):
 
 
 class UntranslatableError(ProgramError):
-    """A law has no form in the language of the compiler, and is none the worse for it: Python can run it."""
+    """Error of a law that cannot be expressed in the language of the compiler, although Python can run it."""
 
 
 class Compiler(Protocol):
-    """Compiler of a composed text into a module; both ways fill ``module``.
+    """Compiler of a composed text into a module; ``compile_text`` and ``run_text`` both fill ``module``.
 
-    They raise ProgramError for a mistake in the text, UntranslatableError where it has no form in the language of the
-    compiler, and CompilerError where the compiler does not work.
-    ``path`` is where the text lies, alone in its folder, or no absolute path where nothing is kept.
+    Both raise ProgramError for a mistake in the text, UntranslatableError for a text that the language of the compiler
+    cannot express, and CompilerError if the compiler does not work. ``path`` is the path of the text, alone in its
+    folder, or not an absolute path if nothing is stored.
     """
 
     @property
     def name(self) -> str:
-        """Name of the compiler, in small letters."""
+        """Name of the compiler, in lower case."""
 
     @property
     def effort(self) -> Effort:
-        """Optimisation of its programs."""
+        """Optimisation level of its programs."""
 
     def with_effort(self, effort: Effort) -> "Compiler":
-        """Return the same compiler with another optimisation of its programs."""
+        """Return the same compiler with another optimisation level."""
 
     def identity(self) -> str:
-        """Dependencies of a compiled program beside its text: compiler, version, flags, processor."""
+        """Return the dependencies of a compiled program besides its text: compiler, version, flags, processor."""
 
     def described(self) -> str:
-        """Name and version of the compiler, for people."""
+        """Return name and version of the compiler for messages."""
 
     def compile_text(self, source: str, path: str, module: ModuleType) -> None:
-        """Compile a text, and keep beside ``path`` what ``run_text`` needs."""
+        """Compile a text, and store next to ``path`` the files that ``run_text`` needs."""
 
     def run_text(self, source: str, path: str, module: ModuleType) -> None:
-        """Load what was kept beside ``path``."""
+        """Load the files stored next to ``path``."""
 
 
 OFFERED: dict[str, Callable[[], Compiler]] = {}
-"""Compilers by name, the one to prefer first; each raises SimulationError where it is not on this computer."""
+"""Registered compilers by name, preferred first; each raises SimulationError if it is missing on this computer."""
 
 
 def offer(compilers: Mapping[str, Callable[[], Compiler]]) -> None:
-    """Let programs be compiled by these, each made when it is first needed, and preferred in this order."""
+    """Register compilers in order of preference, each as a function that creates the compiler when first needed."""
     OFFERED.update(compilers)

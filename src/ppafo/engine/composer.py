@@ -1,6 +1,6 @@
-"""Body of a function as the compiled module has it.
+"""Composition of a function body for the compiled module.
 
-Names from outside the function are replaced by what they stand for: numbers, generated names, ``math``.
+Names defined outside the function are replaced by their values: numbers, generated names, ``math``.
 """
 
 import ast
@@ -27,15 +27,15 @@ COMPILED_BUILTINS = frozenset(
 )
 Row = TypeVar("Row", bound=tuple[Any, ...])
 _INSIDE = object()
-"""Stands for a value that is known only while the function runs."""
+"""Placeholder for a value that is known only while the function runs."""
 _INSTEAD = {"print": "; take it out: under PPAFO_BACKEND=python a debugger stops in the function"}
-"""Remedies for functions of Python."""
+"""Remedies for built-in functions that cannot be compiled."""
 
 
 def each(convert: Callable[[float], float], row: Row) -> Row:
-    """A row with each of its numbers, those of nested rows too, converted: whole numbers from floats, and back.
+    """Return a row with each number converted, nested rows included: integers from floats, and back.
 
-    The engine writes it out number by number, by the class that the row is declared to be.
+    The engine expands the call number by number, according to the declared class of the row.
     """
     make: Any = type(row)
     made_row: Row = make(*(each(convert, value) if isinstance(value, tuple) else convert(value) for value in row))
@@ -43,13 +43,13 @@ def each(convert: Callable[[float], float], row: Row) -> Row:
 
 
 def is_step_function(function: object) -> bool:
-    """True for a function of the step: its first parameter is ``parts``, what the device is made of."""
+    """Return whether the first parameter of a function is ``parts``, the components of the device."""
     return isinstance(function, FunctionType) and function.__code__.co_varnames[:1] == ("parts",)
 
 
 @dataclass(frozen=True, slots=True)
 class RewrittenNames:
-    """Names of a function that was written anew: all that it has, values that some stand for, classes of rows."""
+    """Names of a rewritten function: all local names, known values by name, and row classes by name."""
 
     local: frozenset[str]
     kept: Mapping[str, Any]
@@ -57,12 +57,12 @@ class RewrittenNames:
 
 
 class Composer(ast.NodeTransformer):
-    """Rewrites the body of one function; ``add`` adds another to the module, ``note`` keeps what was looked up.
+    """Rewriter of the body of one function.
 
-    ``rows_of`` says which rows of effects a function that was added needs: each call hands them over before its own
-    arguments. ``needed`` has those that this function must be handed in its turn, because it has no such parameter.
-    ``stands_for`` says which class a declared row has in this module, ``names`` what a function has that was written
-    anew.
+    ``add`` adds another function to the module, and ``note`` records each name that was looked up. ``rows_of`` returns
+    the rows of effects that an added function needs; each call passes these rows before its own arguments. ``needed``
+    has the rows that this function must receive in turn, because it has no such parameters. ``stands_for`` returns the
+    class that replaces a declared row in this module. ``names`` are the names of a function that was rewritten before.
     """
 
     def __init__(
@@ -87,17 +87,17 @@ class Composer(ast.NodeTransformer):
         self.needed: set[str] = set()
 
     def refuse(self, where: ast.AST, problem: str) -> ProgramError:
-        """The error for a place in the function."""
+        """Return the error for a node of the function."""
         return refusal(self.function.__code__.co_filename, where, problem)
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
-        """Leave the annotation away."""
+        """Remove the annotation."""
         if node.value is None:
             return ast.copy_location(ast.Pass(), node)
         return ast.copy_location(ast.Assign([node.target], self.visit(node.value)), node)
 
     def visit_Assign(self, node: ast.Assign) -> ast.stmt:
-        """Remember which NamedTuple each name stands for, so that ``name._replace`` can be written out."""
+        """Record the NamedTuple class of each assigned name, so that ``name._replace`` can be expanded."""
         kind, target = self.kind_of(node.value), node.targets[0]
         parts = getattr(kind, "__args__", ())
         named = zip(target.elts, parts, strict=False) if isinstance(target, ast.Tuple) else ((target, kind),)
@@ -108,13 +108,13 @@ class Composer(ast.NodeTransformer):
         return ast.copy_location(ast.Assign(node.targets, self.visit(node.value)), node)
 
     def visit_Expr(self, node: ast.Expr) -> ast.stmt:
-        """Leave a text that stands alone away."""
+        """Remove a docstring or other constant statement."""
         if isinstance(node.value, ast.Constant):
             return ast.copy_location(ast.Pass(), node)
         return ast.copy_location(ast.Expr(self.visit(node.value)), node)
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
-        """Refuse a power with a number that is written out: compilers and Python differ in its last bits."""
+        """Refuse a power with a literal operand, because its last bits differ between compilers and Python."""
         left, right = self.visit(node.left), self.visit(node.right)
         # With a sign or without.
         unsigned = (side.operand if isinstance(side, ast.UnaryOp) else side for side in (left, right))
@@ -125,7 +125,7 @@ class Composer(ast.NodeTransformer):
         return ast.copy_location(ast.BinOp(left, node.op, right), node)
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
-        """Replace a name from outside."""
+        """Replace a name defined outside the function."""
         value = self.value_of(node)
         return node if value is _INSIDE else self.handed_over(value, node)
 
@@ -144,9 +144,9 @@ class Composer(ast.NodeTransformer):
         return ast.Attribute(self.visit(node.value), node.attr, node.ctx)
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
-        """Check the arguments of what is called; those that a NamedTuple has of its own are written out.
+        """Check the arguments of a call; default values of a NamedTuple are inserted.
 
-        ProgramError where one does not fit.
+        Raises ProgramError if the arguments do not match.
         """
         called = self.value_of(node.func)
         if called is each and len(node.args) > 1:
@@ -170,9 +170,9 @@ class Composer(ast.NodeTransformer):
         return ast.Call(function, [*arguments, *own], [])
 
     def with_parts(self, called: Any, node: ast.Call) -> tuple[Any, ast.Call]:
-        """A function that is called with ``parts=``, as the function with these parts, and the call without them.
+        """Return a function called with ``parts=`` as a function bound to these parts, and the call without ``parts``.
 
-        ProgramError where they are not known before the function runs.
+        Raises ProgramError if the parts are not known before the function runs.
         """
         given = next((keyword for keyword in node.keywords if keyword.arg == "parts"), None)
         if given is None or not isinstance(called, FunctionType):
@@ -189,7 +189,7 @@ class Composer(ast.NodeTransformer):
         return made_of(called, name, parts), ast.copy_location(ast.Call(node.func, node.args, others), node)
 
     def rows_for(self, function: ast.expr, node: ast.AST) -> list[ast.expr]:
-        """Rows of effects that a function of the module is handed first. ProgramError where a local name hides one."""
+        """Rows of effects that are passed first to a function of the module. ProgramError if a local name hides one."""
         rows = self.rows_of(function.id) if isinstance(function, ast.Name) else ()
         for row in rows:
             if row in self.local - self.given:
@@ -198,16 +198,16 @@ class Composer(ast.NodeTransformer):
         return [ast.Name(row, ast.Load()) for row in rows]
 
     def handed_over(self, value: Any, node: ast.expr) -> ast.expr:
-        """Text of a value that is passed and not called. ProgramError for a function that needs rows of effects."""
+        """Text of a value that is passed but not called. ProgramError for a function that needs rows of effects."""
         stand_in = self.stand_in(value, node)
         if isinstance(stand_in, ast.Name) and self.rows_of(stand_in.id):
             raise self.refuse(node, f"an effect acts inside '{ast.unparse(node)}', so that it can only be called")
         return stand_in
 
     def own_arguments(self, called: Any, node: ast.Call) -> list[ast.expr]:
-        """Fields of a NamedTuple after those given by place, where some have the defaults of its class; else none.
+        """Fields of a NamedTuple after the positional arguments, if some have default values; else none.
 
-        ProgramError where they do not fit.
+        Raises ProgramError if the arguments do not match.
         """
         if is_step_function(called) or any(isinstance(argument, ast.Starred) for argument in node.args):
             return []  # its groups are handed over by name; how many there are is known only to the compiler
@@ -230,7 +230,7 @@ class Composer(ast.NodeTransformer):
         ]
 
     def kind_of(self, node: ast.expr) -> Any:
-        """Declared type of a value, by the annotations of functions and fields; None if undeclared."""
+        """Declared type of a value, from annotations of functions and fields; None if undeclared."""
         if isinstance(node, ast.Attribute) and (owner := self.row_of(node.value)) is not None:
             return owner.__annotations__.get(node.attr)
         if isinstance(node, ast.Call):
@@ -243,13 +243,13 @@ class Composer(ast.NodeTransformer):
         return self.kinds.get(node.id) if isinstance(node, ast.Name) else None
 
     def row_of(self, node: ast.expr) -> Any:
-        """The NamedTuple class that a value is declared to be, as its name stands now; None where it is none."""
+        """Declared NamedTuple class of a value, looked up by its present name; None if the type is not a NamedTuple."""
         kind = self.kind_of(node)
         row = self.function.__globals__.get(kind if isinstance(kind, str) else getattr(kind, "__name__", ""), kind)
         return row if is_row(row) else None
 
     def fields_of(self, node: ast.expr) -> tuple[Any, list[ast.Attribute]]:
-        """The class of a row and an expression for each of its fields. ProgramError where the class is not declared."""
+        """Class of a row, and an expression for each field. ProgramError if the class is not declared."""
         row, owner = self.stands_for(self.row_of(node)), node
         while isinstance(owner, ast.Attribute):
             owner = owner.value
@@ -261,7 +261,7 @@ class Composer(ast.NodeTransformer):
         return row, [ast.copy_location(ast.Attribute(node, name, ast.Load()), node) for name in row._fields]
 
     def replaced(self, node: ast.Call, changed: ast.expr) -> ast.expr:
-        """``row._replace(field=...)`` as the row that it makes. ProgramError where there is no such field."""
+        """Expand ``row._replace(field=...)`` to a construction of the row. ProgramError if the field does not exist."""
         row, fields = self.fields_of(changed)
         given = {keyword.arg: keyword.value for keyword in node.keywords if keyword.arg is not None}
         unknown = sorted(given.keys() - set(row._fields))
@@ -273,7 +273,7 @@ class Composer(ast.NodeTransformer):
         return ast.Call(ast.Name(self.add(row), ast.Load()), values, [])
 
     def each_number(self, convert: ast.expr, node: ast.expr) -> ast.expr:
-        """``each(convert, row)`` as the row that it makes, number by number."""
+        """Expand ``each(convert, row)`` to a construction of the row, number by number."""
         row, fields = self.fields_of(node)
         values = [
             self.each_number(convert, field_read)
@@ -284,7 +284,7 @@ class Composer(ast.NodeTransformer):
         return ast.Call(ast.Name(self.add(row), ast.Load()), values, [])
 
     def value_of(self, node: ast.expr) -> Any:
-        """Present value of a name or ``module.name`` outside the function. ProgramError if it has none."""
+        """Present value of a name or ``module.name`` outside the function. ProgramError if there is none."""
         if isinstance(node, ast.Name) and node.id in self.kept:
             return self.kept[node.id]
         if isinstance(node, ast.Name) and node.id not in self.local:
@@ -313,9 +313,9 @@ class Composer(ast.NodeTransformer):
         return value
 
     def stand_in(self, value: Any, node: ast.expr) -> ast.expr:
-        """Text of a value from outside the function. ProgramError if it cannot be compiled.
+        """Text of a value from outside the function. ProgramError if the value cannot be compiled.
 
-        A function that remembers its results (``functools.lru_cache``) is what it remembers.
+        A function with a cache (``functools.lru_cache``) is replaced by the function without the cache.
         """
         value = value.__wrapped__ if isinstance(value, functools._lru_cache_wrapper) else value
         # ``inf`` and ``nan`` of math are written by name, as they are in most sources.
@@ -336,7 +336,7 @@ class Composer(ast.NodeTransformer):
         return self.literal(value, node, f"'{name}'")
 
     def global_name(self, module: str, name: str, node: ast.expr) -> ast.expr:
-        """A name of the generated module, which no local name may hide. ProgramError where a local name hides it."""
+        """Name of the generated module. ProgramError if a local name hides this name."""
         first = module or name
         if first in self.local:
             raise self.refuse(node, f"the local name '{first}' hides '{ast.unparse(node)}'; give it another name")
@@ -345,7 +345,7 @@ class Composer(ast.NodeTransformer):
         return ast.Attribute(ast.Name(module, ast.Load()), name, ast.Load())
 
     def literal(self, value: Any, where: ast.AST, name: str) -> ast.expr:
-        """A constant, to the last bit: a number, or a tuple or NamedTuple of them. ProgramError for anything else."""
+        """Exact literal of a constant: a number, or a tuple or NamedTuple of numbers. ProgramError otherwise."""
         if type(value) in (float, np.float64):
             # A minus sign of its own: -0.0 and the sign of NaN survive, which repr would lose in some languages.
             size: ast.expr = ast.Constant(abs(float(value)))

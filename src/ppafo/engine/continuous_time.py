@@ -1,7 +1,7 @@
-"""Plant in continuous time, for solvers and linear models: balance of the gas, an unconstrained vane, its modes.
+"""Plant in continuous time for solvers and linear models: gas balance, unconstrained vane, and modes of motion.
 
-The flows are those of a step of the engine. A vane that sticks, slides or stands at a stop is in modes, which root
-functions end.
+The flows are computed as in a step of the engine. A vane that sticks, slides or rests at a stop is in one of several
+modes; root functions detect the end of a mode.
 """
 
 from collections.abc import Callable, Mapping
@@ -31,15 +31,15 @@ from ppafo.model.plant import (
 from ppafo.model.ports import friction_in_motion, rebound
 
 SAME_TIME = 1.0e-12
-"""Two instants [s] that are as good as one."""
+"""Difference [s] below which two instants count as equal."""
 SLOWEST_REBOUND = 1.0e-7
-"""Angular velocity [rad/s] below which a rebound is not worth following."""
+"""Angular velocity [rad/s] below which a rebound is neglected."""
 NEAR = 1.0e-4
-"""Angle [rad] on either side at which volumes are looked at for how the angle widens them."""
+"""Half-width [rad] of the central difference of volumes with respect to the angle."""
 
 
 class GasRates(NamedTuple):
-    """Rates of both pressures [Pa/s] and temperatures [K/s], flows from the source and to the atmosphere [kg/s]."""
+    """Rates of both pressures [Pa/s] and temperatures [K/s], and flows from the source and to the atmosphere [kg/s]."""
 
     pressure_1: float
     pressure_2: float
@@ -50,7 +50,7 @@ class GasRates(NamedTuple):
 
 
 class TurningChambers(NamedTuple):
-    """Both chambers, and rates at which the angle widens them [m^3/s]."""
+    """Both chambers, and rates of volume change due to the rotation [m^3/s]."""
 
     now: Chambers
     growth_1: float
@@ -66,7 +66,7 @@ def turning_chambers(
     *,
     parts: ActuatorFunctions,
 ) -> TurningChambers:
-    """Both chambers at an angle [rad], its rate [rad/s] and absolute pressures [Pa]. Equations (4), (5)."""
+    """Both chambers at an angle [rad], angular velocity [rad/s] and absolute pressures [Pa]. Equations (4), (5)."""
     less = parts.chambers(plant, angle - NEAR, pressure_1, pressure_2)
     more = parts.chambers(plant, angle + NEAR, pressure_1, pressure_2)
     per_angle = angular_velocity / (2.0 * NEAR)
@@ -78,7 +78,7 @@ def turning_chambers(
 
 
 def flows_at(plant: PlantParameters, openings: Openings, pressure_1: float, pressure_2: float) -> StageFlows:
-    """Flows [kg/s] through both ports and the leak of a valve that stands at openings [-]. Equations (6) to (8)."""
+    """Flows [kg/s] through both ports and the leakage, for valve openings [-]. Equations (6) to (8)."""
     leaking = plant_with_leak_at(plant, pressure_1, pressure_2)
     port_1, port_2 = blended_ports(plant, openings)
     return stage_flows(leaking, pressure_1, pressure_2, port_1, port_2, blended_port_flow)
@@ -87,7 +87,7 @@ def flows_at(plant: PlantParameters, openings: Openings, pressure_1: float, pres
 def isothermal_rates(
     plant: PlantParameters, openings: Openings, at: TurningChambers, pressure_1: float, pressure_2: float
 ) -> GasRates:
-    """Rates of gas of one temperature, ideal or not, at absolute pressures [Pa]. Equations (3), (9)."""
+    """Rates of isothermal gas, ideal or real, at absolute pressures [Pa]. Equations (3), (9)."""
     in_1, in_2, leak = flows_at(plant, openings, pressure_1, pressure_2)
     supplied = in_1.from_source + in_2.from_source
     content_1 = chamber_mass(pressure_1, at.now.volume_1, plant.gas_product)
@@ -160,9 +160,9 @@ def thermal_rates(
 def pressure_rates(
     plant: PlantParameters, at: TurningChambers, pressure_1: float, pressure_2: float, gained_1: float, gained_2: float
 ) -> tuple[float, float]:
-    """Rates of both pressures [Pa/s] from those of the contents [kg/s]: equation (3) in time.
+    """Rates of both pressures [Pa/s] from the rates of the contents [kg/s]: time derivative of equation (3).
 
-    d(p V) = R T dm, and a chamber that gives grows with its pressure, too.
+    d(p V) = R T dm, where the volume of a compliant chamber also changes with its pressure.
     """
     product, now = plant.gas_product, at.now
     rate_1 = (product * gained_1 - pressure_1 * at.growth_1) / (now.volume_1 + pressure_1 * now.compliance_1)
@@ -181,9 +181,9 @@ def free_motion(
     *,
     parts: ActuatorFunctions,
 ) -> tuple[float, float]:
-    """Slopes of angle [rad/s] and angular velocity [rad/s^2] of a vane that slides towards ``way`` (0: it sticks).
+    """Rates of angle [rad/s] and angular velocity [rad/s^2] of a vane that slides in direction ``way`` (0: sticking).
 
-    Equations (1), (2), (10). ``added_torque`` [N m] is the leg's, beside the plant's own.
+    Equations (1), (2), (10). ``added_torque`` [N m] is the torque of the leg, in addition to the torque of the plant.
     """
     if way == 0.0:
         return 0.0, 0.0
@@ -195,9 +195,10 @@ def free_motion(
 
 
 def torque_at_rest(run: Run) -> Callable[[Mapping[str, Any], float, float, float, float], float]:
-    """Torque on a joint at rest before friction [N m], with its actuator, loads and leg.
+    """Torque on a joint at rest before friction [N m], including actuator, loads and leg.
 
-    The function takes states of effects by name, time [s], angle [rad] and two absolute pressures [Pa]. Equation (1).
+    The returned function takes effect states by name, time [s], angle [rad] and two absolute pressures [Pa]. Equation
+    (1).
     """
     program = run.program
     driving = in_program(driving_torque, program, run.effects)
@@ -210,21 +211,21 @@ def torque_at_rest(run: Run) -> Callable[[Mapping[str, Any], float, float, float
 
 
 class Roots(NamedTuple):
-    """Two root functions whose zeros end a mode; positive while the mode lasts."""
+    """Two root functions, positive during a mode; the mode ends when one becomes zero."""
 
     first: float
     second: float
 
 
 def mode_at_rest(plant: PlantParameters, angle: float, torque: float) -> float:
-    """Direction in which a vane at ``angle`` [rad] sets off under ``torque`` [N m]: 1, -1, or 0 where it sticks."""
+    """Direction in which a vane at ``angle`` [rad] starts to move under ``torque`` [N m]: 1, -1, or 0 if it sticks."""
     if holds_still(torque, plant.static_torque, angle <= plant.angle_min, angle >= plant.angle_max):
         return 0.0
     return 1.0 if torque > 0.0 else -1.0
 
 
 def roots_at_rest(plant: PlantParameters, angle: float, torque: float) -> Roots:
-    """Distance of the torque from breakaway in both directions [N m]; a stop holds against any torque."""
+    """Margins of the torque to breakaway in both directions [N m]; a stop withstands any torque."""
     # A constant has no zero: the solver never leaves the mode through a stop that holds.
     towards_upper = 1.0 if angle >= plant.angle_max else plant.static_torque - torque
     towards_lower = 1.0 if angle <= plant.angle_min else plant.static_torque + torque
@@ -232,13 +233,13 @@ def roots_at_rest(plant: PlantParameters, angle: float, torque: float) -> Roots:
 
 
 def roots_sliding(plant: PlantParameters, angle: float, angular_velocity: float, way: float) -> Roots:
-    """Speed along the way [rad/s] and distance from the stop ahead [rad]."""
+    """Speed in the direction of motion [rad/s], and distance to the next stop [rad]."""
     ahead = plant.angle_max - angle if way > 0.0 else angle - plant.angle_min
     return Roots(way * angular_velocity, ahead)
 
 
 def after_stop(run: Run, states: Mapping[str, Any], angular_velocity: float) -> float:
-    """Angular velocity [rad/s] after an impact on a stop; 0 where the rebound is not worth following."""
+    """Angular velocity [rad/s] after an impact on a stop; 0 for a negligible rebound."""
     thrown_back = float(in_program(rebound, run.program, run.effects)(states, angular_velocity))
     # Rebounds follow in ever shorter times: without a lowest speed the solver would restart without end.
     return thrown_back if abs(thrown_back) > SLOWEST_REBOUND else 0.0

@@ -1,4 +1,4 @@
-"""Definition of a function as its file has it, refused where that is not what Python runs."""
+"""Syntax tree of a function from its source file, refused if Python runs different code."""
 
 import ast
 import inspect
@@ -13,18 +13,18 @@ from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, p
 from ppafo.errors import ProgramError
 
 Adaptation = Callable[[FunctionType, ast.FunctionDef], ast.FunctionDef]
-"""Makes a definition one of the part of Python that is compiled; it is handed a copy of its own."""
+"""Function that converts a definition to the compiled subset of Python, from a copy of the syntax tree."""
 
 
 def emitted_name(item: Any) -> str:
-    """Name that a function or NamedTuple class gets in the generated module: its module path and its own name."""
+    """Return the name of a function or NamedTuple class in the generated module: module path and own name."""
     module = item.__module__ or ""
     path = module.removeprefix("ppafo.") if module.startswith("ppafo.") else f"foreign.{module}"
     return re.sub(r"\W", "_", f"{path}_{item.__qualname__}")
 
 
 def check_is_plain(function: Any) -> None:
-    """Refuse what is no plain function: its source text would not be what Python runs. ProgramError says why."""
+    """Refuse all but plain functions, whose source text is the code that Python runs. ProgramError states why."""
     name = getattr(function, "__qualname__", None) or repr(function)
     if type(function) is not FunctionType:
         if not callable(function):
@@ -46,15 +46,15 @@ def check_is_plain(function: Any) -> None:
 
 
 def place_of(item: Any) -> str:
-    """File and line of a function, the module of anything else."""
+    """Return file and line of a function, or the module of any other object."""
     code = getattr(item, "__code__", None)
     return f"module {item.__module__}" if code is None else place(code.co_filename, code.co_firstlineno)
 
 
 def parse_definition(function: FunctionType, adapt: Adaptation | None = None) -> ast.FunctionDef:
-    """The definition of a plain function with the lines of its file; refused where it is not what Python runs.
+    """Return the definition of a plain function with the line numbers of its file.
 
-    ProgramError where the definition cannot be read or is not what Python runs.
+    Raises ProgramError if the definition cannot be read or differs from the code that Python runs.
     """
     code = function.__code__
     file, name = code.co_filename, function.__qualname__
@@ -82,7 +82,7 @@ def parse_definition(function: FunctionType, adapt: Adaptation | None = None) ->
 
 
 def _code_of(tree: ast.FunctionDef, function: FunctionType) -> Iterator[CodeType]:
-    """The code that Python makes of a definition: it calls what is in a module otherwise where it sees the import."""
+    """Yield the bytecode of a definition compiled with and without the module imports in view."""
     names = function.__code__.co_names
     modules = [name for name in names if isinstance(function.__globals__.get(name), ModuleType)]
     imports = [parse_module(f"import {name}").body[0] for name in modules]
@@ -97,14 +97,14 @@ def _code_of(tree: ast.FunctionDef, function: FunctionType) -> Iterator[CodeType
 
 
 def _shape(code: CodeType) -> tuple[Any, ...]:
-    """Instructions of a code object, without line numbers and docstring."""
+    """Return the instructions of a code object, without line numbers and docstring."""
     # Texts are left out: a docstring may have changed without a change of what runs.
     constants = [(type(constant), repr(constant)) for constant in code.co_consts if not isinstance(constant, str)]
     return code.co_code, code.co_names, code.co_varnames, code.co_argcount, code.co_kwonlyargcount, constants
 
 
 def source_lines(body: list[ast.stmt]) -> Iterator[int]:
-    """Line in its file of each line that ``ast.unparse`` writes for some statements."""
+    """Yield the source line number of each line that ``ast.unparse`` writes for some statements."""
     for statement in body:
         yield statement.lineno
         if isinstance(statement, ast.If | ast.For | ast.While):

@@ -1,7 +1,7 @@
-"""Entries of composed texts: functions that Python calls, with arrays and numbers, and that return nothing.
+"""Entries of composed texts: functions called from Python, with arrays and numbers as arguments and no return value.
 
-A text is Python with two marks: ``@entry`` states the types of the parameters of a function, ``@inline`` stands before
-what the entries call. Every compiler reads them there; Python itself runs the text with marks that do nothing.
+A text is Python with two decorators: ``@entry`` declares the parameter types of a function, ``@inline`` marks functions
+called by entries. Every compiler reads the decorators; for Python itself they do nothing.
 """
 
 import ast
@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 PARSING = threading.RLock()
-"""Held by whoever makes a syntax tree: Python 3.11 keeps one depth for the trees of all threads, and ends with a
-SystemError where the garbage collector lets a second one parse before the first is done (CPython issue 106905)."""
+"""Lock for creating syntax trees: Python 3.11 has one recursion depth for the trees of all threads, and raises
+SystemError if the garbage collector lets a second thread parse before the first is done (CPython issue 106905).
+"""
 
 FLOAT, INT = "float64", "int64"
 ARRAY, ARRAY_2D, ARRAY_3D = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
@@ -27,44 +28,44 @@ from collections import namedtuple
 '''
 """First lines of a composed text."""
 INLINE = "@inline"
-"""The mark of functions that its entries call."""
+"""Decorator of functions called by entries."""
 ENTRY = '@entry("void({})")'
-"""The mark of an entry, for the types of its parameters."""
+"""Decorator of an entry, with a placeholder for the parameter types."""
 
 ORIGIN = "# origin"
-"""Beginning of the line before each function that says which lines of which file it was made from."""
+"""Prefix of the comment before each function that gives its source file and lines."""
 
 _MARK = "@entry("
 
 
 def with_arrays(entry: Callable[..., None], *arrays: NDArray[np.float64]) -> Callable[..., None]:
-    """An entry of a loaded module as a function of its numbers alone; the arrays, its first arguments, stay the same.
+    """Return an entry of a loaded module as a function of its numbers alone, bound to the leading array arguments.
 
-    A call then costs what one with a few numbers costs.
+    A call then costs as much as a call with a few numbers.
     """
     packed: Callable[..., Callable[..., None]] | None = getattr(entry, "with_arrays", None)
     return partial(entry, *arrays) if packed is None else packed(*arrays)
 
 
 def entry_text(name: str, parameters: Mapping[str, str], lines: Iterable[str]) -> str:
-    """Text of an entry, from the types of its parameters in order and the lines of its body."""
+    """Return the text of an entry, from its parameter types in order and the lines of its body."""
     head = ENTRY.format(", ".join(parameters.values()))
     return "\n".join([head, f"def {name}({', '.join(parameters)}):", *indent(lines), ""])
 
 
 def indent(lines: Iterable[str]) -> list[str]:
-    """Lines of Python, each one level further in."""
+    """Return lines of Python, indented by one more level."""
     return [f"    {line}" for line in lines]
 
 
 def parse_expression(text: str) -> ast.expr:
-    """Return the syntax tree of an expression, one thread at a time."""
+    """Return the syntax tree of an expression; only one thread parses at a time."""
     with PARSING:
         return ast.parse(text, mode="eval").body
 
 
 def entry_types(source: str) -> dict[str, list[str]]:
-    """Types of the parameters of all entries of a text, in order, by the name of the entry."""
+    """Return the parameter types of all entries of a text, in order, by entry name."""
     types = {}
     for mark, head in pairwise(source.split("\n")):
         if mark.startswith(_MARK):
@@ -77,5 +78,5 @@ def entry_types(source: str) -> dict[str, list[str]]:
 
 
 def without_origins(source: str) -> str:
-    """Return the text without the lines that say where its functions stand: what decides the machine code."""
+    """Return the text without the source-position comments, that is, the part that determines the machine code."""
     return "\n".join(line for line in source.split("\n") if not line.startswith(ORIGIN))

@@ -34,17 +34,17 @@ class RecordedResult(Protocol):
 
     @property
     def status(self) -> Any:
-        """End of the run, a ``Status``."""
+        """End of the run: a ``Status``."""
 
     def plot(self) -> "Figure":
-        """Return its figure."""
+        """Return the figure of the result."""
 
 
 def channel_values(self: RecordedResult, channel: str | tuple[str, str]) -> Floats:
-    """Return the values of a channel in SI, ``result["torque"]``, or in a unit, ``result["pressure_1", "psi_g"]``.
+    """Return a channel's values, in SI (``result["torque"]``) or in a given unit (``result["pressure_1", "psi_g"]``).
 
-    ``result["time"]`` are the times of the samples [s]. DataError for a channel that is not there, UnitError for a unit
-    that does not fit it.
+    ``result["time"]`` are the times of the samples [s]. Raises DataError for an unknown channel, and UnitError for a
+    unit that does not fit the channel.
     """
     if channel == "time":
         return self.recording.time
@@ -55,13 +55,13 @@ def channel_values(self: RecordedResult, channel: str | tuple[str, str]) -> Floa
 
 
 def channel_names(self: RecordedResult) -> list[str]:
-    """Return the time and the channels, which a notebook completes between brackets."""
+    """Return ``time`` and the channel names, which a notebook offers as completions between brackets."""
     return ["time", *self.recording.names]
 
 
 @in_units(lambda result: result.scenario.device.shown)
 def html(self: RecordedResult) -> str:
-    """Return metrics and figure, which a notebook shows."""
+    """Return metrics and figure as HTML, which a notebook displays."""
     from ppafo.report.notebook import result_html
 
     return result_html(str(self).partition("\n")[0], self.metrics, self.plot())
@@ -70,7 +70,7 @@ def html(self: RecordedResult) -> str:
 def dataset(self: RecordedResult, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
     """Return the recording as an xarray Dataset; attributes hold units, long names and the scenario as JSON.
 
-    Channels are in SI but for those with another unit in ``units``, ``{"pressure_1": "psi_g"}``.
+    Channels are in SI units unless ``units`` gives another unit for them, such as ``{"pressure_1": "psi_g"}``.
     """
     from ppafo.storage import dataset_of
 
@@ -81,7 +81,7 @@ def dataset(self: RecordedResult, units: Mapping[str, str] | None = None) -> "xa
 
 
 def dataframe(self: RecordedResult, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
-    """Return the channels as columns over time [s]; ``units`` as of ``dataset``."""
+    """Return the channels as columns indexed by time [s]; ``units`` as in ``dataset``."""
     table = dataset(self, units)
     frame = table.to_dataframe()
     # pandas keeps no attributes of columns.

@@ -1,4 +1,7 @@
-"""Scenario of a document with its overrides: device, motion, control and assumptions in SI, every mistake one line."""
+"""Building of a scenario from its document and overrides: device, motion, control and assumptions in SI units.
+
+Each mistake in the document raises an error of one line.
+"""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -83,11 +86,12 @@ _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
 
 @dataclass(frozen=True, slots=True)
 class ScenarioRequest:
-    """A scenario that is to be built.
+    """Request to build a scenario.
 
-    ``file`` is what messages call it, ``path`` the file itself if there is one, ``folder`` where relative paths begin,
-    ``content`` the document as it was given. ``parameter_set`` takes the place of the set that the document names, and
-    ``instead`` has names of other files, by path in the document, whose relative paths begin in the working folder.
+    ``file`` is the name of the scenario in messages, ``path`` the file, if there is one, ``folder`` the folder from
+    which relative paths start, and ``content`` the document as given. ``parameter_set`` replaces the parameter set that
+    the document names. ``instead`` maps a path in the document to the name of another file; relative names in
+    ``instead`` start from the working folder.
     """
 
     file: str
@@ -101,7 +105,7 @@ class ScenarioRequest:
 
 @dataclass(frozen=True, slots=True)
 class Hardware:
-    """The parameter set with all overrides in it, the name of its valve that is used, and what follows what in it."""
+    """Parameter set with all overrides applied, name of its selected valve, and links between its numbers."""
 
     parameter_set: ParameterSet
     valve: str
@@ -109,9 +113,9 @@ class Hardware:
 
 
 def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
-    """Return the scenario of a document that has the right keys.
+    """Return the scenario of a document whose keys have been checked.
 
-    ScenarioError or ParameterError for the first value that cannot be used.
+    Raises ScenarioError or ParameterError for the first value that cannot be used.
     """
     document = changed.document
     reading = DocumentReader(request.file, document, changed.paths)
@@ -176,13 +180,13 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
 
 
 def origin_of(request: ScenarioRequest, document: Mapping[str, Any], valve: str, named: Iterable[str] = ()) -> Origin:
-    """Return where a scenario comes from; ``named`` are overrides for what the request gives ``instead``."""
+    """Return the origin of a scenario; ``named`` are the overrides that correspond to ``request.instead``."""
     overrides = (*(override.words for override in request.overrides), *named)
     return Origin(request.path, document["device"]["set"], valve, overrides, request.content)
 
 
 def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: tuple[Override, ...]) -> Hardware:
-    """Return the parameter set with the overrides of the file and then the caller's."""
+    """Return the parameter set with the overrides of the file, then those of the caller."""
     section, in_file = reading.document["device"], request.content.get("device", {})
     valve = section.get("valve")
     try:
@@ -206,9 +210,9 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
 
 
 def parameter_set_of(origin: Origin) -> ParameterSet:
-    """Return the set of which the device of a scenario was made, with the overrides of its file and then the caller's.
+    """Return the parameter set of a scenario's device, with the overrides of its file and then those of the caller.
 
-    ParameterError where it cannot be read any more.
+    Raises ParameterError if the set can no longer be read.
     """
     folder = Path() if origin.file is None else Path(origin.file).parent
     of_file = read_overrides(origin.content.get("device", {}).get("overrides", ()))
@@ -218,13 +222,13 @@ def parameter_set_of(origin: Origin) -> ParameterSet:
 
 
 def set_name(name: str, folder: Path) -> str:
-    """Return the name of a set of the package, or the path of a set file, which may be relative to the scenario."""
+    """Return the name of a shipped parameter set, or the path of a set file; relative paths start from ``folder``."""
     is_path = Path(name).suffix == ".toml" or "/" in name
     return str(folder / name) if is_path and name not in list_sets() else name
 
 
 def read_device(reading: DocumentReader, hardware: Hardware) -> Device:
-    """Return the device of a parameter set with its overrides; ParameterError for what is missing or contradicts."""
+    """Return the device of a parameter set with its overrides; ParameterError for missing or contradictory values."""
     try:
         device = build_device(hardware.parameter_set, hardware.valve, hardware.links)
     except ParameterError as error:
@@ -235,7 +239,7 @@ def read_device(reading: DocumentReader, hardware: Hardware) -> Device:
 
 
 def _texts(values: Iterable[Any]) -> Iterator[Any]:
-    """Yield what tables and lists hold, in their order."""
+    """Yield the values of nested tables and lists in order."""
     for value in values:
         if isinstance(value, Mapping | list):
             yield from _texts(value.values() if isinstance(value, Mapping) else value)
@@ -244,14 +248,15 @@ def _texts(values: Iterable[Any]) -> Iterator[Any]:
 
 
 def _of_device(reading: DocumentReader, error: ParameterError) -> ParameterError:
-    """Return the error with the scenario it happened in, on one line whatever the names are."""
+    """Return a ParameterError that names the scenario in which ``error`` was raised, on one line."""
     return ParameterError(f"{reading.file}: [device]: {one_line(error)}")
 
 
 def _initial(reading: DocumentReader, supply: Supply) -> tuple[Initial, Graph]:
-    """Return the pressures [Pa absolute] of the chambers at the start, and which pressures of the supply they follow.
+    """Return the initial chamber pressures [Pa absolute] and their links to the supply pressures that they follow.
 
-    Each is a number or a word; a word follows its pressure, a number in gauge the atmosphere.
+    Each pressure is given as a number or as a word: a word stands for the supply pressure that it names, and a gauge
+    pressure is relative to the atmosphere.
     """
     pressures: list[float] = []
     links: dict[str, tuple[LinkedDefault, ...]] = {}
@@ -282,7 +287,7 @@ def _control(
     motion: Motion,
     reference: ProfileChoice,
 ) -> tuple[Control, Graph]:
-    """Return the controller with its sample period [s], and which of its settings [SI] follow other numbers."""
+    """Return the controller with its sample period [s], and the links of its settings [SI] to other numbers."""
     kind = kind_at(reading.document, "controller")
     controlled, leg = controlled_in(reading.document), getattr(motion, "leg", None)
     items = controller_settings(kind, controlled)
@@ -308,7 +313,7 @@ def _control(
 
 
 def _controlled(reading: DocumentReader) -> str:
-    """Return what the reference is of; ScenarioError where the controller cannot follow it."""
+    """Return the controlled quantity of the reference; ScenarioError if the controller cannot follow this quantity."""
     controlled, kind = controlled_in(reading.document), kind_at(reading.document, "controller")
     law = CONTROLLERS[kind]
     if not law.needs_reference or controlled in law.controls:
@@ -324,9 +329,9 @@ def _controlled(reading: DocumentReader) -> str:
 
 
 def _reference(reading: DocumentReader, controlled: str, atmosphere: float) -> tuple[ProfileChoice, Graph]:
-    """Return what the controller follows, and which levels of it follow the atmosphere [Pa absolute].
+    """Return the reference profile and the links of its levels to the atmospheric pressure [Pa absolute].
 
-    ScenarioError where the controller needs a reference and none is given.
+    Raises ScenarioError if the controller needs a reference and none is given.
     """
     if "reference" not in reading.document:
         law = kind_at(reading.document, "controller")
@@ -358,9 +363,9 @@ def _sensors(reading: DocumentReader, clock: RunTimes) -> Sensors:
 def read_assumptions(
     before: DocumentReader, reading: DocumentReader, hardware: Hardware, overrides: Iterable[Override]
 ) -> tuple[Assumption, ...]:
-    """Return every assumption that still has a value; one that an override replaced says what it was ``before``.
+    """Return all assumptions with a value; the note of an overridden assumption states the value in ``before``.
 
-    ScenarioError for a path that has no value.
+    Raises ScenarioError for a path without a value.
     """
     replaced = {override.typed for override in overrides}
     notes: Mapping[str, str] = reading.document.get(_SECTION, {})
@@ -380,7 +385,7 @@ def read_assumptions(
 
 
 def _value(reading: DocumentReader, hardware: Hardware, path: str) -> str | None:
-    """Return the value at a path as written in the file or, where it has none, the default; None without either."""
+    """Return the value at a path as written in the file, else its default; None if there is neither."""
     written = value_at(reading.document, path)
     if written is not None and path in OF_A_VANE.paths(reading.document):
         return str(written)
@@ -400,7 +405,7 @@ def _value(reading: DocumentReader, hardware: Hardware, path: str) -> str | None
 
 
 def read_gas_model(reading: DocumentReader) -> GasModel | None:
-    """Return how the gas takes up heat in SI, None where it keeps its temperature."""
+    """Return the heat exchange model of the gas in SI units; None for isothermal gas."""
     if kind_at(reading.document, "gas_model") != THERMAL:
         return None
     model = GasModel(**reading.section("gas_model", THERMAL_GAS))
@@ -412,9 +417,9 @@ def read_gas_model(reading: DocumentReader) -> GasModel | None:
 
 
 def read_supply_line(reading: DocumentReader, device: Device) -> SupplyLine | None:
-    """Return the lines of a file in SI, None where it has no such section: then supply pressures are constant.
+    """Return the supply lines of a file in SI units; None without such a section, for constant supply pressures.
 
-    ScenarioError where dorsiflexion is set to more than the line has that feeds its regulator.
+    Raises ScenarioError if the dorsiflexion pressure exceeds the pressure of the line that feeds its regulator.
     """
     if value_at(reading.document, SUPPLY_LINE) is None:
         return None
@@ -433,7 +438,7 @@ def read_supply_line(reading: DocumentReader, device: Device) -> SupplyLine | No
 
 
 def assumed_lines(reading: DocumentReader) -> tuple[Assumption, ...]:
-    """Return the values of the lines that the file leaves to their defaults, with the reason for each."""
+    """Return an assumption for each supply-line value that the file leaves at its default, with the reason."""
     if value_at(reading.document, SUPPLY_LINE) is None:
         return ()
     return tuple(

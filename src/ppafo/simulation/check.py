@@ -1,9 +1,9 @@
-"""Reliability of a run: the error of its steps, and its repeatability.
+"""Reliability of a run: time-stepping error, and repeatability.
 
-The error of the time stepping falls with the allowed one, so nearly all of it is in what changes where a run has a
-sixteenth of it. A loop with coarse sensors or repeated impacts may amplify a difference that is too small to measure
-into other results: it runs again with start and measurements moved a little, and metrics that change then are
-numerically sensitive. They hold for one run among many, and a check says so.
+The time-stepping error falls with the allowed error, so the difference from a run with a sixteenth of the allowed
+error is nearly the whole error. A loop with coarse sensors or repeated impacts may amplify an unmeasurably small
+difference into different results. The run is therefore repeated with slightly perturbed start and measurements;
+metrics that change then are numerically sensitive: their values hold for one run among many.
 """
 
 import math
@@ -27,24 +27,24 @@ from ppafo.units.shown import in_units, units_in_force
 SHORTER = 4
 """Ratio by which the steps of a finer run are shorter; its allowed error is smaller by the square."""
 MARGIN = 1.5
-"""Estimated error over the change: it is then above the error in 99 % of drawn runs (docs/evidence.md)."""
+"""Safety factor on the change: the estimate then exceeds the error in 99 % of drawn runs (docs/evidence.md)."""
 LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, LARGEST_OF_TEMPERATURE = 2.0e-4, 1.0e-3, 2.0e-3
-"""Errors over the ranges of angle and pressures, and over the gas's temperature, that a run keeps to by default."""
+"""Default error limits relative to the ranges of angle and pressures, and to the gas temperature [-]."""
 SMALLEST_TOLERANCE = 1.0e-6
 """Smallest ``run.tolerance`` that a run may have [-]."""
 
 MOVE = 1.0e-7
 """Perturbation of a start or a measurement, as a fraction of its range."""
 ALLOWED_CHANGE = 1.0e-3
-"""Largest change of a metric that counts as none, as a fraction of its value or of the range of its quantity."""
+"""Largest change of a metric that is ignored, as a fraction of its value or of the range of its quantity."""
 
 FINER, MOVED_START, MOVED_MEASUREMENT = "finer steps", "start moved", "measurement moved"
 _MOVES = frozenset({MOVED_START, MOVED_MEASUREMENT})
 
 DRAWS = 4
-"""Draws of what moves the measurements of sensors without noise."""
+"""Number of noise realisations with which measurements are perturbed if the sensors have no noise."""
 ALLOWED_PARTING = 1.0e-2
-"""Largest difference of two runs over time that counts as none, as a fraction of the range."""
+"""Largest difference between two runs over time that is ignored, as a fraction of the range."""
 _TEMPERATURES = "temperatures over time"
 _COURSES = {
     "angle over time": ("angle",),
@@ -59,13 +59,14 @@ def _units_of(shown: "ErrorEstimate | Check") -> Mapping[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class ErrorEstimate:
-    """Estimated error of a run from its time stepping: largest over time of the angle [rad] and of a pressure [Pa].
+    """Estimated time-stepping error of a run.
 
-    ``metrics`` has the error of each metric in its SI unit, inf where the finer run has no such number; ``largest`` the
-    name of the one whose error is largest over its value or the range of its quantity, empty without metrics, and
-    ``share`` that ratio [-]. ``temperature`` [K] is of gas with an energy balance, None of any other. ``over_promise``
-    is the largest of angle, pressure and temperature over what a run keeps to by default [-], and ``tolerance`` a
-    ``run.tolerance`` that is small enough, 0 where none is needed; ``units`` are those in which a person is shown it.
+    ``angle`` [rad], ``pressure`` [Pa] and ``temperature`` [K] are the largest errors over time; ``temperature`` is None
+    for gas without an energy balance. ``metrics`` maps each metric to its error in SI units, inf if the finer run lacks
+    this metric. ``largest`` names the metric with the largest relative error, "" without metrics, and ``share`` is that
+    relative error [-], with respect to the value of the metric or the range of its quantity. ``over_promise`` is the
+    largest of the errors of angle, pressure and temperature, divided by the default error limit [-]. ``tolerance`` is a
+    ``run.tolerance`` that meets the limit, 0 if none is needed. ``units`` are the display units by SI unit.
     """
 
     angle: float
@@ -81,7 +82,7 @@ class ErrorEstimate:
     @property
     @in_units(_units_of)
     def sentence(self) -> str:
-        """The errors of angle, pressures, temperatures and metrics in the units that people are shown."""
+        """Errors of angle, pressures, temperatures and metrics in display units."""
         from ppafo.report.display_units import metric_change
 
         errors = {"rad": self.angle, "Pa": self.pressure, "K": self.temperature}
@@ -98,10 +99,11 @@ class ErrorEstimate:
 
 @dataclass(frozen=True, slots=True)
 class NumberCheck:
-    """A number in SI units and how much it changed in each repeat, by name; inf where a repeat has no such number.
+    """Change of one quantity [SI] between the run and each repeat.
 
-    ``value`` is a metric, or the range of an angle or a pressure whose ``changes`` are the largest over time;
-    ``allowed`` is the largest change that counts as none, ``allowed_error`` the largest of the run with finer steps.
+    ``value`` is the value of a metric, or the range of a channel. ``changes`` maps each kind of repeat to the change of
+    the metric, or to the largest change of the channel over time; inf if the repeat lacks the value. ``allowed`` is the
+    largest change that is ignored, ``allowed_error`` the one for the run with finer steps.
     """
 
     name: str
@@ -113,12 +115,12 @@ class NumberCheck:
 
     @property
     def is_determined(self) -> bool:
-        """True where no repeat changed it by more than is allowed."""
+        """True if no repeat changed the value by more than the allowed change."""
         return not self.changed_by
 
     @property
     def changed_by(self) -> frozenset[str]:
-        """The repeats that changed it by more than is allowed."""
+        """Kinds of repeat that changed the value by more than the allowed change."""
         return frozenset(
             name
             for name, change in self.changes.items()
@@ -128,11 +130,12 @@ class NumberCheck:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Check:
-    """Repeatability of a run: of its metrics, and of its angle, pressures and temperatures over time.
+    """Repeatability of a run.
 
-    ``error`` is the estimated error of the run from its steps, of which the one with finer steps has a sixteenth.
-    ``parts_at`` is the first time [s] at which a repeat is elsewhere by more than 1e-2 of a range, None where none is;
-    ``failed`` names the repeats that diverged.
+    ``metrics`` and ``courses`` (angle, pressures and temperatures over time) hold the changes in the repeats. ``error``
+    is the estimated time-stepping error, from a run with a sixteenth of the allowed error. ``parts_at`` is the first
+    time [s] at which a repeat differs by more than 1e-2 of a range, None if none does. ``failed`` names the kinds of
+    repeat that diverged. ``units`` are the display units by SI unit.
     """
 
     scenario: str
@@ -145,12 +148,12 @@ class Check:
 
     @property
     def is_determined(self) -> bool:
-        """True where every repeat gave the same metrics and stayed with the run all the time."""
+        """True if every repeat completed with the same metrics and the same channels over time."""
         return not self.failed and all(row.is_determined for row in (*self.metrics, *self.courses))
 
     @property
     def sentence(self) -> str:
-        """Result of the check, in plain words."""
+        """Result of the check in plain words."""
         if self.is_determined:
             return (
                 f"All metrics are repeatable: none changes by more than {ALLOWED_CHANGE:.0e} of its value or its "
@@ -179,7 +182,7 @@ class Check:
 
     @in_units(_units_of)
     def __repr__(self) -> str:
-        """Return the table of all changes in the units that people are shown, and the sentence."""
+        """Return the table of all changes in display units, and the sentence."""
         from ppafo.report.display_units import metric_change, metric_level
         from ppafo.report.writing import align_columns
 
@@ -196,7 +199,7 @@ class Check:
         return "\n".join([head, *align_columns(rows), "", self.sentence])
 
     def document(self) -> dict[str, Any]:
-        """Return the check as data that JSON can hold, in SI units."""
+        """Return the check as data that can be written as JSON, in SI units."""
         document: dict[str, Any] = plain(self)
         rows = {"metrics": self.metrics, "courses": self.courses}
         judged = {
@@ -210,7 +213,7 @@ Again = Callable[[Sequence[Run]], Sequence[RecordedResult]]
 
 
 def finer(run: Run) -> Run:
-    """Return a run, or an ensemble, with a sixteenth of its allowed error and in steps a quarter as long."""
+    """Return a run, or an ensemble, with a sixteenth of the allowed error and a quarter of the step size."""
     return replace(
         run,
         tolerance=run.tolerance / SHORTER**2,
@@ -222,7 +225,7 @@ def finer(run: Run) -> Run:
 
 
 def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstimate:
-    """The estimated error of a result, from the same run with finer steps; inf where that diverged."""
+    """Estimated error of a result, from the same run with finer steps; inf if the finer run diverged."""
     courses = list(_courses_of(result).values())
     if not fine.status.is_completed:
         errors_at_end, errors = [math.inf for _ in courses], dict.fromkeys(result.metrics, math.inf)
@@ -255,7 +258,7 @@ def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstima
 
 
 def _courses_of(result: RecordedResult) -> dict[str, tuple[str, ...]]:
-    """Recorded channels of a run that are compared over time, by the words for them."""
+    """Recorded channels that are compared over time, grouped by their description."""
     recorded = {
         words: tuple(name for name in channels if name in result.recording) for words, channels in _COURSES.items()
     }
@@ -263,7 +266,7 @@ def _courses_of(result: RecordedResult) -> dict[str, tuple[str, ...]]:
 
 
 def _shares(result: RecordedResult, errors: Mapping[str, float]) -> dict[str, float]:
-    """Errors of metrics over their values or the ranges of their quantities [-]; those that have either."""
+    """Relative errors of metrics [-]: divided by the metric's value or, if larger, the range of its quantity."""
     pressures = _pressure_range(result)
     scales = {
         name: max(abs(metric.value), _metric_range(result, name, metric.unit, pressures))
@@ -274,7 +277,7 @@ def _shares(result: RecordedResult, errors: Mapping[str, float]) -> dict[str, fl
 
 
 def _pressure_range(result: RecordedResult) -> float:
-    """Highest less lowest pressure [Pa] that the chambers had or are connected to; the atmosphere's if there is one."""
+    """Range of the chamber, supply and atmospheric pressures [Pa]; the atmospheric pressure if the range is 0."""
     supply = result.scenario.device.supply
     outside = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
     chambers = [result.recording[name] for name in _COURSES["pressures over time"] if name in result.recording]
@@ -283,9 +286,9 @@ def _pressure_range(result: RecordedResult) -> float:
 
 
 def checked(result: RecordedResult, run: Run, again: Again) -> Check:
-    """Return whether a result can be repeated, from its plan.
+    """Return the repeatability check of a result, from its planned run.
 
-    SimulationError for a Python controller that gives a different run each time: every change would be its own.
+    Raises SimulationError for a Python controller that gives a different run each time, so that changes say nothing.
     """
     scenario, recording = result.scenario, result.recording
     controller = scenario.controller.custom
@@ -330,9 +333,10 @@ def checked(result: RecordedResult, run: Run, again: Again) -> Check:
 
 
 def start_moved(run: Run, move: float, apart: float) -> Run:
-    """The run from a little more gas in both chambers, and where the vane is free from a little further on.
+    """Run that starts with slightly more gas in both chambers and, for a free vane, at a slightly larger angle.
 
-    With ``apart`` -1 chamber 2 has a little less instead: a torque that is exactly the wanted one then is so no more.
+    With ``apart`` -1 chamber 2 starts with slightly less gas instead, so that a torque that equals the reference
+    exactly no longer does.
     """
     plant, start = run.plant, run.initial
     angle = start.angle
@@ -368,7 +372,7 @@ def _value(result: RecordedResult, name: str) -> float:
 
 
 def _difference(now: float, before: float) -> float:
-    """The change; inf where only one of both is a number."""
+    """Change from ``before`` to ``now``; inf if only one of the two is finite."""
     if math.isfinite(now) and math.isfinite(before):
         return now - before
     # Equal infinities and two values that are not known are no change.
@@ -376,7 +380,7 @@ def _difference(now: float, before: float) -> float:
 
 
 def _largest(changes: Iterable[tuple[str, float]]) -> dict[str, float]:
-    """The largest change of all directions, with its sign, by repeat."""
+    """Largest signed change over all perturbations, by kind of repeat."""
     largest: dict[str, float] = {}
     for name, change in changes:
         largest[name] = max(largest.get(name, 0.0), change, key=abs)
@@ -384,7 +388,7 @@ def _largest(changes: Iterable[tuple[str, float]]) -> dict[str, float]:
 
 
 def _metric_range(result: RecordedResult, name: str, unit: str, pressures: float) -> float:
-    """Range of the quantity of a metric; 1 for a number of events, 0 for a unit that has none."""
+    """Range of the quantity of a metric; 1 for a count of events, 0 for a unit without a range."""
     scenario, recording = result.scenario, result.recording
     actuator = scenario.device.actuator
     angles, torques = actuator.angle_max - actuator.angle_min, abs(actuator.torque_constant) * pressures
@@ -413,7 +417,7 @@ def _metric_range(result: RecordedResult, name: str, unit: str, pressures: float
 
 
 def _largest_differences(one: Recording, other: Recording, channels: Iterable[str]) -> Floats:
-    """Largest difference of some channels at each sample that both have."""
+    """Largest difference over the channels at each sample that both recordings have."""
     # A repeat that diverged is shorter.
     count = min(len(one), len(other))
     return np.asarray(np.max([np.abs(one[name][:count] - other[name][:count]) for name in channels], axis=0))

@@ -1,4 +1,4 @@
-"""Times of a run: one step that divides the sample period; recorded samples may lie between steps."""
+"""Times of a run: the step divides the sample period; recorded samples may lie between steps."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -30,10 +30,10 @@ TIMES = (_DURATION_PATH, _STEP_PATH, _OUTPUT_PATH, _RATE_PATH, _PERIOD_PATH)
 
 
 def read_clock(reading: DocumentReader) -> RunTimes:
-    """Return the times of a run [s]; the step is the largest one, up to what is given, that divides the sample period.
+    """Return the times of a run [s]; the step is the largest divisor of the sample period up to the given step.
 
-    Without an output interval every step is recorded, or nearly every one where they do not divide the duration.
-    ScenarioError where the times contradict each other or make too many steps.
+    Without an output interval every step is recorded, or nearly every one if the steps do not divide the duration.
+    Raises ScenarioError for contradictory times, and for too many steps.
     """
     duration = reading.number(_DURATION_PATH, _DURATION)
     if value_at(reading.document, _RATE_PATH) is not None:
@@ -82,7 +82,7 @@ def read_clock(reading: DocumentReader) -> RunTimes:
 
 
 def links_of_times(document: Mapping[str, Any]) -> Graph:
-    """Return which times of a document follow others because it does not give them: step and output interval."""
+    """Return the links of the step and the output interval to the other times, if the document does not give them."""
     step, output = (value_at(document, path) is not None for path in (_STEP_PATH, _OUTPUT_PATH))
     found: dict[str, tuple[LinkedDefault, ...]] = {}
     if not step:
@@ -101,32 +101,32 @@ def links_of_times(document: Mapping[str, Any]) -> Graph:
 
 
 def step_unless_given(duration: Numeric, period: Numeric) -> Numeric:
-    """The largest step [s] of a run where its file has none: no longer than the run or a sample of the controller."""
+    """Default upper limit of the step [s]: the duration or the sample period of the controller, if shorter."""
     found: Numeric = smaller(smaller(duration, period), _LONGEST_STEP)
     return found
 
 
 def step_with_output(duration: Numeric, period: Numeric, output_interval: Numeric) -> Numeric:
-    """The largest step [s] of a run whose file has an output interval [s] and no step: no longer than that either."""
+    """Default upper limit of the step [s] with a given output interval [s], which limits the step as well."""
     found: Numeric = smaller(step_unless_given(duration, period), output_interval)
     return found
 
 
 def dividing_step(period: Numeric, step: Numeric) -> Numeric:
-    """The largest step [s], up to one that is given, that divides the sample period."""
+    """Largest step [s] that divides the sample period and does not exceed the given step."""
     # A quotient that rounding put above a whole number would make the step shorter than what is given.
     found: Numeric = period / larger(1.0, rounded_up(period / step * (1.0 - _RELATIVE)))
     return found
 
 
 def output_unless_given(duration: Numeric, period: Numeric, step: Numeric) -> Numeric:
-    """The time [s] between two recorded samples where nobody says it: every step, or nearly so."""
+    """Default output interval [s]: every step, or nearly every step."""
     found: Numeric = duration / larger(1.0, nearest_whole(duration / dividing_step(period, step)))
     return found
 
 
 def nearest_whole(number: Numeric) -> Numeric:
-    """The nearest whole number, the even one of two that are as near."""
+    """Nearest integer; ties go to the even one."""
     up = truncated(number + 0.5)
     is_odd_tie = (up - number == 0.5) & (0.5 * up != truncated(0.5 * up))
     found: Numeric = choose(is_odd_tie, up - 1.0, up)
@@ -139,13 +139,13 @@ def _not_above(reading: DocumentReader, path: str, value: float, limit_path: str
 
 
 TimeTexts = Mapping[str, Mapping[str, Any]]
-"""The times of a scenario by section and name, as a file gives them."""
+"""Times of a scenario by section and name, as written in a file."""
 
 
 def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> RunTimes:
-    """Return the clock [s] of a run with other times, which are read as overrides of the scenario ``name`` are.
+    """Return the clock [s] of a run with other times, read like overrides of the scenario ``name``.
 
-    ScenarioError if they do not fit together.
+    Raises ScenarioError if the times do not fit together.
     """
     document = {section: dict(texts) for section, texts in given.items()}
     for path, value in times.items():
@@ -158,7 +158,7 @@ def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> RunTi
 
 
 def time_texts(base: Scenario) -> TimeTexts:
-    """Return the times as the scenario's file gives them, or the numbers where the scenario was changed since."""
+    """Return the times as written in the scenario file, or as numbers if the scenario was changed after loading."""
     document = apply_overrides(base.origin.content, read_overrides(base.origin.overrides), base.name).document
     texts = {
         section: {name: value for name, value in document[section].items() if f"{section}.{name}" in TIMES}

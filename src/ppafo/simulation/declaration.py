@@ -1,7 +1,8 @@
-"""Every value that a scenario can hold: section, name, SI unit, range, default and meaning.
+"""Declaration of every value of a scenario: section, name, SI unit, range, default and meaning.
 
 The schema, the conversion to SI, the messages and the overrides all read these lists; the settings of controllers and
-profiles come from their own catalogues. Limits are wide: they exclude slips of the pen and what no solver could handle.
+profiles come from their own catalogues. The ranges are wide: they exclude typing errors and values that no solver
+could handle.
 """
 
 import functools
@@ -51,7 +52,7 @@ PRESSURE_WORDS = {
     "dorsiflexion_supply": "dorsiflexion_pressure",
     "atmosphere": "atmospheric_pressure",
 }
-"""Words that stand for a pressure of the device, and the name of that pressure in its supply."""
+"""Words for the pressures of the device, mapped to the names of these pressures in its supply."""
 AT_REST = "atmosphere"
 
 _DELAY, *_OF_SIGNALS, SEED = quantities_of(Sensors)
@@ -69,7 +70,7 @@ SAMPLING = (RATE, PERIOD)
 PURPOSE = "reference.beyond_reach"
 """Key of a file with the reason why its reference lies beyond the reach of the device."""
 _OF_REACH = ("reference.", "supply.", "actuator.", "motion.", "device.")
-"""Beginnings of the paths of a reference, and of what decides how far a device reaches."""
+"""Prefixes of paths that belong to a reference or affect the reach of the device."""
 ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 
 SUPPLY_LINE = "supply_line"
@@ -94,12 +95,13 @@ TEXTS = ("name", "description", "device.set", "device.valve")
 
 @dataclass(frozen=True, slots=True)
 class DeclaredContent:
-    """Possible content of the files of one kind of scenario, for the kinds that a document names.
+    """Possible content of the files of one kind of scenario; the functions take the document, whose kinds decide.
 
-    ``texts`` are paths, ``quantities`` the declarations of numbers by path; ``find_kinds`` loads the kinds of other
-    packages, ``check_motion`` refuses a kind of motion that they cannot have, with the place that begins the message.
-    ``same`` maps a path to another one of the same value, which the document keeps. ``appended`` maps a path
-    to the section whose own list of overrides has it, and to the path there.
+    ``find_kinds`` loads the kinds of other packages. ``texts`` gives the paths of texts, ``quantities`` the
+    declarations of numbers by path. ``same`` maps a path to an equivalent path under which the document keeps the
+    value. ``appended`` maps a path to the section in whose own list of overrides the value belongs, and to the path
+    within that section. ``check_motion`` raises an error for a kind of motion that these files cannot have; its second
+    argument is the start of the message.
     """
 
     find_kinds: Callable[[Mapping[str, Any], str], None]
@@ -110,22 +112,22 @@ class DeclaredContent:
     check_motion: Callable[[object, str], None] = lambda _kind, _place: None
 
     def paths(self, document: Mapping[str, Any]) -> tuple[str, ...]:
-        """Return every path that an override can set, beside the paths of the device."""
+        """Return every path that an override can set, apart from the paths of the device."""
         return (*self.texts(document), *self.quantities(document), *self.appended)
 
 
 def changes_reach(paths: Iterable[str]) -> bool:
-    """True where a path is of a reference, or of what decides how far a device reaches."""
+    """True if any path belongs to a reference or affects the reach of the device."""
     return any(path.startswith(_OF_REACH) for path in paths)
 
 
 def controller_settings(kind: str, controlled: str = TORQUE) -> tuple[Quantity, ...]:
-    """Return the settings of a controller of the catalogue, in units of what it controls; none where it is unknown."""
+    """Return the settings of a controller kind, in units of the controlled quantity; empty for an unknown kind."""
     return law_settings(CONTROLLERS[kind], controlled) if kind in CONTROLLERS else ()
 
 
 def law_settings(law: ControllerKind, controlled: str) -> tuple[Quantity, ...]:
-    """Return the settings of a controller, in units of what it controls."""
+    """Return the settings of a controller, in units of the controlled quantity."""
     # A law that knows no torque has its settings in units of its own.
     is_of_any = controlled in law.controls and TORQUE in law.controls
     return (
@@ -134,7 +136,7 @@ def law_settings(law: ControllerKind, controlled: str) -> tuple[Quantity, ...]:
 
 
 def reference_settings(kind: str, controlled: str) -> tuple[Quantity, ...]:
-    """Return the settings of a reference: levels, to be given where it is no torque, and differences of them."""
+    """Return the settings of a reference profile; unless the reference is a torque, its levels have no default."""
     followed = CONTROLLED[controlled]
     settings = profile_settings(kind, followed.level)
     if controlled == TORQUE or kind not in PROFILES:
@@ -153,7 +155,7 @@ def reference_settings(kind: str, controlled: str) -> tuple[Quantity, ...]:
 
 
 def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
-    """Return the settings of a profile; a level, which has no unit of its own, gets the unit of what is prescribed."""
+    """Return the settings of a profile; levels, which have no unit of their own, get the prescribed quantity's unit."""
     settings = []
     for quantity in PROFILES[kind].quantities if kind in PROFILES else ():
         lowest, highest = max(quantity.minimum, prescribed.minimum), min(quantity.maximum, prescribed.maximum)
@@ -166,23 +168,23 @@ def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
 
 
 def shank_settings(kind: str) -> tuple[Quantity, ...]:
-    """Return the settings of the shank of a leg: a profile's, or where in its stride a gait begins."""
+    """Return the settings of the shank of a leg: settings of a profile, or the stride phase at which a gait starts."""
     return (GAIT_START,) if kind == GAIT_SHANK else profile_settings(kind, SHANK_LEVEL)
 
 
 def by_path(section: str, items: Iterable[Quantity]) -> dict[str, Quantity]:
-    """Return the declarations of a section by path."""
+    """Return the declarations of a section, keyed by path."""
     return {f"{section}.{quantity.name}": quantity for quantity in items}
 
 
 def section_of(document: Mapping[str, Any]) -> MotionSection | None:
-    """Return what ``[motion]`` holds for the kind that a document names, None where that is not known or a walk."""
+    """Return the ``[motion]`` section for the kind that a document names; None for an unknown kind and for a walk."""
     kind = MOTIONS.get(kind_at(document, "motion"))
     return None if kind is None else kind.section
 
 
 def motion_quantities(section: MotionSection | None, profile_kind: str) -> dict[str, Quantity]:
-    """Return the declaration of the numbers of a motion by path, whose profile is of a kind."""
+    """Return the declarations of the numbers of a motion, keyed by path, for a kind of its profile."""
     if section is None:
         return {}
     profile = section.profile
@@ -191,9 +193,9 @@ def motion_quantities(section: MotionSection | None, profile_kind: str) -> dict[
 
 
 def quantities(document: Mapping[str, Any], of_motion: Mapping[str, Quantity] | None = None) -> dict[str, Quantity]:
-    """Return the declaration of every number that a document with its kinds can hold, by path.
+    """Return the declaration of every number that a document with its kinds can contain, keyed by path.
 
-    ``of_motion`` are those of a motion that the document does not name.
+    ``of_motion`` are the declarations of a motion that the document does not name.
     """
     if of_motion is None:
         section = section_of(document)
@@ -212,12 +214,12 @@ def quantities(document: Mapping[str, Any], of_motion: Mapping[str, Quantity] | 
 
 
 def profile_path(section: MotionSection | None) -> str:
-    """Return the path of the profile in the section of a motion, an empty text where it has none."""
+    """Return the path of the profile in the section of a motion; "" for a motion without one."""
     return "" if section is None or section.profile is None else f"motion.{section.profile.name}"
 
 
 def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the paths of every text that a document can hold."""
+    """Return the path of every text that a document can contain."""
     kinds = ("motion.kind", "controller.kind", "reference.kind", REFERENCE_OF, "gas_model.kind")
     section = section_of(document)
     if section is None or section.profile is None:
@@ -228,9 +230,9 @@ def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
-    """Load the kinds that a document names, where other packages have them; ``file`` is for the message.
+    """Load the kinds of other packages that a document names; ``file`` is the document's name in messages.
 
-    ScenarioError where one cannot be loaded.
+    Raises ScenarioError if a kind cannot be loaded.
     """
     check_motion_kind(kind_at(document, "motion"), f"{file}: motion.kind")
     kind = kind_at(document, "motion")
@@ -253,7 +255,7 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
 
 
 def check_motion_kind(kind: object, place: str) -> None:
-    """Raise ScenarioError for the motion of a leg that walks; ``place`` begins the message."""
+    """Raise ScenarioError for the motion of a leg that walks; the message starts with ``place``."""
     with refused_as(ScenarioError, place, KindError):
         walks = isinstance(kind, str) and is_walk(kind)
     if walks:
@@ -265,7 +267,7 @@ def check_motion_kind(kind: object, place: str) -> None:
 
 @functools.cache
 def line_entries() -> dict[str, Entry]:
-    """Return the defaults for what ``[supply_line]`` does not give, by path such as ``dorsiflexion.droop``."""
+    """Return the defaults of values that ``[supply_line]`` omits, keyed by path such as ``dorsiflexion.droop``."""
     document = tomllib.loads((resources.files("ppafo.simulation") / "supply_line.toml").read_text(encoding="utf-8"))
     return {
         f"{line}.{quantity.name}": Entry.model_validate(document[line][quantity.name])
@@ -276,7 +278,7 @@ def line_entries() -> dict[str, Entry]:
 
 @functools.cache
 def line_quantities(line: str) -> tuple[Quantity, ...]:
-    """Return what a file may state of one line, with defaults in SI."""
+    """Return the quantities that a file may give for one line, with defaults in SI."""
     entries = ((quantity, line_entries()[f"{line}.{quantity.name}"]) for quantity in _REGULATED)
     return tuple(
         replace(quantity, default=to_si(entry.value, entry.unit, quantity.unit)) for quantity, entry in entries
@@ -284,7 +286,7 @@ def line_quantities(line: str) -> tuple[Quantity, ...]:
 
 
 def line_paths() -> dict[str, Quantity]:
-    """Return the declaration of every number of both lines, by path such as ``supply_line.dorsiflexion.droop``."""
+    """Return the declarations of all numbers of both lines, by path such as ``supply_line.dorsiflexion.droop``."""
     return {
         f"{SUPPLY_LINE}.{line}.{quantity.name}": quantity for line in SUPPLY_LINES for quantity in line_quantities(line)
     }

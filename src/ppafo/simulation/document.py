@@ -1,4 +1,4 @@
-"""Document of a scenario: values by dotted path, and a text with its unit read into SI or refused in one line."""
+"""Document of a scenario: values by dotted path, and conversion of a text with its unit to SI or a one-line error."""
 
 import math
 from collections.abc import Mapping
@@ -22,14 +22,14 @@ REFERENCE_OF = "reference.of"
 
 
 def kind_at(document: Mapping[str, Any], section: str) -> str:
-    """Return the kind that a section names, an empty text where it does not."""
+    """Return the kind that a section names; "" if it names none."""
     kind = value_at(document, f"{section}.kind")
     # Anything but a text is refused by the layout, with its place.
     return kind if isinstance(kind, str) else ""
 
 
 def value_at(document: Mapping[str, Any], path: str) -> Any:
-    """Return what a document has at a dotted path, None where it has nothing."""
+    """Return the value of a document at a dotted path; None if there is none."""
     node: Any = document
     for part in path.split("."):
         node = node.get(part) if isinstance(node, Mapping) else None
@@ -37,34 +37,34 @@ def value_at(document: Mapping[str, Any], path: str) -> Any:
 
 
 def controlled_in(document: Mapping[str, Any]) -> str:
-    """Return what the reference of a document is of: a torque where it says nothing, or nothing that is known."""
+    """Return the controlled quantity of a document's reference: a torque by default, and also for an unknown word."""
     name = value_at(document, REFERENCE_OF)
     return name if isinstance(name, str) and name in CONTROLLED else TORQUE
 
 
 @dataclass(frozen=True, slots=True)
 class DocumentReader:
-    """A document with what messages call it; ``overridden`` are the paths that an override has set."""
+    """Document with its name in messages, ``file``; ``overridden`` are the paths set by overrides."""
 
     file: str
     document: Mapping[str, Any]
     overridden: frozenset[str] = frozenset()
 
     def quote(self, path: str) -> str:
-        """Return file, key and value, as they were given."""
+        """Return file, key and value as given."""
         value = value_at(self.document, path)
         if path in self.overridden:
             return f"{self.file}: override {path}={one_line(value)}"
         return f"{self.file}: {path} = {quote(value)}"
 
     def refusal(self, path: str, reason: str) -> ScenarioError:
-        """Return the error that says why the value at a path is not usable."""
+        """Return the error for an unusable value at a path, with the reason."""
         return ScenarioError(f"{self.quote(path)}: {reason}")
 
     def number(self, path: str, quantity: Quantity, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-        """Return the value at a path in the quantity's SI unit; its default where nothing is given.
+        """Return the value at a path in the quantity's SI unit; its default if the document gives none.
 
-        ScenarioError where it is no number, has another unit or is out of range.
+        Raises ScenarioError if the value is not a number, has a wrong unit or is out of range.
         """
         value = value_at(self.document, path)
         if value is None:
@@ -97,7 +97,7 @@ class DocumentReader:
     def section(
         self, section: str, quantities: tuple[Quantity, ...], atmosphere: float = STANDARD_ATMOSPHERE
     ) -> dict[str, float]:
-        """Return all values of a section by name, in SI; gauge pressures count from an atmosphere [Pa absolute]."""
+        """Return all values of a section by name, in SI; gauge pressures refer to ``atmosphere`` [Pa absolute]."""
         return {
             quantity.name: self.number(f"{section}.{quantity.name}", quantity, atmosphere) for quantity in quantities
         }

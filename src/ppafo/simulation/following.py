@@ -1,4 +1,4 @@
-"""Settings of a controller that nobody gives and that follow numbers of the device, its lines and its sensors."""
+"""Default settings of a controller that follow numbers of the device, its supply lines and its sensors."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -22,9 +22,10 @@ def read_followers(
     device: Device,
     present: Mapping[str, float],
 ) -> tuple[dict[str, float], Graph]:
-    """Return the settings of some sections [SI] by path, and the links of those that a file leaves to the device.
+    """Return the settings of some sections [SI] by path, and the links of settings that follow the device by default.
 
-    ``terms`` are what a default may follow, by name; ``present`` has numbers by path beside the device's.
+    ``terms`` are the quantities that a default may follow, by name; ``present`` are numbers by path in addition to
+    those on the device.
     """
     settings: dict[str, float] = {}
     links: dict[str, tuple[LinkedDefault, ...]] = {}
@@ -47,12 +48,12 @@ def read_followers(
 
 
 def numbers_of_sensors(sensors: Mapping[str, Any]) -> dict[str, float]:
-    """Return the settings of sensors by their path in a scenario."""
+    """Return the settings of sensors, keyed by their path in a scenario."""
     return {f"sensors.{name}": number for name, number in sensors.items()}
 
 
 def numbers_of_lines(lines: "SupplyLines | None") -> dict[str, float]:
-    """Return the numbers of both supply lines by path, {} where there are none."""
+    """Return the numbers of both supply lines, keyed by path; {} without supply lines."""
     if lines is None:
         return {}
     numbered = {line: number for number, line in enumerate(SUPPLY_LINES, start=1)}

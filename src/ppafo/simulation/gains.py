@@ -1,4 +1,4 @@
-"""The gains in force of a run, and where they come from."""
+"""Controller gains in use in a run, and their origin."""
 
 from dataclasses import dataclass
 
@@ -44,7 +44,7 @@ _OF_LOOP = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """A gain in force [SI]: its name, unit and value, and whether it was computed from the device or given."""
+    """Controller gain in use: name, unit and value [SI]; ``computed`` if derived from the device, otherwise given."""
 
     name: str
     unit: str
@@ -59,7 +59,11 @@ class Gain:
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """The gains of a law, with the rate of what it controls at full opening, per ``unit``, and what comes late [s]."""
+    """Controller gains in use, with the loop parameters from which they are computed.
+
+    ``torque_rate`` is the rate of the controlled quantity at full valve opening [``unit``/s]; ``dead_time`` is the dead
+    time of the loop [s].
+    """
 
     gains: tuple[Gain, ...]
     torque_rate: float
@@ -70,7 +74,7 @@ class Gains:
 
     @property
     def sentence(self) -> str:
-        """The gains in force and where they come from."""
+        """Gains in use and their origin."""
         loop = f"{self.torque_rate:.3g} {self.unit}/s at full opening, {1.0e3 * self.dead_time:.3g} ms late"
         parts = [
             f"{', '.join(gain.text for gain in self.gains if gain.computed == computed)} {origin}"
@@ -82,17 +86,17 @@ class Gains:
 
 
 def settings_of(scenario: Scenario, law: ControllerKind) -> tuple[Quantity, ...]:
-    """Return the settings of a law of a scenario, in units of what it controls."""
+    """Return the settings of a scenario's controller, in units of the controlled quantity."""
     return law_settings(law, scenario.controlled)
 
 
 def terms_of(scenario: Scenario, law: ControllerKind) -> dict[str, LinkFunction]:
-    """Return what the gains of a law follow on the device of a scenario, by name."""
+    """Return the functions of the device that determine the default gains of a scenario's controller, by name."""
     return loop_terms(scenario.device, law, scenario.motion.motion_kind.sees(scenario), scenario.controlled)
 
 
 def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
-    """Return the gains of a scenario's torque law in force; None for a law that has none."""
+    """Return the gains in use of a scenario's torque controller; None for a controller without such gains."""
     if scenario.controller.is_outside:
         return None
     items = [quantity for quantity in settings_of(scenario, law) if _OF_LOOP.intersection(quantity.follows)]

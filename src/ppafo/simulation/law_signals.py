@@ -1,6 +1,6 @@
-"""Signals by which a law sees what it controls: their rows, how late they are, and between which angles the joint is.
+"""Signals by which a controller measures the controlled quantity: their rows, delays, and the joint's range of angles.
 
-Where nothing says where the joint is, its gains are those of the usual place.
+If nothing prescribes the joint angle, gains are computed for the usual angle.
 """
 
 import math
@@ -18,7 +18,7 @@ from ppafo.simulation.motion_kind import LawSignals
 
 PERIOD_PATH = "controller.period"
 MOVED = "motion.profile"
-"""Table of the profile along which a joint is moved."""
+"""Table of the profile that prescribes the joint angle."""
 _OF_DEVICE = (
     "foot_plate.inertia",
     "foot_plate.gravity_torque",
@@ -41,14 +41,14 @@ _Length = Annotated[float, Number("m", "")]
 
 
 class SignalsOfWalk(NamedTuple):
-    """Sample period [s] and bandwidth of the pressure sensors [Hz] of a walk, whose measurements are not old."""
+    """Sample period [s] and bandwidth of the pressure sensors [Hz] in a walk, which has no transport delay."""
 
     period: _Seconds
     bandwidth: _Hertz
 
 
 class Signals(NamedTuple):
-    """Sample period and age of a measurement [s], bandwidth of the pressure sensors [Hz]."""
+    """Sample period [s], bandwidth of the pressure sensors [Hz] and transport delay of a measurement [s]."""
 
     period: _Seconds
     bandwidth: _Hertz
@@ -65,11 +65,11 @@ _Joint = {
     "static_torque": _Torque,
 }
 Locked: Any = row_with("Locked", Signals, locked_angle=_Angle)
-"""Signals of a joint that is locked, with its angle [rad]."""
+"""Signals of a locked joint, with its angle [rad]."""
 OfJoint: Any = row_with("OfJoint", Signals, angle_bandwidth=_Hertz, **_Joint)
-"""Signals of a scenario, bandwidth [Hz], resolution and noise [rad] of its angle sensor; what turns, its friction."""
+"""Signals of a scenario; bandwidth [Hz], resolution and noise [rad] of its angle sensor; moving mass and friction."""
 OfLeg: Any = row_with("OfLeg", OfJoint, foot_mass=_Mass, foot_mass_centre=_Length, foot_inertia=_Inertia)
-"""Signals, and a joint with a foot: its mass [kg], ankle to mass centre [m], inertia about that [kg m^2]."""
+"""Signals, and a joint with a foot: foot mass [kg], distance to its centre of mass [m], inertia about that [kg m^2]."""
 _Ramp = {"start_level": _Angle, "level": _Angle}
 _Sine = {"level": _Angle, "amplitude": _Angle}
 _KNOTS = tuple(quantity.name for quantity in TABLE.quantities)
@@ -94,44 +94,44 @@ MovedOnTable: Any = row_with("MovedOnTable", Signals, **_Table)
 
 
 def anywhere(stops: Range, _signals: Any) -> tuple[float, float]:
-    """Place [rad], twice, of a joint that may be anywhere."""
+    """Lowest and highest angle [rad] of a joint without prescribed angle: the usual angle for both."""
     place = usual_place(stops.angle_min, stops.angle_max)
     return place, place
 
 
 def where_locked(_stops: Range, signals: Any) -> tuple[float, float]:
-    """Place [rad], twice, of a joint that is locked."""
+    """Lowest and highest angle [rad] of a locked joint: the locked angle for both."""
     return signals.locked_angle, signals.locked_angle
 
 
 def at_level(stops: Range, signals: Any) -> tuple[float, float]:
-    """Place [rad], twice, of a joint whose angle is to be constant."""
+    """Lowest and highest angle [rad] of a joint with constant reference angle: that angle for both."""
     return between(stops, signals.level), between(stops, signals.level)
 
 
 def at_both_levels(stops: Range, signals: Any) -> tuple[float, float]:
-    """Places [rad] of a joint whose angle is to go from one level to another."""
+    """Start and final angle [rad] of a joint whose reference is a ramp, limited to the stops."""
     return between(stops, signals.start_level), between(stops, signals.level)
 
 
 def at_both_crests(stops: Range, signals: Any) -> tuple[float, float]:
-    """Places [rad] of a joint whose angle is to be a sine."""
+    """Lowest and highest angle [rad] of a joint whose reference is a sine, limited to the stops."""
     return between(stops, signals.level - signals.amplitude), between(stops, signals.level + signals.amplitude)
 
 
 def between(stops: Range, angle: float) -> float:
-    """The angle between the stops that is nearest to an angle [rad]."""
+    """Angle [rad], limited to the range between the stops."""
     return float(min(max(angle, stops.angle_min), stops.angle_max))
 
 
 def at_knots(stops: Range, signals: Any) -> tuple[float, float]:
-    """Places [rad] of a joint whose angle is to go through the knots of a table; curves pass them by little."""
+    """Lowest and highest angle [rad] of a joint whose reference is a table; curves exceed the knots slightly."""
     lowest, highest = table_bounds(table_of(signals))
     return between(stops, lowest), between(stops, highest)
 
 
 def table_of(row: Any) -> TabulatedProfile:
-    """The table whose settings are numbers of a row, written out one by one."""
+    """Tabulated profile from a row that lists its settings one by one."""
     return TabulatedProfile(
         level=row.level,
         period=row.repetition,
@@ -173,7 +173,7 @@ def table_of(row: Any) -> TabulatedProfile:
 
 
 def lag_of_sensor(bandwidth: float) -> float:
-    """Time constant [s] of a sensor with a bandwidth [Hz]; 0 for one that follows at once, whose bandwidth is 0."""
+    """Time constant [s] of a sensor with a bandwidth [Hz]; 0 for bandwidth 0, which means an ideal sensor."""
     return 1.0 / (2.0 * math.pi * bandwidth) if bandwidth > 0.0 else 0.0
 
 
@@ -183,7 +183,7 @@ def time_in_scenario(signals: Signals) -> float:
 
 
 def time_in_walk(signals: SignalsOfWalk) -> float:
-    """Time [s] by which pressure sensors of a walk follow late."""
+    """Lag of the pressure sensors in a walk [s]."""
     return lag_of_sensor(signals.bandwidth)
 
 
@@ -195,7 +195,7 @@ def time_with_angle(signals: Any) -> float:
 
 
 def turning_alone(signals: Any) -> tuple[float, float]:
-    """Inertia [kg m^2] and largest gravity torque [N m] of what the actuator moves."""
+    """Inertia [kg m^2] and largest gravity torque [N m] of the parts that the actuator moves."""
     return signals.inertia, signals.gravity_torque
 
 
@@ -209,13 +209,13 @@ def turning_with_foot(signals: Any) -> tuple[float, float]:
 _PRESSURES = (PERIOD_PATH, "sensors.pressure_bandwidth")
 _ANGLE = (*_PRESSURES, "sensors.delay", *_OF_ANGLE, *_OF_DEVICE)
 IN_WALK = LawSignals(signals=SignalsOfWalk, late=time_in_walk, paths=_PRESSURES, places=anywhere)
-"""The torque in a walk."""
+"""Signals of a torque controller in a walk."""
 IN_SCENARIO = LawSignals(signals=Signals, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay"), places=anywhere)
-"""A torque or a pressure of a vane alone."""
+"""Signals of a controller of torque or pressure, for a vane alone."""
 LOCKED = LawSignals(
     signals=Locked, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay", LOCKED_ANGLE), places=where_locked
 )
-"""The same of a joint that is locked at an angle."""
+"""Signals of a controller of torque or pressure whose joint is locked at an angle."""
 _PLACES: dict[str, tuple[tuple[type, type, type], tuple[str, ...], Callable[[Range, Any], tuple[float, float]]]] = {
     "": ((Signals, OfJoint, OfLeg), (), anywhere),
     "constant": ((MovedToLevel, JointAtLevel, LegAtLevel), ("level",), at_level),
@@ -224,18 +224,18 @@ _PLACES: dict[str, tuple[tuple[type, type, type], tuple[str, ...], Callable[[Ran
     "tabulated": ((MovedOnTable, JointOnTable, LegOnTable), _KNOTS, at_knots),
     "smooth": ((MovedOnTable, JointOnTable, LegOnTable), _KNOTS, at_knots),
 }
-"""Settings of a profile of the angle that say between which angles the joint is to be, and the rows that have them.
+"""Row types, settings that determine the range of joint angles, and function for this range, by kind of profile.
 
-The rows are of a joint that is moved, of one whose angle is controlled, and of that with the foot of a leg.
+Row types are for a joint moved along the profile, a joint whose angle is controlled, and the latter with a leg's foot.
 """
 
 
 def seen_in_scenario(
     controlled: str, has_leg: bool, is_locked: bool = False, reference: str = "", moved: str = ""
 ) -> LawSignals:
-    """Return how the law of a vane alone sees what is controlled, by its kind of reference.
+    """Return the signals of the controller of a vane alone, for its controlled quantity and kind of reference.
 
-    The joint may have a leg's foot, be locked, or be moved along a profile of the kind ``moved``.
+    The joint may carry the foot of a leg, be locked, or be moved along a profile of the kind ``moved``.
     """
     if controlled == ANGLE:
         rows, names, places = _PLACES.get(reference, _PLACES[""])

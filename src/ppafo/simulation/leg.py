@@ -1,4 +1,4 @@
-"""A foot on a shank that is led, without ground: what it adds to the plan of a vane and to what a run records."""
+"""Foot on a shank with prescribed motion, without ground contact: its part in the plan and the recording of a run."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -26,7 +26,7 @@ from ppafo.simulation.vane_recording import measured, net_torques
 
 
 def on_gait(leg: Leg, name: str, folder: Path) -> Leg:
-    """Return a leg whose shank and knee go as in a gait of a name, or of a file in a folder; DataError for none."""
+    """Return a leg whose shank and knee follow a gait, by name or by file in a folder; DataError if there is none."""
     from ppafo.gait import list_gaits, load_gait, series_of  # other shanks load none
 
     gait = load_gait(name if name in list_gaits() else folder / name)
@@ -43,7 +43,7 @@ def on_gait(leg: Leg, name: str, folder: Path) -> Leg:
 
 
 def plan_leg(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
-    """Return the run of a vane that moves the foot of a leg, and what may be wrong with it."""
+    """Return the run of a vane that moves the foot of a leg, and its possible problems."""
     leg = _leg_of(scenario)
     # Curves were made when the file was read; these two of their numbers may have been changed since, or vary.
     if leg.curves is None:
@@ -60,9 +60,9 @@ def plan_leg(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
 
 def measured_leg(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
-    """Return recording and metrics of a vane that moves the foot of a leg; also of the leg where its shank moves.
+    """Return recording and metrics of a vane that moves the foot of a leg, with channels of the leg if its shank moves.
 
-    Where a gait leads the shank, the foot stands beside the one that was measured.
+    If the shank follows a gait, the recording also has the measured foot angle of that gait.
     """
     kind, leg, angle = run.program.shank, run.leg, rows["state.angle"]
     channels: dict[str, tuple[Floats, str]] = {}
@@ -102,7 +102,7 @@ def _leg_of(scenario: Scenario) -> Leg:
 
 
 def shank_kind(leg: Leg) -> ProfileKind:
-    """The profile that leads the shank of a leg: a kind by name, or the curves of a gait."""
+    """Profile of the shank angle of a leg: a kind by name, or the curves of a gait."""
     return PROFILES[leg.shank.kind] if leg.curves is None else GAIT_SHANK
 
 
@@ -114,9 +114,10 @@ def foot_load(
     foot_inertia: float,
     shank_length: float,
 ) -> FootLoad:
-    """Foot and plate about the ankle of a leg: J and S of equation (11) with (1), docs/equations.md.
+    """Load of foot and foot plate about the ankle: J and S of equation (11) with (1), docs/equations.md.
 
-    Inertia [kg m^2] and largest gravity torque [N m] of foot plate and vane, then the foot and the shank as in ``Leg``.
+    Inertia [kg m^2] and largest gravity torque [N m] are those of foot plate and vane; the numbers of foot and shank
+    are as in ``Leg``.
     """
     moment = foot_mass * foot_mass_centre
     return FootLoad(
@@ -128,5 +129,5 @@ def foot_load(
 
 
 def with_load(plant: PlantParameters, load: FootLoad) -> PlantParameters:
-    """The plant with the inertia of all that turns; the weight of the foot plate is accounted for in the leg."""
+    """Plant with the total inertia of all moving parts; the leg accounts for the weight of the foot plate."""
     return plant._replace(inertia=load.inertia, gravity_torque=0.0)

@@ -39,9 +39,9 @@ FILE = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Layout of the files of one kind of scenario: kind of file, possible content, model, builder.
+    """Layout of the files of one kind of scenario: kind of file, possible content, models, builder.
 
-    ``model`` has the sections and kinds of a document alone, ``whole`` all there are: messages speak of these.
+    ``model`` has the sections and kinds of a document only; ``whole`` has all sections and kinds and is for messages.
     """
 
     file: TomlKind
@@ -52,7 +52,7 @@ class Layout:
 
 
 VANE = Layout(FILE, OF_A_VANE, scenario_file, lambda _: whole_scenario_file(), build_scenario)
-"""Scenarios of a vane alone; a room above this one has the scenarios of a leg."""
+"""Scenarios of a vane alone; the scenarios of a leg are in a package above this one."""
 
 
 def list_scenarios() -> tuple[str, ...]:
@@ -84,7 +84,7 @@ def scenario_or_load(
     overrides: Iterable[str] = (),
     load: Callable[[str | Path, Iterable[str]], Scenario] = load_scenario,
 ) -> Scenario:
-    """Return a scenario as it is, or load it by name or path; ScenarioError for overrides of one that is loaded."""
+    """Return a loaded scenario unchanged, or load one by name or path; ScenarioError for overrides of a loaded one."""
     if not isinstance(scenario, Scenario):
         return load(scenario, overrides)
     if tuple(overrides):
@@ -103,7 +103,7 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()
 
 
 def request_of_dict(content: Mapping[str, Any], overrides: Iterable[str]) -> ScenarioRequest:
-    """Return the request for a scenario of nested dictionaries; ScenarioError where they are none or too deep."""
+    """Return the request for a scenario of nested dictionaries; ScenarioError for other data or too deep nesting."""
     if not isinstance(content, Mapping):
         raise ScenarioError(f"a scenario is a dictionary laid out as a scenario file, not a {type(content).__name__}")
     file = _called(content)
@@ -114,20 +114,20 @@ def request_of_dict(content: Mapping[str, Any], overrides: Iterable[str]) -> Sce
 
 
 def request_again(origin: Origin) -> ScenarioRequest:
-    """Return the request of which a scenario was made."""
+    """Return the request from which a scenario was built."""
     file, content = origin.file, origin.content
     name, folder = (_called(content), Path()) if file is None else (label(file), Path(file).parent)
     return ScenarioRequest(name, file, folder, content, read_overrides(origin.overrides, ScenarioError))
 
 
 def _called(content: Mapping[str, Any]) -> str:
-    """Return what messages call a document that is no file."""
+    """Return the name in messages of a document without a file."""
     name = content.get("name")
     return f"scenario '{label(name)}'" if isinstance(name, str) else "scenario"
 
 
 def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
-    """Check the keys of the file itself, put the overrides in, and then require all that is needed."""
+    """Check the keys of the file itself, apply the overrides, then check that all required keys are given."""
     # A set in the place of a scenario would else be refused key by key.
     if "default_valve" in request.content and not {"run", "controller"} & request.content.keys():
         raise ScenarioError(
@@ -161,7 +161,10 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
 def _check_layout(
     document: dict[str, Any], file: str, layout: Layout, may_have_gaps: bool = False, of_kinds_alone: bool = False
 ) -> None:
-    """Raise ScenarioError for unknown keys and kinds, or kinds alone, and for gaps unless there may be some."""
+    """Raise ScenarioError for unknown keys and kinds, and for missing keys unless ``may_have_gaps``.
+
+    With ``of_kinds_alone`` only unknown kinds are errors.
+    """
     # The whole layout has every kind of everything: it is made for a message alone.
     for model in (layout.model, layout.whole):
         try:

@@ -1,6 +1,6 @@
 """Chambers of an actuator of any kind at an angle: torque per pressure and volume of each.
 
-Where nobody knows where the joint is, they are taken at a right angle, or in the middle of a range without one.
+If the joint angle is unknown, the chambers are evaluated at a right angle or, if the range has none, at mid-range.
 """
 
 from collections.abc import Callable
@@ -18,13 +18,13 @@ from ppafo.parameters.reach import static_torque
 
 RIGHT_ANGLE = 1.5707963267948966
 INSIDE = 0.2
-"""rad from a stop."""
+"""Smallest distance of the right angle from a stop [rad]."""
 LEAST_GAUGE = 1.0
-"""Pa: a supply at the atmosphere's pressure must not divide by 0."""
+"""Smallest gauge pressure of a supply [Pa], which avoids a division by 0."""
 
 
 class Surroundings(NamedTuple):
-    """Absolute pressures [Pa] that an actuator is fed with, and the atmosphere."""
+    """Supply pressures of both chambers, and atmospheric pressure [Pa absolute]."""
 
     supply_pressure: Annotated[float, Number("Pa_a", "")]
     dorsiflexion_pressure: Annotated[float, Number("Pa_a", "")]
@@ -32,9 +32,10 @@ class Surroundings(NamedTuple):
 
 
 class MeanChambers(NamedTuple):
-    """Torque per pressure [m^3], and gas content per pressure [m^3]: the volume, and what it gives under pressure.
+    """Chamber properties at an angle.
 
-    The angle moves gas by ``growth`` [m^3/rad].
+    ``torque_per_pressure`` [m^3] is the torque per pressure of each chamber. ``volume`` [m^3] is the gas content per
+    pressure: volume, plus pressure times compliance. ``growth`` [m^3/rad] is the volume displaced per angle.
     """
 
     torque_per_pressure_1: float
@@ -46,7 +47,7 @@ class MeanChambers(NamedTuple):
 
 
 class RestingPlant(NamedTuple):
-    """Resting plant of an actuator alone (``ShapedPlant``), as a kind may read it."""
+    """Plant of an actuator alone at rest (``ShapedPlant``), as the functions of an actuator kind read it."""
 
     shape: Any
     gas_product: float
@@ -58,14 +59,14 @@ class RestingPlant(NamedTuple):
 
 
 class MeasuredParts(NamedTuple):
-    """Shape of an actuator that was measured: ``prepare`` of its kind, and the table that it takes third."""
+    """Shape of a measured actuator: the kind's function ``prepare``, and the measured table, its third argument."""
 
     prepare: Callable[[Any, Range, Any], Any]
     table: Any
 
 
 class ShapedParts(NamedTuple):
-    """Actuator of another kind than the vane: its shape from settings and stops, both chambers, torque [N m]."""
+    """Functions of an actuator that is no vane: shape from settings and stops, both chambers, torque [N m]."""
 
     shape: Callable[[Any, Range], Any]
     chambers: Callable[[Any, float, float, float], Chambers]
@@ -79,18 +80,18 @@ class ChamberParts(NamedTuple):
 
 
 def measured_shape_of(settings: Any, stops: Range, *, parts: MeasuredParts) -> Any:
-    """The shape of an actuator that has a table."""
+    """Shape of an actuator with a measured table."""
     return parts.prepare(settings, stops, parts.table)
 
 
 def usual_place(lowest: float, highest: float) -> float:
-    """Angle [rad] for the gains of a joint that may be anywhere: a right angle, or the middle of a range without it."""
+    """Angle [rad] for the gains of a joint of unknown angle: a right angle, or mid-range if that is out of range."""
     has_right_angle = lowest + INSIDE <= RIGHT_ANGLE <= highest - INSIDE
     return RIGHT_ANGLE if has_right_angle else 0.5 * (lowest + highest)
 
 
 def gauge_of(supply: float, room: float) -> float:
-    """Pressure [Pa] of a supply above the atmosphere ``room``, below 0 of a vacuum, and never 0."""
+    """Gauge pressure [Pa] of a supply relative to the atmosphere ``room``: negative for a vacuum, never 0."""
     gauge = supply - room
     return gauge if gauge <= -LEAST_GAUGE else max(gauge, LEAST_GAUGE)
 
@@ -109,7 +110,7 @@ def vane_at(settings: VaneSettings, stops: Range, _around: Surroundings, angle: 
 
 
 def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float, *, parts: ShapedParts) -> MeanChambers:
-    """Both chambers of another kind at an angle [rad], half filled."""
+    """Both chambers at an angle [rad] of an actuator that is no vane, at half of the supply's gauge pressure."""
     room = around.atmospheric_pressure
     plant = RestingPlant(
         shape=parts.shape(settings, stops),
@@ -139,25 +140,26 @@ def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float, *
 
 
 def usual_chambers(settings: Any, stops: Range, around: Surroundings, *, parts: ChamberParts) -> MeanChambers:
-    """Both chambers where nobody knows where the joint is."""
+    """Both chambers at the usual angle, for an unknown joint angle."""
     return parts.at(settings, stops, around, usual_place(stops.angle_min, stops.angle_max))
 
 
 def vane_growth(settings: VaneSettings, _stops: Range, _around: Surroundings) -> float:
-    """Growth of chamber 1 of a vane with the angle [m^3/rad], which is the same everywhere."""
+    """Volume of chamber 1 of a vane displaced per angle [m^3/rad], independent of the angle."""
     return settings.displacement_per_radian
 
 
 def shaped_growth(settings: Any, stops: Range, around: Surroundings, *, parts: ShapedParts) -> float:
-    """Mean growth of chamber 1 of another kind [m^3/rad] between the stops, at the pressure of its supply."""
+    """Mean volume displaced per angle [m^3/rad] in chamber 1 between the stops, for an actuator that is no vane."""
     gauge = around.supply_pressure - around.atmospheric_pressure
     return mean_growth(parts.shape(settings, stops), stops, gauge, parts.chambers)
 
 
 class ChambersOf(NamedTuple):
-    """The functions of an actuator that give its ``MeanChambers`` and the mean growth of chamber 1 [m^3/rad].
+    """Functions of an actuator for its ``MeanChambers`` at the usual angle, at any angle, and for its mean ``growth``.
 
-    Both take the same: by path, and in which rows. ``at`` gives the chambers at an angle [rad], which it takes last.
+    ``sources`` are the paths of their arguments and ``rows`` the types into which these are grouped. ``at`` takes the
+    angle [rad] as an additional last argument; ``growth`` is in m^3/rad.
     """
 
     function: Any
@@ -168,7 +170,7 @@ class ChambersOf(NamedTuple):
 
 
 def chambers_of(device: Device) -> ChambersOf:
-    """Return how the mean chambers of a device follow from its numbers."""
+    """Return the functions that compute the mean chambers of a device from its numbers."""
     actuator = device.actuator
     kind = ACTUATORS[actuator.kind]
     rows = (kind.settings, Range, Surroundings)
@@ -193,7 +195,7 @@ def chambers_of(device: Device) -> ChambersOf:
 
 
 def quicker_at(device: Device, angle: float, controlled: str) -> float:
-    """Rate of a torque or pressure at an angle [rad] over its rate where the gains are computed [-]."""
+    """Rate of a torque or pressure at an angle [rad], divided by the rate at the angle used for the gains [-]."""
     here, there = (
         _rate_per_flow(device, place, controlled)
         for place in (angle, usual_place(float(device.actuator.angle_min), float(device.actuator.angle_max)))
@@ -202,7 +204,7 @@ def quicker_at(device: Device, angle: float, controlled: str) -> float:
 
 
 def _rate_per_flow(device: Device, angle: float, controlled: str) -> float:
-    """Rate of change per volume flow at full opening, [N m/m^3] or of a pressure [Pa/m^3], the larger chamber's."""
+    """Rate per volume flow at full opening of a torque [N m/m^3] or of a pressure [Pa/m^3], of the faster chamber."""
     supply, plant, torque = device.supply, plant_parameters(device), static_torque(device)
     room = float(supply.atmospheric_pressure)
     full_1, full_2 = float(supply.pressure), float(supply.dorsiflexion_pressure)

@@ -1,7 +1,7 @@
 """Kinds of motion of a vane alone: locked, free, along a profile, or with the foot of a leg.
 
-Each kind declares what a file says of it, and how that is read and checked against the stops of the device. What only
-a run or an ensemble of such a motion needs is loaded when it is called.
+Each kind declares its section of a file, and how that section is read and checked against the stops of the device. Code
+that only a run or an ensemble needs is imported on use.
 """
 
 from collections.abc import Callable, Mapping
@@ -48,9 +48,9 @@ _PROFILE, _SHANK = "motion.profile", "motion.shank"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VaneKind:
-    """A motion of a vane alone. What only its runs need is loaded when it is called.
+    """Kind of motion of a vane alone; code that only its runs need is imported on use.
 
-    Motions differ in what their file says, in how they are planned, and in what is recorded of them.
+    Kinds differ in their section of the file, in the planning of a run, and in the recorded channels.
     """
 
     name: str
@@ -65,13 +65,13 @@ class VaneKind:
     is_repeated_for_its_error: ClassVar[bool] = True
 
     def contradictory_numbers(self, scenario: Scenario) -> "tuple[Problem, ...]":
-        """Return the numbers that do not go together: the vane beyond a stop, a delay too long."""
+        """Return the problems of contradictory numbers: vane beyond a stop, delay too long."""
         from ppafo.simulation.ensemble.vane import contradictory_numbers
 
         return contradictory_numbers(scenario)
 
     def quantities(self, scenario: Scenario) -> dict[str, Quantity]:
-        """Return the declaration of every number of a scenario beside its device's, by path."""
+        """Return the declarations of all numbers of a scenario except those of its device, keyed by path."""
         profile = self.section.profile
         kind = "" if profile is None else getattr(scenario.motion, profile.name).kind
         of_motion = motion_quantities(self.section, kind)
@@ -86,25 +86,25 @@ class VaneKind:
         return quantities(document, of_motion) | elsewhere
 
     def clock(self, scenario: Scenario, times: Mapping[str, Any]) -> "tuple[RunTimes, tuple[Problem, ...]]":
-        """Return the clock with other times [s], by path, and what does not fit together."""
+        """Return the clock with other times [s], by path, and the problems of contradictory times."""
         from ppafo.simulation.ensemble.vane import clock
 
         return clock(scenario, times)
 
     def switches(self, scenario: Scenario) -> tuple[Any, ...]:
-        """Return the flaws of the sensors, of which each is 0 for all runs of a program or for none."""
+        """Return the imperfections of the sensors; in one program each is either 0 for all runs or nonzero for all."""
         return scenario.sensors.flaws
 
     def noise(self, scenario: Scenario) -> Any:
-        """Return the sum of all levels of noise."""
+        """Return the sum of the standard deviations of all sensor noise, which is 0 only without noise."""
         return scenario.sensors.angle_noise + scenario.sensors.pressure_noise
 
     def law(self, scenario: Scenario) -> ControllerKind:
-        """Return the controller as it is in its catalogue."""
+        """Return the controller kind as its catalogue has it."""
         return CONTROLLERS[scenario.controller.kind]
 
     def sees(self, scenario: Scenario) -> LawSignals:
-        """Return how the controller sees what it controls, with the foot of a leg or without."""
+        """Return the signals of the controller, with the foot of a leg or without."""
         from ppafo.simulation.law_signals import seen_in_scenario
 
         motion, is_locked = vane_motion(scenario), self.name == "locked"
@@ -112,25 +112,25 @@ class VaneKind:
         return seen_in_scenario(scenario.controlled, motion.leg is not None, is_locked, scenario.reference.kind, moved)
 
     def follows_reference(self, scenario: Scenario) -> bool:
-        """Tell whether there is a law that follows the reference, and not a constant command."""
+        """Tell whether the controller follows a reference: False for a constant command."""
         return not scenario.controller.is_open_loop
 
     def asks_gradually(self, law: ControllerKind) -> bool:
-        """Tell whether a law asks for openings between shut and open to follow a reference."""
+        """Tell whether a controller follows a reference with valve openings between shut and fully open."""
         return law.needs_reference and not law.only_switches
 
     def lacks(self, scenario: Scenario, metric: "MetricKind") -> str:
-        """Return why a scenario has not what a metric needs, an empty text where it has it."""
+        """Return the reason why a scenario cannot have a metric; "" if the scenario has it."""
         from ppafo.simulation.ensemble.vane import lacks
 
         return lacks(scenario, metric)
 
     def python_call(self, name: str, overrides: str) -> str:
-        """Return the call of Python that runs a scenario of a name with overrides, which are quoted texts."""
+        """Return the Python call that runs a scenario, given by name, with overrides, which are quoted texts."""
         return f"ppafo.simulate({name!r}, [{overrides}])"
 
     def further_command(self, _file: str) -> str:
-        """Return an empty text: a run says all of a vane alone."""
+        """Return an empty text: ``simulate`` reports everything about a vane alone."""
         return ""
 
 
@@ -147,7 +147,7 @@ def _measured(scenario: Scenario, run: "Run", times: "Floats", rows: "Mapping[st
 
 
 def _read_angle(reading: DocumentReader, device: Device) -> float:
-    """Return the angle [rad] of the vane; ScenarioError where it is not between the stops of the device."""
+    """Return the angle [rad] of the vane; ScenarioError if it is not between the stops of the device."""
     angle, stops = reading.number(LOCKED_ANGLE, ANGLE), (device.actuator.angle_min, device.actuator.angle_max)
     if not stops[0] - TOLERANCE <= angle <= stops[1] + TOLERANCE:
         low, high = (shown_text(stop, "rad") for stop in stops)
@@ -183,7 +183,7 @@ LOCKED_MOTION = VaneKind(
     measured=_measured,
     places={LOCKED_ANGLE: ("motion", "profile", "level")},
 )
-"""A vane on a test bench that is clamped: its profile is constant."""
+"""Vane clamped on a test bench: its profile is constant."""
 
 
 def _read_prescribed(
@@ -212,11 +212,11 @@ PRESCRIBED_MOTION = VaneKind(
     plan=_plan,
     measured=_measured,
 )
-"""The ankle goes along a profile whatever the device does."""
+"""The ankle follows a profile, independent of the device."""
 
 
 def _read_leg(reading: DocumentReader, device: Device, _duration: float, _step: float, folder: Path) -> FreeMotion:
-    """Return the motion with a leg whose shank goes along a profile without corners or as in a gait."""
+    """Return the motion with a leg whose shank follows a smooth profile or a gait."""
     _read_angle(reading, device)
     numbers: dict[str, Any] = reading.section("motion", LEG)
     start = numbers.pop("angle"), numbers.pop("angular_velocity")

@@ -1,6 +1,6 @@
-"""Kinds of motion by name: what each brings to the runs of its scenarios, and where it is found.
+"""Kinds of motion by name: their contributions to the runs of their scenarios, and their locations.
 
-A kind is loaded when a document or a scenario names it: a vane alone loads no walk.
+A kind is loaded when a document or a scenario names it: scenarios of a vane alone load no walk.
 """
 
 from collections.abc import Callable, Mapping
@@ -35,10 +35,10 @@ class RunTimes:
 
 
 class LawSignals(NamedTuple):
-    """Signals of a law: the row of its signals, their delay, and the paths that fill the row.
+    """Signals of a controller: their row type, a function for their delay [s], and the paths that fill the row.
 
-    ``places`` makes the two angles [rad] between which the joint is of the stops and the row. ``turning`` makes inertia
-    and gravity torque of the row for a law of an angle; None for any other.
+    ``places`` computes the lowest and highest joint angle [rad] from the stops and the row. ``turning`` computes
+    inertia [kg m^2] and gravity torque [N m] from the row for a controller of an angle; None for any other.
     """
 
     signals: type
@@ -54,93 +54,96 @@ Measured = tuple["Recording", Mapping[str, "Metric"], str]
 
 @runtime_checkable
 class MotionKind(Protocol[ScenarioType_contra]):
-    """Contribution of a motion to the runs of its scenarios. Any number of a scenario may be an array (runs,)."""
+    """Contribution of a kind of motion to the runs of its scenarios.
+
+    Any number of a scenario may be an array (runs,).
+    """
 
     @property
     def name(self) -> str:
-        """Name under which its catalogue has it."""
+        """Name of the kind in its catalogue."""
 
     @property
     def section(self) -> "MotionSection | None":
-        """Table ``[motion]`` in the file of a vane alone; None in the layout of a walk."""
+        """Section ``[motion]`` in the file of a vane alone; None for a walk."""
 
     @property
     def layout(self) -> str:
-        """Layout of its files, libraries and pages: ``vane`` or ``walk``."""
+        """Layout of the kind's files, libraries and pages: ``vane`` or ``walk``."""
 
     @property
     def places(self) -> Mapping[str, tuple[str, ...]]:
-        """Attributes that lead to the numbers that are not where their path says, by path."""
+        """Attribute names that lead to numbers not located at their path, keyed by path."""
 
     @property
     def command(self) -> str:
-        """Word behind ``ppafo`` on the command line that shows what a scenario comes to."""
+        """Subcommand of ``ppafo`` that shows the result of a scenario."""
 
     @property
     def is_measured_at_once(self) -> bool:
-        """True where the status of a run says what was measured, so that it cannot wait until somebody asks."""
+        """True if the status of a run depends on its metrics, which are then computed at once, not on first use."""
 
     @property
     def reads_forces(self) -> bool:
-        """True where a controller reads the forces under the foot beside the angle and the pressures."""
+        """True if controllers read the forces under the foot in addition to angle and pressures."""
 
     @property
     def is_repeated_for_its_error(self) -> bool:
-        """True where a run is so short that a second one tells the error of the first without being asked for."""
+        """True if runs are so short that the error estimate, a second run, is made without request."""
 
     def plan(self, scenario: ScenarioType_contra, /) -> "tuple[Run, tuple[Problem, ...]]":
-        """Return the run and what may be wrong with it, as ``plan_vane`` does."""
+        """Return the run and its possible problems, as ``plan_vane`` does."""
 
     def contradictory_numbers(self, scenario: ScenarioType_contra, /) -> "tuple[Problem, ...]":
-        """Return the numbers that do not go together."""
+        """Return the problems of contradictory numbers."""
 
     def quantities(self, scenario: ScenarioType_contra, /) -> dict[str, Quantity]:
-        """Return the declaration of the numbers of a scenario beside those of its device, by path."""
+        """Return the declarations of all numbers of a scenario except those of its device, keyed by path."""
 
     def clock(
         self, scenario: ScenarioType_contra, times: Mapping[str, Any], /
     ) -> "tuple[RunTimes, tuple[Problem, ...]]":
-        """Return the clock with other times [s], by path, and what is wrong with it."""
+        """Return the clock with other times [s], by path, and the problems of contradictory times."""
 
     def switches(self, scenario: ScenarioType_contra, /) -> tuple[Any, ...]:
-        """Return settings that are 0 for all runs of a program or for none."""
+        """Return settings of which each, in one program, is either 0 for all runs or nonzero for all."""
 
     def noise(self, scenario: ScenarioType_contra, /) -> Any:
-        """Return the sum of all levels of noise that the controller receives."""
+        """Return the sum of all noise levels of the controller's sensors, which is 0 only without noise."""
 
     def law(self, scenario: ScenarioType_contra, /) -> "ControllerKind":
-        """Return the controller with what the motion adds to it."""
+        """Return the controller with the additions of the motion."""
 
     def sees(self, scenario: ScenarioType_contra, /) -> LawSignals:
-        """Return how the controller sees what it controls."""
+        """Return the signals of the controller."""
 
     def follows_reference(self, scenario: ScenarioType_contra, /) -> bool:
-        """Tell whether the controller follows the reference of the scenario, and none that it makes itself."""
+        """Tell whether the controller follows the reference of the scenario, and not one that it generates itself."""
 
     def asks_gradually(self, law: "ControllerKind", /) -> bool:
-        """Tell whether a law asks for openings between shut and open to follow what it wants."""
+        """Tell whether a controller follows its reference with valve openings between shut and fully open."""
 
     def lacks(self, scenario: ScenarioType_contra, metric: "MetricKind", /) -> str:
-        """Return why a scenario has not what a metric needs, an empty text where it has it."""
+        """Return the reason why a scenario cannot have a metric; "" if the scenario has it."""
 
     def python_call(self, name: str, overrides: str, /) -> str:
-        """Return the call of Python that shows a scenario of a name with overrides, which are quoted texts."""
+        """Return the Python call that shows a scenario, given by name, with overrides, which are quoted texts."""
 
     def further_command(self, file: str, /) -> str:
-        """Return which command says more of a scenario than a run, in one line; an empty text where none does."""
+        """Return the command that reports more about a scenario than a run does, in one line; "" if there is none."""
 
     def measured(
         self, scenario: ScenarioType_contra, run: "Run", times: "Floats", rows: "Mapping[str, Floats]", /
     ) -> Measured:
-        """Return what a run came to, from its rows (samples,) by path at times [s]."""
+        """Return recording, metrics and end of a run, from its rows (samples,) by path at times [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class MotionSection:
-    """Table ``[motion]`` of a kind of motion of a vane alone: its numbers, and the table of a profile, if any.
+    """Section ``[motion]`` of a kind of motion of a vane alone: its numbers, and the table of a profile, if any.
 
-    ``read(reading, device, duration, step, folder)`` gives the motion; times are in seconds, and in ``folder`` relative
-    paths begin.
+    ``read(reading, device, duration, step, folder)`` returns the motion; ``duration`` and ``step`` are in seconds, and
+    relative paths start from ``folder``.
     """
 
     summary: str
@@ -151,10 +154,10 @@ class MotionSection:
 
 @dataclass(frozen=True, slots=True)
 class ProfileTable:
-    """A table of ``[motion]`` with the kind of a profile and its settings, an attribute ``name`` of the motion.
+    """Table within ``[motion]`` with the kind of a profile and its settings; ``name`` is also the motion's attribute.
 
-    ``settings(kind)`` declares its numbers, ``layout()`` is the model of the table. ``own`` are its kinds that are no
-    profiles, with the texts that each needs.
+    ``settings(kind)`` declares its numbers, ``layout()`` is the model of the table. ``own`` maps kinds that are no
+    profiles to the texts that each requires.
     """
 
     name: str
@@ -165,17 +168,17 @@ class ProfileTable:
 
 
 VANE, WALK = "vane", "walk"
-"""The layouts of a vane alone, and of a leg that a gait leads; the motion of that has the same name."""
+"""Layouts of a vane alone and of a leg led by a gait; the kind of motion of the latter is also named ``walk``."""
 
 VANE_MOTIONS = ("free", "locked", "prescribed", "leg")
-"""Motions of a vane alone that this package has."""
+"""Kinds of motion of a vane alone in this package."""
 
 _GROUP = "ppafo.motions"
 MOTIONS: Kinds[MotionKind[Any]] = Kinds(_GROUP, "motion", MotionKind, declared_kinds(_GROUP))
-"""Motions of a vane alone, and of a leg that walks with the device."""
+"""Kinds of motion: of a vane alone, and of a leg that walks with the device."""
 
 
 def is_walk(name: str) -> bool:
-    """Tell whether a kind of motion is a walk; KindError where the kind cannot be used."""
+    """Tell whether a kind of motion is a walk; KindError if the kind cannot be used."""
     kind = MOTIONS.get(name)
     return kind is not None and kind.layout == WALK

@@ -1,4 +1,4 @@
-"""Nominal device of a model-based law and of the chamber observer: the device numbers that it follows."""
+"""Nominal device of a model-based controller and of the chamber observer, from the numbers of the actual device."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _GAS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
 _MASS = ("gas.molar_mass", "gas.temperature")
 _ANY = ("supply.pressure",)
-"""A source for what no number decides."""
+"""Dummy source for a term that depends on no number."""
 
 _SAME = {
     "supply_pressure": "supply.pressure",
@@ -42,11 +42,11 @@ AREA_PATHS, SONIC_PATHS = (
 )
 """Paths of the numbers of an orifice in each of its forms, by its section."""
 LEAST_SHARE = 0.05
-"""Part of a chamber's volume in the middle of its range that is dead volume at least."""
+"""Smallest dead volume as a fraction of the chamber volume at mid-range [-]."""
 USUAL_RANGE = 1.0e6
-"""Pa: absolute pressure of the transducers that are usual with supplies up to 7 bar."""
+"""Range of the usual pressure transducers for supplies up to 7 bar [Pa absolute]."""
 COMPRESSED = 1.25
-"""Part of a supply pressure up to which a converter is to show more: its largest reading counts as a broken wire."""
+"""Smallest converter range divided by the supply pressure [-]; a full-scale reading means a broken wire."""
 _PAIRS = ("solenoid", "solenoid_recycling")
 _SPOOL = "proportional"
 
@@ -62,13 +62,19 @@ def no(number: float) -> float:
 
 
 def flow_of_area(molar_mass: float, ratio: float, temperature: float, area: float, discharge: float) -> float:
-    """R T times the conductance of an area [m^3/s], from molar mass [kg/mol], k [-], temperature [K]. Equation (6)."""
+    """Flow coefficient of an area, R T times its conductance [m^3/s], from molar mass [kg/mol], k [-], temperature [K].
+
+    Equation (6).
+    """
     constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass)
     return constant * temperature * area_conductance(area, discharge, ratio, constant, temperature)
 
 
 def flow_of_sonic(molar_mass: float, temperature: float, sonic: float) -> float:
-    """R T times a sonic conductance [m^3/s], from molar mass [kg/mol] and temperature [K]. ISO 6358-1."""
+    """Flow coefficient R T C [m^3/s] of a sonic conductance C [m^3/(s Pa)], from molar mass [kg/mol], temperature [K].
+
+    ISO 6358-1.
+    """
     constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass)
     return constant * temperature * sonic_conductance_mass(sonic, constant, temperature)
 
@@ -79,68 +85,74 @@ def product_of(molar_mass: float, temperature: float) -> float:
 
 
 def conductance_of_area(molar_mass: float, ratio: float, temperature: float, area: float, discharge: float) -> float:
-    """Conductance of an area [kg/(s Pa)], from molar mass [kg/mol], k [-], temperature [K]. Equation (6)."""
+    """Mass-flow conductance [kg/(s Pa)] of an orifice area [m^2], from molar mass [kg/mol], k [-], temperature [K].
+
+    Equation (6).
+    """
     constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass)
     return area_conductance(area, discharge, ratio, constant, temperature)
 
 
 def conductance_of_sonic(molar_mass: float, temperature: float, sonic: float) -> float:
-    """Conductance of a sonic conductance [kg/(s Pa)], from molar mass [kg/mol] and temperature [K]. ISO 6358-1."""
+    """Mass-flow conductance [kg/(s Pa)] of a sonic conductance [m^3/(s Pa)] of ISO 6358-1.
+
+    Takes molar mass [kg/mol] and temperature [K].
+    """
     return sonic_conductance_mass(sonic, specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass), temperature)
 
 
 def per_content(number: float, molar_mass: float, temperature: float) -> float:
-    """A number per mass [1/kg] as one per content p V [1/J], from molar mass [kg/mol] and temperature [K]."""
+    """Convert a number per mass [1/kg] to a number per gas content p V [1/J]; molar mass [kg/mol], temperature [K]."""
     return number / (specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass) * temperature)
 
 
 def as_content(number: float, molar_mass: float, temperature: float) -> float:
-    """A mass [kg] as a content p V [J], from molar mass [kg/mol] and temperature [K]."""
+    """Convert a gas mass [kg] to a gas content p V [J]; molar mass [kg/mol], temperature [K]."""
     return number * specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass) * temperature
 
 
 def converter_range(supply: float, dorsiflexion: float) -> float:
-    """Pressure [Pa] that a converter shows at most: 1 MPa, or what a joint may compress a supply [Pa] to."""
+    """Largest pressure [Pa] that the converter measures: 1 MPa, or 1.25 times the larger supply pressure [Pa]."""
     return max(USUAL_RANGE, COMPRESSED * max(supply, dorsiflexion))
 
 
 def time_of_joint(joining: float, holding: float) -> float:
-    """Time for which both chambers are joined, or for which chamber 2 then keeps its gas [s]."""
+    """Sum of the time [s] for which both chambers are joined and the time for which chamber 2 then stays closed."""
     return joining + holding
 
 
 class NominalParts(NamedTuple):
-    """Chambers of the actuator in the middle of its range."""
+    """Function for the chambers of the actuator at the usual angle."""
 
     mean_chambers: Callable[[Any, Range, Surroundings], MeanChambers]
 
 
 def torque_per_pressure(settings: Any, stops: Range, around: Surroundings, *, parts: NominalParts) -> float:
-    """Torque per pressure of chamber 1 [m^3] in the middle of the range."""
+    """Torque per pressure of chamber 1 [m^3] at the usual angle."""
     return parts.mean_chambers(settings, stops, around).torque_per_pressure_1
 
 
 def dead_volume_1(settings: Any, stops: Range, around: Surroundings, *, parts: NominalParts) -> float:
-    """Dead volume [m^3] of a vane whose chamber 1 is as large in the middle of the range."""
+    """Dead volume [m^3] of a vane whose chamber 1 has the same volume at mid-range."""
     mean = parts.mean_chambers(settings, stops, around)
     return rest_of(mean.volume_1, mean.torque_per_pressure_1, stops)
 
 
 def dead_volume_2(settings: Any, stops: Range, around: Surroundings, *, parts: NominalParts) -> float:
-    """Dead volume [m^3] of a vane whose chamber 2 is as large in the middle of the range."""
+    """Dead volume [m^3] of a vane whose chamber 2 has the same volume at mid-range."""
     mean = parts.mean_chambers(settings, stops, around)
     return rest_of(mean.volume_2, mean.torque_per_pressure_1, stops)
 
 
 def rest_of(volume: float, growth: float, stops: Range) -> float:
-    """Remainder at a stop of a volume [m^3] at mid-range, at least a twentieth of it, for a growth [m^3/rad]."""
+    """Dead volume [m^3] from volume at mid-range [m^3] and growth [m^3/rad]; at least a twentieth of that volume."""
     return max(volume - 0.5 * growth * (stops.angle_max - stops.angle_min), LEAST_SHARE * volume)
 
 
 def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, LinkFunction]:
-    """Return what each ``nominal_`` setting follows, by the names of ``nominal_term``.
+    """Return the functions that determine each ``nominal_`` setting, by the names of ``nominal_term``.
 
-    The valve of another package is not known: then ``nominal_flow`` is 0, and the observer off.
+    A valve kind of another package is unknown: ``nominal_flow`` is then 0, and the observer off.
     """
     valve, kind = device.valve, VALVES[device.valve.kind]
     names = tuple(quantity.name for quantity in kind.quantities)
@@ -190,7 +202,7 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Link
 
 
 def _conductance(device: Device, section: str) -> LinkFunction:
-    """Return what the conductance [kg/(s Pa)] of an orifice follows."""
+    """Return the function that determines the conductance [kg/(s Pa)] of an orifice."""
     return in_its_form(
         device,
         section,
@@ -200,7 +212,7 @@ def _conductance(device: Device, section: str) -> LinkFunction:
 
 
 def in_its_form(device: Device, section: str, of_area: LinkFunction, of_sonic: LinkFunction) -> LinkFunction:
-    """Return the term of the form that the orifice of a section has, beside the one of its other form."""
+    """Return the function for an orifice's form (area or sonic conductance), linked to that for its other form."""
     orifice = device.valve.orifice if section == VALVE else device.actuator.leak
     of_area, of_sonic = replace(of_area, orifice=section), replace(of_sonic, orifice=section)
     if isinstance(orifice, SonicOrifice):
@@ -209,7 +221,7 @@ def in_its_form(device: Device, section: str, of_area: LinkFunction, of_sonic: L
 
 
 def _chamber_terms(device: Device) -> dict[str, LinkFunction]:
-    """Return what torque constant, growth and dead volumes follow; of another kind, of a vane like it."""
+    """Return the functions for torque constant, growth and dead volumes; for other actuators, of an equivalent vane."""
     own = {f"chamber_rest_{number}": LinkFunction((f"actuator.dead_volume_{number}",)) for number in (1, 2)}
     if device.actuator.kind == VANE:
         names = ("torque_constant", "displacement_per_radian", "dead_volume_1", "dead_volume_2")

@@ -1,4 +1,4 @@
-"""The numbers of a scenario by dotted path: which there are, and columns of them in their place for many runs."""
+"""Numbers of a scenario by dotted path: their declarations, and their replacement by columns for many runs."""
 
 from collections import deque
 from collections.abc import Collection, Mapping
@@ -38,7 +38,7 @@ _RATE, _PERIOD = "controller.rate", "controller.period"
 
 
 def chosen_path(path: str, scenario: Scenario) -> str:
-    """Return the path with ``valve.`` in place of ``valves.NAME.`` where that is the valve of the scenario."""
+    """Return the path with ``valve.`` in place of ``valves.NAME.`` if NAME is the valve of the scenario."""
     return one_path(path, scenario.device.valve_name)
 
 
@@ -58,15 +58,15 @@ _PARTS = {
     "supply_line": SupplyLine,
     "links": Mapping,
 }
-"""Class of each part of a scenario, whatever moves its ankle; two of them may be None."""
+"""Class of each part of a scenario, for any kind of motion; two of them may be None."""
 
 
 _ACCEPTED: deque[Scenario] = deque(maxlen=16)
-"""Scenarios that were checked last: a frozen one stays what it is, and many are simulated again and again."""
+"""Scenarios checked last: they are frozen, so that repeated simulation needs no new check."""
 
 
 def check_parts(scenario: Scenario) -> None:
-    """Refuse a scenario that was changed in Python to what no file could say: a foreign part, a number out of range."""
+    """Raise ScenarioError for a scenario changed in Python to an impossible one: wrong class, number out of range."""
     if any(scenario is accepted for accepted in _ACCEPTED):
         return
 
@@ -102,12 +102,12 @@ def check_parts(scenario: Scenario) -> None:
 
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
-    """Return the declaration of every number of a scenario and its device, by path; both forms of an orifice."""
+    """Return the declarations of all numbers of a scenario and its device, by path; both forms of each orifice."""
     return device_numbers(scenario.device) | scenario.motion.motion_kind.quantities(scenario)
 
 
 def device_numbers(device: Device) -> dict[str, Quantity]:
-    """Return the declaration of every number of a device, by path; both forms of an orifice."""
+    """Return the declarations of all numbers of a device, by path; both forms of each orifice."""
     kind, species = device.actuator.kind, device.gas.species
     declared = [(section, quantity) for section in _DEVICE_SECTIONS for quantity in members(section, kind)]
     declared += [("actuator.leak", quantity) for quantity in ORIFICE]
@@ -119,10 +119,10 @@ def device_numbers(device: Device) -> dict[str, Quantity]:
 
 
 def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
-    """Return the scenario with numbers replaced, by the paths of ``declared_numbers`` that are not in ``TIMES``.
+    """Return the scenario with numbers replaced; keys are paths of ``declared_numbers`` that are not in ``TIMES``.
 
-    What follows a number that is replaced moves with it. An orifice given in the other form takes that form; both
-    numbers of it must be there.
+    Numbers that follow a replaced number change with it. An orifice given in its other form (area or sonic conductance)
+    changes to that form; both numbers of the form are then required.
     """
     replaced = {chosen_path(path, scenario): number for path, number in numbers.items()}
     moved, changing = moving_together(scenario, replaced), _changing_form(scenario, replaced)
@@ -143,9 +143,9 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
 
 
 def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str, Any]:
-    """Return numbers by path with all that follow them as in a file with these numbers; ``TIMES`` do not follow.
+    """Return numbers by path, together with all numbers that follow them as in a file; ``TIMES`` do not follow.
 
-    What was changed since the scenario was loaded follows nothing any more.
+    Numbers changed since the scenario was loaded no longer follow others.
     """
     # What follows the sample period follows a rate that is given for it.
     period = {_PERIOD: 1.0 / replaced[_RATE]} if _RATE in replaced and _PERIOD not in replaced else {}
@@ -155,12 +155,12 @@ def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str
 
 
 def links_that_hold(scenario: Scenario) -> Graph:
-    """Return the links of a scenario without links of numbers that were changed since it was loaded."""
+    """Return the links of a scenario, except links of numbers changed since it was loaded."""
     return holding(scenario.graph, _numbers_of_graph(scenario))
 
 
 def _numbers_of_graph(scenario: Scenario) -> dict[str, Any]:
-    """Return the numbers that links of a scenario name, by path; of an orifice the form that it has."""
+    """Return the numbers that the links of a scenario name, keyed by path; for an orifice, of its present form."""
     absent = {f"{section}.{name}" for section in ORIFICES for name in other_form(scenario.device, section)}
     present = (path for path in paths_in(scenario.graph) if path not in absent)
     return {path: number_under(scenario, _attributes(path, scenario)) for path in present}
@@ -172,13 +172,13 @@ def number_at(scenario: Scenario, path: str) -> float:
 
 
 def other_form(device: Device, section: str) -> tuple[str, ...]:
-    """Return the names of the form in which an orifice (``valve`` or ``actuator.leak``) is not given."""
+    """Return the number names of the form in which an orifice (``valve`` or ``actuator.leak``) is not given."""
     orifice = device.valve.orifice if section == "valve" else device.actuator.leak
     return tuple(quantity.name for quantity in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM))
 
 
 def _changing_form(scenario: Scenario, paths: Collection[str]) -> list[str]:
-    """Return the sections of the orifices that take the form in which they are not."""
+    """Return the sections of the orifices that change to their other form."""
     return [
         section
         for section in ORIFICES
@@ -187,14 +187,14 @@ def _changing_form(scenario: Scenario, paths: Collection[str]) -> list[str]:
 
 
 def path_of_locked_angle(scenario: Scenario) -> str | None:
-    """Return the path of the angle at which a vane stays, None where it moves."""
+    """Return the path of the angle of a locked vane; None if the vane moves."""
     if scenario.motion.locked_angle is None:
         return None
     return LOCKED_ANGLE if LOCKED_ANGLE in scenario.motion.motion_kind.places else "motion.profile.level"
 
 
 def _attributes(path: str, scenario: Scenario) -> tuple[str, ...]:
-    """Return the attributes that lead from the scenario to a number: its path, unless its motion says otherwise."""
+    """Return the attribute names that lead from the scenario to a number: its path, unless the motion has others."""
     of_motion = scenario.motion.motion_kind.places
     if path in of_motion:
         return of_motion[path]

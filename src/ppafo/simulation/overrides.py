@@ -1,7 +1,7 @@
-"""Overrides of a scenario as a set: kinds first by depth, then numbers, so that their order means nothing.
+"""Overrides of a scenario as a set: kinds first, outer ones before inner ones, then numbers; order is irrelevant.
 
-What is given beside a kind that has no use for it is an error that names both. A document, or the overrides of a file,
-is a layer under the caller's: there another kind drops what only the kind before had.
+A value that a newly chosen kind cannot use is an error that names both overrides. A document, or the overrides of a
+file, is a layer below the caller's overrides: choosing another kind drops the lower layer's settings of the old kind.
 """
 
 import copy
@@ -25,12 +25,12 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _SEED, _VALVE = "sensors.seed", "device.valve"
 _OF_ANY_KIND = {"controller": frozenset({"kind", "rate", "period"})}
 _KIND = "kind"
-"""Last name of paths that decide which other values their section has."""
+"""Last name of the paths of kinds, which decide the other values of their section."""
 
 
 @dataclass(frozen=True, slots=True)
 class OverriddenDocument:
-    """A document with overrides in it: paths that were set, and the overrides that belong to the device."""
+    """Document with its own overrides applied at ``paths``, and the overrides of the device, not yet applied."""
 
     document: dict[str, Any]
     paths: frozenset[str]
@@ -40,12 +40,12 @@ class OverriddenDocument:
 def apply_overrides(
     document: Mapping[str, Any], overrides: Iterable[Override], file: str, declared: DeclaredContent = OF_A_VANE
 ) -> OverriddenDocument:
-    """Return a changed copy of a document; ``file`` is what messages call it.
+    """Return a changed copy of a document; ``file`` is the document's name in messages.
 
     Naming another kind of motion, controller, timing or profile drops the settings of the document that only the old
-    kind has; giving a rate drops its period, and the reverse. A gain on the torque may leave out its unit.
-    ScenarioError for a path that is neither ``declared`` nor of the device, and for two overrides of which one leaves
-    the other without use.
+    kind has; giving a rate drops its period, and vice versa. A gain on the torque may omit its unit. Raises
+    ScenarioError for a path that is neither ``declared`` nor of the device, and for an override that another one makes
+    useless.
     """
     overrides_of = override_set(overrides, ScenarioError, declared.same)
     if _VALVE in overrides_of:
@@ -82,9 +82,9 @@ def over_layer(
     declared: DeclaredContent,
     valve: str = "",
 ) -> tuple[Override, ...]:
-    """Return two layers of overrides of a document as one set: the later ones replace by path, form and kind.
+    """Return two layers of overrides of a document as one set: later ones replace earlier ones by path, form and kind.
 
-    ``valve`` is the name of the one that is chosen unless the later ones choose another.
+    ``valve`` is the name of the valve in use unless the later overrides choose another.
     """
     for override in later:
         if override.typed == _VALVE:
@@ -107,7 +107,7 @@ def _is_choosing(path: str) -> bool:
 
 
 def chosen_by(path: str, choosing: Iterable[str]) -> list[str]:
-    """Return the paths that decide whether there is a value at a path, the nearest one last."""
+    """Return the kind paths that decide whether a path exists, the innermost last."""
     found = []
     for chosen in choosing:
         own = f"{chosen.rpartition('.')[0]}."
@@ -118,9 +118,9 @@ def chosen_by(path: str, choosing: Iterable[str]) -> list[str]:
 def _choose_kinds(
     document: dict[str, Any], overrides_of: Mapping[str, Override], file: str, declared: DeclaredContent
 ) -> tuple[str, ...]:
-    """Set the kinds that are given, outer sections first, and return the paths that remain.
+    """Set the given kinds, outer sections first, and return the remaining paths.
 
-    A kind whose section is not there remains.
+    A kind of a missing section is among the remaining paths.
     """
     # A kind of an outer section decides which sections there are inside it.
     first = sorted(filter(_is_choosing, overrides_of), key=lambda path: (path.count("."), path))
@@ -135,7 +135,7 @@ def _choose_kinds(
 
 
 def _unused(path: str, overrides_of: Mapping[str, Override], known: tuple[str, ...], file: str) -> ScenarioError:
-    """Return the error for an override without use: beside a kind that is given, or in any case."""
+    """Return the error for a useless override: incompatible with a given kind, or of an unknown path."""
     choosing = chosen_by(path, filter(_is_choosing, overrides_of))
     if not choosing:
         return unknown_value(overrides_of[path], known, f"{file} has")
@@ -149,7 +149,7 @@ def _unused(path: str, overrides_of: Mapping[str, Override], known: tuple[str, .
 
 
 def _with_one_path_each(document: Mapping[str, Any], file: str, declared: DeclaredContent) -> dict[str, Any]:
-    """Return a copy of a document where each value stands at the one path that the document keeps."""
+    """Return a copy of a document in which each value is at its preferred path."""
     changed = copy.deepcopy(dict(document))
     for path, kept in declared.same.items():
         section, _, name = path.rpartition(".")
@@ -163,19 +163,19 @@ def _with_one_path_each(document: Mapping[str, Any], file: str, declared: Declar
 
 
 def device_paths() -> tuple[str, ...]:
-    """Return every path of the device that an override can set, with ``valve`` for the one that is chosen."""
+    """Return every path of the device that an override can set, with ``valve`` for the selected valve."""
     sections = [path for path in device_quantities({}) if not path.startswith("reported.")]
     valve = [*ORIFICE, *(quantity for kind in VALVES.values() for quantity in kind.quantities)]
     return (*sections, SPECIES_PATH, RELIEVING_PATH, *(f"valve.{quantity.name}" for quantity in valve))
 
 
 def is_of_device(path: str) -> bool:
-    """Tell whether a path begins in the device, which then has the say about the rest of it."""
+    """Tell whether a path starts in the device, which then checks the rest of the path."""
     return path.partition(".")[0] in {*SECTIONS, EFFECTS_SECTION, "valve", "valves"}
 
 
 def unknown_value(override: Override, known: tuple[str, ...], who_has: str) -> ScenarioError:
-    """Return the error for a path that is neither known nor of the device; ``who_has`` begins as ``task.toml has``."""
+    """Return the error for an unknown path; ``who_has`` is the start of its text, such as ``task.toml has``."""
     EFFECTS.load_own()
     allowed = [*known, *device_paths()]
     section = override.typed.partition(".")[0]
@@ -214,7 +214,7 @@ def _set(document: dict[str, Any], path: str, text: str, file: str, declared: De
 
 
 def _setting_names(document: dict[str, Any], section: str, declared: DeclaredContent) -> frozenset[str]:
-    """Return the keys that a section can have beside its kind."""
+    """Return the keys that a section can have in addition to its kind."""
     prefix = f"{section}."
     paths = [path.removeprefix(prefix) for path in declared.paths(document) if path.startswith(prefix)]
     return frozenset(path.partition(".")[0] for path in paths) - {"kind"}

@@ -1,7 +1,7 @@
-"""Plan of a run, of a scenario or a walk: step sizes, rows of parameters, initial gas.
+"""Plan of a run, for a scenario or a walk: step sizes, rows of parameters, initial gas.
 
-What the numbers come to is pure functions of one run or of columns of runs: Python plans with them, and an exported
-library has them in C.
+The formulas are pure functions of one run or of columns of runs: Python plans with them, and an exported library has
+them in C.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -61,9 +61,9 @@ WHOLE = 1.0e-9
 
 
 def plan_run(scenario: Scenario) -> Run:
-    """The run of a scenario; with a Python controller it records every step, because that controller needs the past.
+    """Planned run of a scenario; with a Python controller it records every step, because delayed signals need the past.
 
-    ScenarioError where it takes too many steps.
+    Raises ScenarioError for too many steps.
     """
     run, problems = scenario.motion.motion_kind.plan(scenario)
     for is_bad, line in problems:
@@ -74,11 +74,11 @@ def plan_run(scenario: Scenario) -> Run:
 
 @dataclass(frozen=True, slots=True)
 class Components:
-    """Components of a run, scenario or walk; numbers in SI units, which may be arrays (runs,).
+    """Components of a run, for a scenario or a walk; numbers in SI units, which may be arrays (runs,).
 
-    Without a ``path`` the vane is free; without a ``controller`` the caller sets the command. ``thermal`` and
-    ``supply_lines`` None stand for gas that keeps its temperature and for constant supply pressures. ``sections`` hold
-    settings of effects beside the device's, by section.
+    ``path`` None means a free vane, ``controller`` None a command set by the caller, ``thermal`` None isothermal gas,
+    and ``supply_lines`` None constant supply pressures. ``sections`` hold settings of effects outside the device, by
+    section.
     """
 
     device: Device
@@ -99,9 +99,9 @@ class Components:
 
 @dataclass(frozen=True, slots=True)
 class CarriedLeg:
-    """A leg on an unconstrained vane: what leads its shank, and what ``put_on(plant)`` makes of a plant without one.
+    """Leg on an unconstrained vane: profile of its shank, and function ``put_on``.
 
-    That is the plant with the foot on it, and the leg as the engine has it.
+    ``put_on(plant)`` returns the plant with the foot's load and the leg as the engine takes it.
     """
 
     shank: ProfileKind
@@ -110,10 +110,10 @@ class CarriedLeg:
 
 @dataclass(frozen=True, slots=True)
 class TimeGrid:
-    """Length of a step [s], how many there are, how many to a sample of the controller and of the recording.
+    """Step length [s], number of steps, and steps per controller sample and per recorded sample.
 
-    ``needs_parts`` is true where the error decides about the parts of a step; ``tolerance`` is the error over the one
-    that a run is allowed by default [-].
+    ``needs_parts`` is true if the error control divides steps into parts; ``tolerance`` is the allowed error divided by
+    the default one [-].
     """
 
     step: Any
@@ -135,11 +135,11 @@ def compose_run(
     start: Start,
     walk: Walk | None = None,
 ) -> Run:
-    """Return the run of components: ``rule`` says how it is stepped, ``start`` where it begins, ``walk`` adds a leg.
+    """Return the run of components: ``rule`` determines the steps, ``start`` the initial state, ``walk`` adds a leg.
 
-    A leg without ground is one of the components, and ``plant`` the bare one.
+    A leg without ground contact is one of the components, and ``plant`` is the plant without it.
 
-    Every law, valve, motion, gas and supply goes with every other here.
+    Every controller, valve, motion, gas and supply can be combined with every other here.
     """
     settings = valve_settings(components.device.valve)
     delay = components.valve.command_delay(settings)
@@ -190,7 +190,7 @@ def compose_run(
 
 
 def _gas(components: Components, effects: Sequence[Effect]) -> GasPhases:
-    """Return what the gas keeps or exchanges; ScenarioError for an effect on the density of gas that has no step."""
+    """Return the gas phases of a gas model; ScenarioError for a density effect that a component does not support."""
     real = next((effect for effect in effects if gas_density in effect.laws), None)
     if real is None and components.thermal is None:
         return isothermal
@@ -214,7 +214,7 @@ def _gas(components: Components, effects: Sequence[Effect]) -> GasPhases:
 
 
 def _of_error(law: ControllerKind | None, components: Components) -> ControllerKind | None:
-    """Return a law that is given the functions of the error it acts on; one of a torque alone as it is."""
+    """Return a controller with the error functions of its controlled quantity; a torque controller unchanged."""
     parts = error_functions(components.controlled, components.device.supply.is_vacuum)
     if law is None or law.controls == (TORQUE,) or parts == OF_TORQUE:
         return law
@@ -222,7 +222,7 @@ def _of_error(law: ControllerKind | None, components: Components) -> ControllerK
 
 
 def _program(components: Components, steps: TimeGrid, walk: Walk | None, has_delay: bool) -> Program:
-    """Return what the lanes are composed of."""
+    """Return the program of a run with these components."""
     feed: ModuleType | None = None
     foot: ModuleType | None = None
     leg: ModuleType | None = None
@@ -264,10 +264,10 @@ def _program(components: Components, steps: TimeGrid, walk: Walk | None, has_del
 
 
 def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, tuple[Problem, ...]]:
-    """The run of a scenario of a vane alone, with a leg or without, and what may be wrong with it.
+    """Run of a scenario of a vane alone, with a leg or without, and its possible problems.
 
-    Numbers in both may be arrays (runs,) of an ensemble, which must ask for one program: of a valve's and the sensors'
-    settings, each is 0 for all or none.
+    Numbers may be arrays (runs,) of an ensemble of one program: each setting of the valve and the sensors is then
+    either 0 for all runs or nonzero for all.
     """
     device, motion, control = scenario.device, vane_motion(scenario), scenario.controller
     plant = plant_parameters(device, motion.outside_torque)
@@ -303,7 +303,7 @@ def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, t
 
 
 def scenario_steps(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
-    """The steps of a scenario: the largest that divides a sample of its controller, in parts where the error asks."""
+    """Time grid of a scenario: the largest step that divides the sample period, divided into parts by error control."""
     counts = step_counts(
         scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
     )
@@ -333,12 +333,12 @@ def scenario_steps(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
 
 
 def relative_tolerance(tolerance: float) -> float:
-    """Allowed error of a pressure over the one that is allowed by default [-], from ``run.tolerance`` [-]."""
+    """Allowed pressure error divided by the default allowed error [-], from ``run.tolerance`` [-]."""
     return tolerance / KEPT_OF_PRESSURE
 
 
 def too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
-    """Runs that take more steps [s] than can be waited for."""
+    """Problem of runs with more than the maximum number of steps; ``step`` in s."""
 
     def line(run: int) -> str:
         duration, length, count = (at(number, run) for number in (scenario.run.duration, step, step_count))
@@ -351,12 +351,12 @@ def too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
 
 
 def sensor_parameters(scenario: Scenario) -> SensorParameters:
-    """Noise and quantisation as the engine takes them."""
+    """Noise and quantisation of the sensors as the engine takes them."""
     return SensorParameters(**{name: getattr(scenario.sensors, name) for name in SensorParameters._fields})
 
 
 def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
-    """Angle, angular velocity and gas at the start."""
+    """Initial angle, angular velocity and gas."""
     motion = vane_motion(scenario)
     if motion.profile is None:
         angle, rate = motion.angle, motion.angular_velocity
@@ -370,7 +370,7 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
 
 
 def exact_orifice(orifice: Orifice | SonicOrifice, device: Device) -> ExactOrifice:
-    """An orifice for the reference solver, with the exact flow function."""
+    """Orifice with the exact flow function, for the reference solver."""
     return ExactOrifice(
         conductance=orifice_conductance(orifice, device.gas),
         is_iso6358=float(isinstance(orifice, SonicOrifice)),
@@ -380,7 +380,7 @@ def exact_orifice(orifice: Orifice | SonicOrifice, device: Device) -> ExactOrifi
 
 
 class StepCounts(NamedTuple):
-    """Length of a step [s], how many there are, how many to a sample of the controller and of the recording [-]."""
+    """Step length [s], number of steps, and steps per controller sample and per recorded sample [-]."""
 
     step: float
     step_count: float
@@ -389,7 +389,7 @@ class StepCounts(NamedTuple):
 
 
 def step_counts(duration: float, time_step: float, output_interval: float, period: float) -> StepCounts:
-    """The largest steps that divide a sample of the controller, and are no longer than ``time_step``; all in [s]."""
+    """Largest steps that divide the sample period of the controller and do not exceed ``time_step``; all times in s."""
     # WHOLE off first: a quotient that rounding put above a whole number would cost one more step.
     steps_per_sample = larger(1.0, rounded_up(period / time_step - WHOLE))
     step = period / steps_per_sample
@@ -402,14 +402,14 @@ def step_counts(duration: float, time_step: float, output_interval: float, perio
 
 
 def nearly_whole(steps: Numeric) -> Numeric:
-    """A number of steps [-], to the whole number where it is one to rounding."""
+    """Number of steps [-], rounded to an integer if it differs only by rounding."""
     counted = truncated(steps + 0.5)
     found: Numeric = choose(abs(steps - counted) <= WHOLE * steps, counted, steps)
     return found
 
 
 def thermal_gas(walls: GasModel, gas: Gas) -> ThermalParameters:
-    """Parameters of the gas with an energy balance: heat exchange with the walls."""
+    """Parameters of a gas with an energy balance and heat exchange with the walls."""
     exchange = wall_exchange(
         walls.heat_transfer_coefficient, walls.wall_area_per_volume, gas.heat_capacity_ratio, gas.specific_gas_constant
     )
@@ -427,7 +427,7 @@ def state_with_volumes(
     pressure_1: float,
     pressure_2: float,
 ) -> PlantState:
-    """The vane at an angle [rad] with a rate [rad/s], and chambers [m^3] filled to absolute pressures [Pa]."""
+    """State of the vane at an angle [rad] and rate [rad/s], with chambers [m^3] filled to absolute pressures [Pa]."""
     return PlantState(
         angle=angle,
         angular_velocity=angular_velocity,

@@ -1,4 +1,4 @@
-"""Functions of time of a scenario: read from its file, as the engine takes them, and their values and bounds."""
+"""Profiles of a scenario (functions of time): reading from a file, engine parameters, values and bounds."""
 
 from typing import Any, NamedTuple
 
@@ -24,7 +24,7 @@ TOLERANCE = 1.0e-9
 
 
 def profile_parameters(choice: ProfileChoice) -> Any:
-    """The NamedTuple of a profile, nested ones filled in the order of its quantities; settings may be arrays."""
+    """NamedTuple of a profile's settings, which may be arrays; nested tuples are filled in quantity order."""
     kind = PROFILES[choice.kind]
     return rebuilt(kind.parameters, [choice.settings[quantity.name] for quantity in kind.quantities])
 
@@ -38,7 +38,7 @@ def profile_values(choice: ProfileChoice, times: "np.ndarray[tuple[int], np.dtyp
 
 
 def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
-    """Lowest and highest value of a profile, N m or rad as its levels; arrays (runs,) where its settings are."""
+    """Lowest and highest value of a profile [N m or rad, as its levels]; arrays (runs,) if its settings are arrays."""
     kind = PROFILES[choice.kind]
     numbers = [choice.settings[quantity.name] for quantity in kind.quantities]
     lowest, highest = over_runs(lambda *values: kind.bounds(rebuilt(kind.parameters, values)), *numbers)
@@ -46,15 +46,16 @@ def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
 
 
 def read_profile(reading: DocumentReader, section: str, prescribed: Quantity) -> ProfileChoice:
-    """Return a function of time with all its settings in SI."""
+    """Return a profile with all its settings in SI."""
     kind = kind_at(reading.document, section)
     return ProfileChoice(kind, reading.section(section, profile_settings(kind, prescribed)))
 
 
 class Limits(NamedTuple):
-    """Lowest and highest value that something can have, arrays (runs,) where they vary; what they are, unit, room [Pa].
+    """Lowest and highest possible value of a quantity; arrays (runs,) if they vary.
 
-    ``room`` is the pressure of the atmosphere, from which a pressure is shown.
+    ``words`` names the limits in messages, ``unit`` is their unit, and ``room`` the atmospheric pressure [Pa] to which
+    displayed gauge pressures refer.
     """
 
     words: str
@@ -65,27 +66,27 @@ class Limits(NamedTuple):
 
     @property
     def allowed(self) -> tuple[Any, Any]:
-        """Lowest and highest value that are not refused: beyond the limits by the rounding of another unit."""
+        """Lowest and highest accepted value: the limits with a margin for rounding in unit conversion."""
         margin = TOLERANCE * np.maximum(1.0, np.maximum(np.abs(self.lowest), np.abs(self.highest)))
         return self.lowest - margin, self.highest + margin
 
     def text(self, value: float) -> str:
-        """A value in the unit in which people write it."""
+        """Value in its display unit."""
         return shown_text(value, self.unit, atmosphere=self.room)
 
     def of_run(self, run: int) -> "Limits":
-        """The limits of one run."""
+        """Limits of one run."""
         lowest, highest, room = (at(number, run) for number in (self.lowest, self.highest, self.room))
         return self._replace(lowest=lowest, highest=highest, room=room)
 
 
 def stops_of(device: Device) -> Limits:
-    """Angles [rad] of both stops of a device."""
+    """Angles [rad] of both stops of a device as limits."""
     return limits_of(device, CONTROLLED[ANGLE])
 
 
 def limits_of(device: Device, followed: ControlledQuantity) -> Limits:
-    """Between what a device can bring what a reference is of; a torque has no limits here."""
+    """Reach of a device in the controlled quantity of a reference; infinite for a torque."""
     actuator, supply = device.actuator, device.supply
     ends = Ends(
         angle_min=actuator.angle_min,
@@ -102,7 +103,7 @@ def limits_of(device: Device, followed: ControlledQuantity) -> Limits:
 def profile_problem(
     limits: Limits, profile: ProfileChoice, duration: float, step: float, section: str = "motion.profile"
 ) -> str:
-    """Return where the profile of a section leaves its limits; "" if nowhere."""
+    """Return the point at which the profile of a section leaves its limits, in words; "" if it stays within."""
     kind, parameters = PROFILES[profile.kind], profile_parameters(profile)
     # The times that the engine asks for, as far as they can be gone through one by one.
     lowest, highest = limits.allowed
@@ -126,7 +127,7 @@ def profile_problem(
 
 @in_units(lambda scenario: scenario.device.shown)
 def reference_problem(scenario: Scenario) -> str:
-    """Return why no controller could follow the reference of a scenario of a vane; an empty text where one might."""
+    """Return the reason why no controller could follow the reference of a scenario of a vane; "" if there is none."""
     if scenario.controlled == TORQUE:
         return ""
     if scenario.controlled == ANGLE and vane_motion(scenario).profile is not None:

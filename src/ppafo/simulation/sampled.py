@@ -1,4 +1,4 @@
-"""Runs a controller that is any Python object, sample by sample, on the same lanes."""
+"""Runs with a Python object as controller, sample by sample, on the compiled model of all other runs."""
 
 import logging
 import math
@@ -22,12 +22,12 @@ from ppafo.wording import nearest_name
 logger = logging.getLogger("ppafo")
 
 _SAID: "WeakSet[type]" = WeakSet()
-"""Classes of controllers of which a line said that their commands are limited."""
+"""Controller classes whose limited commands have been reported."""
 
 
 @final
 class SampledRun:
-    """A batch of one in progress, whose command [-] somebody else gives sample by sample."""
+    """Single run in progress whose command [-] the caller sets at each sample."""
 
     def __init__(self, batch: Batch, module: RunnableProgram | None = None) -> None:
         program, clock = batch.program, batch.clock
@@ -47,22 +47,22 @@ class SampledRun:
 
     @property
     def time(self) -> float:
-        """Time of the present sample [s]."""
+        """Time of the current sample [s]."""
         time: float = self.taken * self._batch.clock.steps_per_sample * self._step
         return time
 
     @property
     def requested(self) -> float:
-        """The reference at the present sample [N m]."""
+        """Reference at the current sample [N m]."""
         requested: float = self._batch.program.reference.value(self._reference, self.time)[0]
         return requested
 
     def measurement(self) -> Any:
-        """Sensor readings at the present sample: a ``Measurement``, of a walk a ``GaitMeasurement``."""
+        """Sensor readings at the current sample: a ``Measurement``, or in a walk a ``GaitMeasurement``."""
         return self._see(self.taken)
 
     def go_on(self, command: float) -> None:
-        """Go on to the next sample under a command."""
+        """Advance to the next sample with a command."""
         clock = self._batch.clock
         done = self.taken * clock.steps_per_sample
         self._block.states[self._command_row] = command
@@ -71,7 +71,7 @@ class SampledRun:
         self.taken += 1
 
     def result(self) -> BatchResult:
-        """States and record so far: of the samples that were taken, and the one that they led to."""
+        """States and record so far, including the sample reached by the last command."""
         clock, outcome = self._batch.clock, self._block.result()
         steps = min(self.taken * clock.steps_per_sample, clock.step_count)
         kept = samples_in(steps, clock.record_every) if clock.record_every else None
@@ -81,9 +81,10 @@ class SampledRun:
 
 
 def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
-    """Run a batch of one with a Python controller; SimulationError where it returns no finite number, and for a slip.
+    """Run a batch of one with a Python controller.
 
-    A command beyond what the valve has is limited, which a line says once for each class of controllers.
+    A command beyond the valve's range is limited; a warning is logged once for each class of controllers. Raises
+    SimulationError for a command that is no finite number, and for a programming error in the controller.
     """
     run = SampledRun(batch)
     # What an earlier run left behind in the object must not steer this one.
@@ -120,7 +121,7 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
 
 
 def _slip(controller: PythonController, error: NameError | AttributeError | TypeError) -> SimulationError:
-    """Return the error of a slip of the pen in a controller: file, line, what is wrong and the nearest name."""
+    """Return the error for a programming error in a controller: file, line, message and nearest name."""
     frame = traceback.extract_tb(error.__traceback__)[-1]
     walked = next(reversed(list(traceback.walk_tb(error.__traceback__))))[0]
     name, hint = getattr(error, "name", None), ""
@@ -132,7 +133,7 @@ def _slip(controller: PythonController, error: NameError | AttributeError | Type
 
 
 def _group(batch: Batch, name: str) -> Any:
-    """The NamedTuple of a group of parameters of the one run, with floats."""
+    """NamedTuple of a group of parameters of the single run, as floats."""
     values: Any = batch.parameters[:, 0].tolist()
     return group_of(name, batch.program.parameter_rows(), values)
 
@@ -171,7 +172,8 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
 def _gait_measurements(batch: Batch, block: LaneBlock) -> Callable[[int], GaitMeasurement]:
     """Function that returns the measurement of a walking controller at a sample, of the present state.
 
-    ScenarioError for sensors that are late and for gas that warms, of which the lanes know more than this.
+    Raises ScenarioError for delayed sensors and for gas with an energy balance, which are only available to compiled
+    controllers.
     """
     program, actuator, rows = batch.program, batch.program.actuator, row_numbers(batch.program.state_rows())
     if program.late_readings or program.is_thermal:

@@ -1,7 +1,7 @@
 """Scenario: one device in one experiment, as frozen values in SI units.
 
-``load_scenario`` makes one from a file; in Python, ``dataclasses.replace`` changes a value and ``controlled_by`` puts
-an object of your own in charge of the valve.
+``load_scenario`` reads one from a file; in Python, ``dataclasses.replace`` changes a value and ``controlled_by`` lets
+an object of your own control the valve.
 """
 
 import math
@@ -31,7 +31,7 @@ UNITS = "SI: kg, m, s, K, mol; angles in rad, pressures in Pa absolute, torques 
 
 @dataclass(frozen=True, slots=True)
 class ProfileChoice:
-    """A function of time: its kind in ``control.catalog.PROFILES`` and all its settings in SI units, as attributes."""
+    """Profile (function of time): kind in ``control.catalog.PROFILES``; settings in SI units, also as attributes."""
 
     kind: str
     settings: Mapping[str, float]
@@ -44,14 +44,16 @@ class ProfileChoice:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """A foot on a shank that is led, without ground. Equation (11) with a prescribed shank.
+    """Foot on a shank with prescribed motion, without ground contact. Equation (11) with a prescribed shank.
 
-    Mass of the foot [kg], from the ankle to its mass centre [m], inertia about that [kg m^2], length of the shank [m],
-    from the ankle to the toes [m], which nothing but the height of the toes asks for.
-    ``ankle_torque`` [N m] is T_2, positive in plantarflexion. ``shank`` is its angle in time [rad], upright at 0; with
-    the kind ``gait`` a ``gait``'s by its ``curves``, a ``model.gait.ShankSeries``, whose knee moves too, from the phase
-    ``start`` [strides] on.
-    Defaults are the paper's subject (after equation (12)), with the mass centre half way along a foot of 0.18 m.
+    ``shank_length`` [m] is from knee to ankle; ``foot_mass_centre`` [m] from the ankle to the foot's centre of mass;
+    ``foot_mass`` [kg]; ``foot_inertia`` [kg m^2] about the centre of mass; ``toe_lever`` [m] from the ankle to the
+    toes, used only for the toe height. ``ankle_torque`` [N m] is T_2, positive in plantarflexion. ``shank`` is the
+    profile of the shank angle [rad], upright at 0. With the kind ``gait``, ``gait`` is the name of the gait and
+    ``curves``, a ``model.gait.ShankSeries``, its motion of shank and knee, which starts at the phase ``start``
+    [strides].
+
+    Defaults are the paper's subject (after equation (12)), with the centre of mass half way along a foot of 0.18 m.
     """
 
     shank_length: Annotated[float, Number("m", "knee to ankle", 0.46, 0.1, 1.0)]
@@ -69,10 +71,10 @@ class Leg:
 
 @dataclass(frozen=True, slots=True)
 class FreeMotion:
-    """The vane moves as the torques demand, alone or with the foot of a leg.
+    """The vane moves freely under the torques on it, alone or with the foot of a leg.
 
     Starts at ``angle`` [rad] with ``angular_velocity`` [rad/s]; ``external_torque`` [N m] is the constant T_ex of
-    equation (1), positive where it works against plantarflexion. With a ``leg`` T_ex follows from equation (11).
+    equation (1), positive if it opposes plantarflexion. With a ``leg``, T_ex follows from equation (11).
     """
 
     angle: Annotated[
@@ -99,7 +101,7 @@ class FreeMotion:
 
     @property
     def outside_torque(self) -> Any:
-        """Constant torque [N m] against plantarflexion beside a leg, which T_2 of equation (11) does below 0."""
+        """Constant torque [N m] against plantarflexion; with a leg -T_2 of equation (11)."""
         return self.external_torque if self.leg is None else -self.leg.ankle_torque
 
     @property
@@ -111,7 +113,7 @@ class FreeMotion:
 
     @property
     def label(self) -> str:
-        """The motion in a few words."""
+        """Short description of the motion."""
         start = f"from {math.degrees(self.angle):.4g} deg"
         if self.leg is None:
             return f"free, {start}"
@@ -127,7 +129,7 @@ class FreeMotion:
 class PrescribedMotion:
     """The angle of the vane [rad] is a given function of time; a locked vane has a constant profile.
 
-    ``kind`` is the kind of motion that a file names, ``locked`` or ``prescribed``.
+    ``kind`` is the kind of motion as in a file, ``locked`` or ``prescribed``.
     """
 
     profile: ProfileChoice
@@ -143,7 +145,7 @@ class PrescribedMotion:
 
     @property
     def locked_angle(self) -> Any:
-        """The angle [rad] at which the vane stays, None where it moves."""
+        """Angle [rad] of a locked vane; None if the vane moves."""
         return self.profile.level if self.profile.kind == "constant" else None
 
     @property
@@ -153,7 +155,7 @@ class PrescribedMotion:
 
     @property
     def label(self) -> str:
-        """The motion in a few words."""
+        """Short description of the motion."""
         level = self.profile.settings.get("level", math.nan)
         if self.profile.kind == "constant":
             return f"locked at {math.degrees(level):.4g} deg"
@@ -169,28 +171,28 @@ class Motion(Protocol):
 
     @property
     def label(self) -> str:
-        """The motion in a few words."""
+        """Short description of the motion."""
 
     @property
     def locked_angle(self) -> Any:
-        """The angle [rad] at which a vane stays, None where it moves."""
+        """Angle [rad] of a locked vane; None if the vane moves."""
 
     @property
     def stride_time(self) -> float:
-        """Time of a stride [s], 0 without strides."""
+        """Stride time [s]; 0 for a motion without strides."""
 
 
 VaneMotion = FreeMotion | PrescribedMotion
-"""The motions of a vane alone."""
+"""Motions of a vane alone."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:
-    """Times of a run [s], and the error of a pressure over the pressure range [-] that the step size control keeps to.
+    """Times of a run [s], and the allowed pressure error divided by the pressure range [-] for step-size control.
 
-    ``step`` is the largest step (the engine divides it where a chamber is faster) and divides ``duration``,
-    ``output_interval`` and the sample period of the controller. With the default tolerance a pressure keeps to 1e-3 of
-    the pressure range and the angle to 2e-4 of its own.
+    ``step`` is the largest step (the engine divides it for a faster chamber) and divides ``duration``,
+    ``output_interval`` and the sample period of the controller. With the default tolerance the error stays below 1e-3
+    of the pressure range and below 2e-4 of the angle range.
     """
 
     duration: Annotated[float, Number("s", "length of the run", None, 0.0, 1.0e6, minimum_allowed=False)]
@@ -207,7 +209,7 @@ class RunSettings:
 
 @dataclass(frozen=True, slots=True)
 class Initial:
-    """Pressures [Pa absolute] of both chambers at the start."""
+    """Initial pressures of both chambers [Pa absolute]."""
 
     pressure_1: Annotated[float, Number("Pa_a", "pressure in chamber 1 at the start", None, 1.0e3, 1.0e8)]
     pressure_2: Annotated[float, Number("Pa_a", "pressure in chamber 2 at the start", None, 1.0e3, 1.0e8)]
@@ -215,10 +217,10 @@ class Initial:
 
 @dataclass(frozen=True, slots=True)
 class GasModel:
-    """Gas with an energy balance: heat transfer coefficient [W/(m^2 K)], area of the walls over the volume [1/m].
+    """Gas with an energy balance: heat transfer coefficient [W/(m^2 K)], wall area per chamber volume [1/m].
 
-    The walls, the source and the room have the temperature of the device's gas. A coefficient of 0 is adiabatic; a
-    very large one gives the isothermal gas of the paper.
+    Walls, supply and surroundings have the temperature of the device's gas. A coefficient of 0 is adiabatic; a very
+    large one gives the isothermal gas of the paper.
     """
 
     heat_transfer_coefficient: Annotated[
@@ -231,7 +233,7 @@ class GasModel:
 
 @dataclass(frozen=True, slots=True)
 class RegulatedLine:
-    """A regulator with the line behind it: droop [Pa s/kg], largest mass flow [kg/s], volume [m^3]."""
+    """Regulator with its downstream line: droop [Pa s/kg], largest mass flow [kg/s], line volume [m^3]."""
 
     droop: Annotated[float, Number("Pa s/kg", "fall of the line pressure per mass flow", None, 1.0, 1.0e10)]
     largest_flow: Annotated[float, Number("kg/s", "what the regulator passes at most", None, 1.0e-6, 1.0)]
@@ -240,13 +242,13 @@ class RegulatedLine:
 
 @dataclass(frozen=True, slots=True)
 class SupplyLine:
-    """Both lines: behind the bottle's regulator, and behind the second regulator, which the first line feeds."""
+    """Both supply lines: downstream of the bottle's regulator, and of the second regulator, fed by the first line."""
 
     plantarflexion: RegulatedLine
     dorsiflexion: RegulatedLine
 
     def row(self, supply: Supply) -> "SupplyLines":
-        """Return the lines as the engine has them, with regulators that relieve where the supply's do."""
+        """Return the lines as engine parameters; their regulators relieve if those of the supply do."""
         from ppafo.model.regulator import SupplyLines
 
         first, second = self.plantarflexion, self.dorsiflexion
@@ -265,8 +267,10 @@ class SupplyLine:
 class Sensors:
     """Sensors of the controller, ideal by default.
 
-    Age of a measurement when it is used [s], standard deviations [rad], [Pa], steps of quantisation [rad], [Pa], the
-    seed of the noise, and first-order bandwidths of the angle sensor and the pressure sensors [Hz], 0 for none.
+    ``delay`` [s] is the age of a measurement when the controller uses it; ``angle_noise`` [rad] and ``pressure_noise``
+    [Pa] are standard deviations; ``angle_resolution`` [rad] and ``pressure_resolution`` [Pa] are quantisation steps;
+    ``seed`` is the seed of the noise. ``angle_bandwidth`` and ``pressure_bandwidth`` [Hz] are first-order bandwidths, 0
+    for no lag.
     """
 
     delay: Annotated[float, Number("s", "age of a measurement when the controller uses it", 0.0, 0.0, 1.0e6)] = 0.0
@@ -282,17 +286,17 @@ class Sensors:
 
     @property
     def flaws(self) -> tuple[float, ...]:
-        """Imperfections of the sensors [s, rad, Pa, rad, Pa, Hz, Hz]; 0 for an ideal one."""
+        """Imperfections of the sensors [s, rad, Pa, rad, Pa, Hz, Hz]; all 0 for ideal sensors."""
         noise, steps = (self.angle_noise, self.pressure_noise), (self.angle_resolution, self.pressure_resolution)
         return self.delay, *noise, *steps, self.angle_bandwidth, self.pressure_bandwidth
 
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """A sampled controller: kind in ``control.catalog.CONTROLLERS``, settings in SI units, sample period [s].
+    """Sampled controller: kind in ``control.catalog.CONTROLLERS``, settings in SI units, sample period [s].
 
-    Its settings are attributes: ``controller.proportional_gain``. With kind ``python`` there are none, and ``custom``
-    is asked sample by sample.
+    Settings are also attributes: ``controller.proportional_gain``. The kind ``python`` has no settings; the object
+    ``custom`` is called at each sample.
     """
 
     kind: str
@@ -308,7 +312,7 @@ class Control:
 
     @property
     def is_outside(self) -> bool:
-        """True where a Python object decides, or whoever hands the command in."""
+        """True if the command comes from a Python object or from the caller."""
         return self.kind == PYTHON_CONTROLLER
 
     def __getattr__(self, name: str) -> Any:
@@ -318,7 +322,7 @@ class Control:
 
 @dataclass(frozen=True, slots=True)
 class Assumption:
-    """A value that no source gives: its path in the scenario, the value as written, and why this one."""
+    """Assumed value without a source: its path in the scenario, the value as written, and the reason for it."""
 
     path: str
     value: str
@@ -327,7 +331,7 @@ class Assumption:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Origin of a scenario, for the record: file, parameter set, valve, overrides and the document of the file."""
+    """Origin of a scenario: file, parameter set, valve, overrides and the document of the file."""
 
     file: str | None
     parameter_set: str
@@ -340,11 +344,10 @@ class Origin:
 class Scenario:
     """A device in one experiment.
 
-    The reference is a torque [N m], or of what else is ``controlled``: an angle [rad], or pressures [Pa] (
-    ``model.controlled``); ``beyond_reach`` is why it lies beyond the reach of the device, "" where it does not on
-    purpose. Without ``gas_model`` the gas keeps its temperature, without ``supply_line`` the
-    supply pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied,
-    beside the device's.
+    The reference is a torque [N m] or, according to ``controlled`` (``model.controlled``), an angle [rad] or a pressure
+    [Pa]. ``beyond_reach`` is the reason for a reference that is beyond the device's reach on purpose, else "". Without
+    ``gas_model`` the gas is isothermal, and without ``supply_line`` the supply pressures are constant, both as in the
+    paper. ``links`` define which numbers of the scenario follow other numbers that are varied; the device has its own.
     """
 
     name: str
@@ -365,7 +368,7 @@ class Scenario:
     beyond_reach: str = ""
 
     def __repr__(self) -> str:
-        """Return name, device, valve, motion, controller and duration, a line each."""
+        """Return name, device, valve, motion, controller and duration, each on its own line."""
         control = self.controller
         law = control.kind if control.custom is None else f"{control.kind}, {type(control.custom).__name__}"
         return (
@@ -378,34 +381,34 @@ class Scenario:
 
     @property
     def supply_lines(self) -> "SupplyLines | None":
-        """Regulators and lines as the engine has them, None where supply pressures are constant."""
+        """Regulators and lines as engine parameters; None for constant supply pressures."""
         return None if self.supply_line is None else self.supply_line.row(self.device.supply)
 
     @property
     def law(self) -> "ControllerKind | None":
-        """The controller with what the motion adds to it; None for a Python object."""
+        """Controller with the additions of the motion; None for a Python object."""
         return None if self.controller.is_outside else self.motion.motion_kind.law(self)
 
     @property
     def stiffness(self) -> Any:
-        """Stiffness of the gas pressure relative to constant temperature [-]: its heat capacity ratio."""
+        """Stiffness of the gas divided by its isothermal stiffness [-]: above 1 for gas with an energy balance."""
         return 1.0 if self.gas_model is None else self.device.gas.heat_capacity_ratio
 
     @property
     def follows_reference(self) -> bool:
-        """True where the controller follows the reference: no constant command, nor a walk, which makes its own."""
+        """True if the controller follows the scenario's reference: False for a constant command and for a walk."""
         return self.motion.motion_kind.follows_reference(self)
 
     @property
     def graph(self) -> Graph:
-        """All links, the device's first."""
+        """Links of the device and of the scenario, in this order."""
         # Sources stand before what follows them, and a scenario's numbers follow the device's.
         return {**self.device.links, **self.links}
 
     def controlled_by(self, controller: PythonController) -> "Scenario":
-        """Return the scenario with any object that has ``reset`` and ``update``, at the same sample period.
+        """Return the scenario controlled by any object that has ``reset`` and ``update``, at the same sample period.
 
-        ScenarioError for a class, or for an object without these methods.
+        Raises ScenarioError for a class, and for an object without these methods.
         """
         # A class has both methods too, and would fail only when it runs.
         if isinstance(controller, type):
@@ -422,17 +425,17 @@ class Scenario:
 
 
 def vane_motion(scenario: Scenario) -> VaneMotion:
-    """The motion of a scenario of a vane alone; ScenarioError for a leg that wears the device."""
+    """Motion of a scenario of a vane alone; ScenarioError for a leg that walks with the device."""
     if isinstance(scenario.motion, FreeMotion | PrescribedMotion):
         return scenario.motion
     raise ScenarioError(f"{scenario.name}: is {scenario.motion.label}, but a scenario of the vane alone is needed here")
 
 
 def scenario_document(scenario: Scenario) -> dict[str, Any]:
-    """Return the whole scenario with every number of the device, in SI units, as data that JSON can hold."""
+    """Return the whole scenario with every number of the device, in SI units, as data that can be written as JSON."""
     return {"units": UNITS, **plain(scenario)}
 
 
 def with_control(scenario: Scenario, control: Control) -> Scenario:
-    """Return a scenario with another control; settings of the previous law no longer follow other numbers."""
+    """Return a scenario with another control; settings of the previous controller no longer follow other numbers."""
     return replace(scenario, controller=control, links=outside(scenario.links, "controller", "timing"))

@@ -1,7 +1,6 @@
-"""The layout of a scenario file, built from the declarations, so that a value is declared in one place only.
+"""Layout of a scenario file, built from the declarations, so that each value is declared in one place only.
 
-Numbers are checked where they are read (``reading``), with the file, the key and the unit at hand; here it is decided
-which keys there can be.
+The layout defines the allowed keys. Numbers are checked when they are read (``reading``), with file, key and unit.
 """
 
 import functools
@@ -28,7 +27,7 @@ _QUANTITY_TEXT = {"type": "string", "pattern": _STARTS_WITH_NUMBER}
 
 
 def number_type(quantity: Quantity, words: tuple[str, ...] = ()) -> Any:
-    """Return the type of a value: a text with its unit, a plain number where there is no unit, or one of some words."""
+    """Return the type of a value: text with unit, a plain number if it has no unit, or one of ``words``."""
     forms: list[dict[str, Any]] = [_QUANTITY_TEXT]
     forms += [{"type": "number"}] if quantity.unit in PLAIN else []
     forms += [{"enum": list(words)}] if words else []
@@ -42,7 +41,7 @@ def _description(quantity: Quantity) -> str:
 
 
 def quantity_fields(quantities: tuple[Quantity, ...], words: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return the fields of a section; one without a default has to be given, unless a word stands in for it."""
+    """Return the fields of a section; a field without a default is required, unless a word can replace the value."""
     fields: dict[str, Any] = {}
     for quantity in quantities:
         kind = number_type(quantity, words)
@@ -53,24 +52,24 @@ def quantity_fields(quantities: tuple[Quantity, ...], words: tuple[str, ...] = (
 
 
 def kind_field(kind: str, summary: str) -> dict[str, Any]:
-    """Return the field that tells one kind of table from another."""
+    """Return the field ``kind`` that distinguishes one kind of table from another."""
     return {"kind": (Literal[kind], Field(description=summary))}
 
 
 def model_name(name: str) -> str:
-    """Return the name of a model: ``ramp_hold`` as ``RampHold``."""
+    """Return the class name of a model: ``RampHold`` for ``ramp_hold``."""
     return "".join(part.capitalize() for part in re.split(r"\W|_", name))
 
 
 def named_or_all(name: str, kinds: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the one kind that is named, all where it is none of them."""
+    """Return only the named kind, or all kinds if there is none of this name."""
     return {name: kinds[name]} if name in kinds else kinds
 
 
 def profile_table(prescribed: Quantity, purpose: str, kind: str = "", further: dict[str, Any] | None = None) -> Any:
-    """Return the section of a profile, one kind or all that are loaded, with ``further`` fields.
+    """Return the model of a profile's section, for one kind or for all loaded kinds, with ``further`` fields.
 
-    ``purpose`` ends the names of its models.
+    ``purpose`` is the last part of the model names.
     """
     return one_of(
         [
@@ -86,13 +85,13 @@ def profile_table(prescribed: Quantity, purpose: str, kind: str = "", further: d
 
 
 def motion_kinds() -> dict[str, MotionKind[Any]]:
-    """Return the kinds of motion of a vane alone: all of this package, and loaded ones of others."""
+    """Return the kinds of motion of a vane alone: all kinds of this package, and loaded ones of other packages."""
     others = {name: kind for name, kind in MOTIONS.loaded().items() if kind.section is not None}
     return {name: MOTIONS[name] for name in VANE_MOTIONS} | others
 
 
 def shank_table() -> Any:
-    """Return the layout of the section of a scenario file on the shank of a leg."""
+    """Return the model of the section for the shank of a leg."""
     gait = {"gait": (str, Field(min_length=1, description="name of a gait, or a path relative to this file"))}
     return one_of(
         [
@@ -114,7 +113,7 @@ def shank_table() -> Any:
 
 
 def controller_table(kinds: Mapping[str, ControllerKind], suffix: str) -> Any:
-    """Return the layout of the section on the controller, of a scenario or walk file."""
+    """Return the model of the controller section of a scenario or walk file."""
     sampling = {
         quantity.name: optional(number_type(quantity), _description(quantity)) for quantity in declaration.SAMPLING
     }
@@ -130,9 +129,9 @@ def controller_table(kinds: Mapping[str, ControllerKind], suffix: str) -> Any:
 
 
 def file_model(name: str, own: dict[str, Any], sections: Container[str] = declaration.SECTIONS) -> type[BaseModel]:
-    """Return the model of a file of a scenario: the sections that every one has, and the ones of its kind of motion.
+    """Return the model of a scenario file: sections that every scenario has, and sections of its kind of motion.
 
-    Of the sections that may be left out it has those in ``sections``.
+    Optional sections are included if they are in ``sections``.
     """
     device = {
         "set": (str, Field(min_length=1, description="name of a parameter set, or a path relative to this file")),
@@ -173,9 +172,9 @@ def file_model(name: str, own: dict[str, Any], sections: Container[str] = declar
 
 
 def scenario_file(document: Mapping[str, Any] | None = None) -> type[BaseModel]:
-    """Return the model of a scenario file with the sections and kinds of a document; with all that are loaded for None.
+    """Return the model of a scenario file with the sections and kinds of a document; for None, with all loaded kinds.
 
-    A file that names no controller is compared with all of this package.
+    A file that names no controller is compared with all controllers of this package.
     """
     controllers, profiles = CONTROLLERS.loaded_or_own(), PROFILES.loaded()
     sections = declaration.SECTIONS if document is None else tuple(filter(document.__contains__, declaration.SECTIONS))
@@ -186,7 +185,7 @@ def scenario_file(document: Mapping[str, Any] | None = None) -> type[BaseModel]:
 
 
 def whole_scenario_file() -> type[BaseModel]:
-    """Return the model of a scenario file that may have every controller of this package."""
+    """Return the model of a scenario file with every controller of this package."""
     CONTROLLERS.load_own()
     return scenario_file()
 

@@ -34,12 +34,12 @@ REMEDY = (
 )
 
 _OF_STEPS = ("result.failure_time", "result.too_many_parts", "pace.", "valve_state.", "controller_state.")
-"""Rows of the time stepping of which no recording of a vane is made."""
+"""Prefixes of state rows of the time stepping, which no recording of a vane contains."""
 
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """End of a run: ``time`` [s] is where a diverged run stopped; ``message`` has its state and the remedy."""
+    """End of a run: ``time`` [s] at which a diverged run stopped; ``message`` with its last state and the remedy."""
 
     kind: Literal["completed", "diverged"]
     time: float | None = None
@@ -47,12 +47,12 @@ class Status:
 
     @property
     def is_completed(self) -> bool:
-        """True where the run reached the end of the scenario."""
+        """True if the run reached the end of the scenario."""
         return self.kind == "completed"
 
 
 class RunMetrics(NamedTuple):
-    """The channels of a run, its metrics by name, and how it ended if it was completed, in words."""
+    """Channels of a run, metrics by name, and a sentence on the end of a completed run."""
 
     recording: Recording
     metrics: "Mapping[str, Metric]"
@@ -60,7 +60,7 @@ class RunMetrics(NamedTuple):
 
 
 class DeferredResult:
-    """Recording, metrics and end of a run, computed on first use: of many runs they are never read."""
+    """Recording, metrics and end of a run, computed on first use, because many runs never need them."""
 
     __slots__ = ("_measured",)
 
@@ -68,7 +68,7 @@ class DeferredResult:
         self._measured = measured
 
     def __call__(self) -> RunMetrics:
-        """Return recording, metrics and end, the same at every call."""
+        """Return recording, metrics and end; the same objects at every call."""
         # What makes them holds all rows of the run, so it is let go once they are made.
         if not isinstance(self._measured, RunMetrics):
             self._measured = self._measured()
@@ -80,7 +80,7 @@ class DeferredResult:
     __hash__ = None  # type: ignore[assignment]  # recordings have no hash
 
     def __reduce__(self) -> tuple[type["DeferredResult"], tuple[RunMetrics]]:
-        """Copy and pickle what was measured: the program of the run stays in this process."""
+        """Copy and pickle the recording and metrics only: the program of the run stays in this process."""
         return DeferredResult, (self(),)
 
 
@@ -90,7 +90,7 @@ def _units_of(result: "Result", *_: object, **__: object) -> Mapping[str, str]:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Result:
-    """A finished run. ``versions`` are the packages', ``engine`` the figures of the time stepping."""
+    """Result of a finished run; ``versions`` are package versions, ``engine`` has step size and numbers of steps."""
 
     scenario: Scenario
     status: Status
@@ -100,31 +100,31 @@ class Result:
 
     @property
     def recording(self) -> Recording:
-        """The channels over time, in SI."""
+        """Channels over time, in SI."""
         return self.measured().recording
 
     @property
     def metrics(self) -> "Mapping[str, Metric]":
-        """The metrics by name, in SI."""
+        """Metrics by name, in SI."""
         return self.measured().metrics
 
     @property
     def tracking(self) -> "Tracking | None":
-        """The verdict where what is controlled does not follow its reference; None where it does, or has none."""
+        """Verdict on a run that does not follow its reference; None if it follows, or has no reference."""
         from ppafo.simulation.tracking import tracking_in
 
         return tracking_in(self) if self.status.is_completed else None
 
     @property
     def following(self) -> str:
-        """Sentence on a run whose controlled quantity follows its reference; "" where it does not, or has none."""
+        """Sentence on a run that follows its reference; "" if it does not follow, or has no reference."""
         from ppafo.simulation.tracking import following_text
 
         return following_text(self) if self.status.is_completed else ""
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Reasons why the run is of little use, a sentence each: a loop that misses its reference, coarse valves."""
+        """Reasons why the run is of limited use, a sentence each: a missed reference, a too coarse pair of valves."""
         from ppafo.simulation.tracking.pair_step import coarse_pair
 
         verdict = self.tracking
@@ -133,7 +133,7 @@ class Result:
 
     @in_units(_units_of)
     def __repr__(self) -> str:
-        """Return name, status, duration and one line a metric, in the units that people are shown."""
+        """Return name, status, duration and one line per metric, in display units."""
         from ppafo.report.display_units import name_lines
 
         scenario, status = self.scenario, self.status
@@ -150,7 +150,7 @@ class Result:
 
     @in_units(_units_of)
     def plot(self) -> "Figure":
-        """Return a figure of angle, pressures, torque, command and gas; ``.savefig(...)`` writes it."""
+        """Return a figure of angle, pressures, torque, command and gas; ``.savefig(...)`` saves it."""
         from ppafo.report.notebook import shown
         from ppafo.report.recording_figure import recording_figure
 
@@ -161,9 +161,9 @@ class Result:
 
     @in_units(_units_of)
     def error(self) -> "ErrorEstimate":
-        """Return the estimated error [SI] of this run from its steps: it runs again with a sixteenth of it.
+        """Return the estimated time-stepping error [SI], from a second run with a sixteenth of the allowed error.
 
-        SimulationError for a run that diverged.
+        Raises SimulationError for a run that diverged.
         """
         if not self.status.is_completed:
             raise SimulationError(f"{self.scenario.name}: the run diverged, so its error cannot be estimated")
@@ -173,9 +173,10 @@ class Result:
 
     @in_units(_units_of)
     def check(self) -> "Check":
-        """Return whether this run can be repeated: with finer steps, and with start and measurements moved.
+        """Return the repeatability of this run: with finer steps, and with perturbed start and measurements.
 
-        SimulationError for a run that diverged, and for a Python controller that gives a different run each time.
+        Raises SimulationError for a run that diverged, and for a Python controller that gives a different run each
+        time.
         """
         if not self.status.is_completed:
             raise SimulationError(f"{self.scenario.name}: the run diverged, so there is nothing to check")
@@ -184,7 +185,7 @@ class Result:
         return checked(self, plan_run(self.scenario), partial(results_of, self.scenario))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what ``run.json`` says of a result, beside what storage adds to it, as plain data in SI units."""
+        """Return the content of ``run.json`` as plain data in SI units, except the fields added by storage."""
         return {
             "status": plain(self.status),
             "metrics": {name: plain(metric) for name, metric in self.metrics.items()},
@@ -204,7 +205,7 @@ class Result:
     def save(self, folder: str | Path, attachments: Mapping[str, bytes] | None = None) -> Path:
         """Write ``recording.nc``, ``recording.csv``, ``run.json`` and any attachments (contents by file name).
 
-        The folder is complete or not there; an earlier result in it is replaced. Returns the folder.
+        The folder is written completely or not at all; an earlier result in it is replaced. Returns the folder.
         """
         from ppafo.storage import write_result
 
@@ -217,7 +218,7 @@ def simulate(scenario: Scenario) -> Result:
 
 
 def results_of(scenario: Scenario, runs: Sequence[Run]) -> list[Result]:
-    """Results of runs of one scenario, as planned or with other numbers; a Python controller has them in turn."""
+    """Results of runs of one scenario, as planned or with other numbers; a Python controller makes them one by one."""
     custom = scenario.controller.custom
     if custom is None:
         outcomes = run_together(runs)
@@ -241,7 +242,7 @@ def simulate_many(scenarios: Sequence[Scenario], threads: int | None = None) -> 
 
 
 def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
-    """The result of what a run came to; one that was stopped has the records up to there."""
+    """Result of a run from its outcome; a diverged run has the record up to its failure."""
     rows = state_row_numbers(run)
     times: Floats = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
     record = outcome.record[:, :, 0]
@@ -261,7 +262,7 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
 
 
 def _measured(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> RunMetrics:
-    """Recording and metrics of a record (samples, rows), and how a completed run ended."""
+    """Recording, metrics and end of a run, from a record (samples, rows)."""
     from ppafo.metrics.metric import Metrics
 
     by_path = {path: np.ascontiguousarray(record[:, row]) for path, row in rows.items()}
@@ -270,7 +271,7 @@ def _measured(scenario: Scenario, run: Run, times: Floats, record: Floats, rows:
 
 
 def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: Floats) -> Status:
-    """Completed, or diverged with time, the last good state and what to do."""
+    """Completed, or diverged with time, last good state and remedy."""
     failed = float(outcome.states[rows["result.failure_time"], 0])
     if failed >= NEVER_FAILED and bool(np.isfinite(outcome.states).all()):
         return Status("completed", None, "completed")
@@ -287,7 +288,7 @@ def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: F
 
 
 def compile_models(scenarios: Iterable[Scenario]) -> None:
-    """Compile the models of scenarios into the cache, unless they are there; nothing is run."""
+    """Compile the models of scenarios into the cache if they are not there yet; no run is made."""
     programs = [plan_run(scenario).program for scenario in scenarios]
     # Fully optimised ones serve single runs and ensembles.
     load_programs((program, Effort.FULL) for program in programs)

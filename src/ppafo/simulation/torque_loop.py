@@ -1,6 +1,6 @@
-"""Numbers of a device that the default gains of a law follow; the rules are in ``control.torque_loop``.
+"""Numbers of a device from which default controller gains are computed; the rules are in ``control.torque_loop``.
 
-A gain is a frame here: the chambers of the actuator, the flow of the valve and what comes late are put in their places,
+A gain is a generic function here: functions for the actuator's chambers, the valve's flow and the delays are inserted,
 so that one function of floats gives the gain in a file, in a study and in an exported library.
 """
 
@@ -24,11 +24,11 @@ from ppafo.simulation.motion_kind import LawSignals
 from ppafo.simulation.nominal import AREA_PATHS, SONIC_PATHS, VALVE, flow_of_area, flow_of_sonic, in_its_form
 
 RATE, DEAD_TIME = "torque rate at full opening", "dead time of the torque loop"
-"""Names of what the gains are made of, among the terms."""
+"""Names of the loop parameters from which gains are computed."""
 
 
 class FlowNumbers(NamedTuple):
-    """Gas, and the valve's orifice in the form that it has."""
+    """Gas properties, and the two numbers of the valve's orifice in its form."""
 
     molar_mass: Annotated[float, Number("kg/mol", "")]
     heat_capacity_ratio: Annotated[float, Number("", "")]
@@ -38,17 +38,18 @@ class FlowNumbers(NamedTuple):
 
 
 class SpoolParts(NamedTuple):
-    """Functions for the time of a spool: the time [s] after which the valve has followed a command."""
+    """Function for the time [s] that a spool takes to follow a command."""
 
     follow_time: Callable[[Any], float]
 
 
 class LoopParts(NamedTuple):
-    """Functions for the torque loop, each taking the rows it needs.
+    """Functions for the torque loop; each takes the rows that it needs.
 
-    The chambers of the actuator at an angle [rad], the two angles [rad] between which the joint is, R T times the
-    conductance of the valve [m^3/s], how late the valve follows a command [s] once it is sampled every period [s], how
-    late the measurements are [s], and how what is controlled goes with the pressure in each chamber.
+    ``chambers_at`` gives the chambers at an angle [rad]; ``places`` the lowest and highest joint angle [rad];
+    ``valve_flow`` R T times the conductance of the valve [m^3/s]; ``time_of_valve`` the delay of the valve [s] for a
+    sample period [s]; ``time_of_signals`` the delay of the measurements [s]; ``per_pressure`` the derivative of the
+    controlled quantity with respect to the pressure of each chamber.
     """
 
     chambers_at: Callable[[Any, Range, Surroundings, float], MeanChambers]
@@ -61,35 +62,35 @@ class LoopParts(NamedTuple):
 
 
 class JointParts(NamedTuple):
-    """Functions for the joint: chambers of the actuator; inertia [kg m^2] and gravity torque [N m]."""
+    """Functions for the joint: mean chambers of the actuator; inertia [kg m^2] and gravity torque [N m]."""
 
     mean_chambers: Callable[[Any, Range, Surroundings], MeanChambers]
     turning: Callable[[Any], tuple[float, float]]
 
 
 class AngleParts(NamedTuple):
-    """Functions for the loop of the angle: torque loop of a device and its joint, by all their rows."""
+    """Functions for the angle loop: torque loop of a device, and joint."""
 
     torque_loop_of: Callable[..., TorqueLoop]
     joint_of: Callable[..., Joint]
 
 
 class GainParts(NamedTuple):
-    """Functions for a gain: torque loop of a device, and a rule of ``control.torque_loop``."""
+    """Functions for a gain: torque loop of a device, and rule of ``control.torque_loop``."""
 
     loop_of: Callable[..., TorqueLoop]
     rule: Callable[..., float]
 
 
 class ReachParts(NamedTuple):
-    """Functions for a share of the reach: torque reach of a device, and a rule of ``control.torque_loop``."""
+    """Functions for a number from the torque reach: reach of a device, and rule of ``control.torque_loop``."""
 
     reach_of: Callable[..., float]
     rule: Callable[[float], float]
 
 
 class GainOfJointParts(NamedTuple):
-    """Functions for a gain of loop and joint: both, and a rule of ``control.angle_loop``."""
+    """Functions for a gain from torque loop and joint, with a rule of ``control.angle_loop``."""
 
     torque_loop_of: Callable[..., TorqueLoop]
     joint_of: Callable[..., Joint]
@@ -97,46 +98,46 @@ class GainOfJointParts(NamedTuple):
 
 
 def area_flow(numbers: FlowNumbers) -> float:
-    """R T times the conductance of an area [m^3/s]."""
+    """Flow coefficient of an orifice area: R T times its conductance [m^3/s]."""
     return flow_of_area(
         numbers.molar_mass, numbers.heat_capacity_ratio, numbers.temperature, numbers.orifice_1, numbers.orifice_2
     )
 
 
 def sonic_flow(numbers: FlowNumbers) -> float:
-    """Flow of a sonic orifice per pressure, R T times its conductance [m^3/s]."""
+    """Flow coefficient of a sonic orifice: R T times its conductance [m^3/s]."""
     return flow_of_sonic(numbers.molar_mass, numbers.temperature, numbers.orifice_1)
 
 
 def time_of_spool(valve: Any, period: float, *, parts: SpoolParts) -> float:
-    """Time [s] from a sample to the flow: what the valve needs, and the wait for the command and in it."""
+    """Delay [s] from a sample to the flow of a proportional valve: time of the spool, plus sample delay."""
     return parts.follow_time(valve) + SAMPLES_LATE * period
 
 
 def time_of_pair(valve: Any, period: float) -> float:
-    """Time [s] from a sample to the flow of a pair of on/off valves: a coil may wait for its next switching, too."""
+    """Delay [s] from a sample to the flow of a pair of on/off valves: switching delay, plus wait for the switching."""
     delay: float = max(valve.opening_delay, valve.closing_delay)
     wait: float = max(SAMPLES_LATE * period, valve.switching_interval)
     return delay + wait
 
 
 def torque_by_pressure_1(mean: MeanChambers) -> float:
-    """Derivative of the controlled quantity by the pressure in chamber 1: for a torque [m^3], positive."""
+    """Derivative of the torque with respect to the pressure in chamber 1 [m^3], positive."""
     return mean.torque_per_pressure_1
 
 
 def torque_by_pressure_2(mean: MeanChambers) -> float:
-    """Negative derivative of the controlled quantity by the pressure in chamber 2: for a torque [m^3]."""
+    """Negative derivative of the torque with respect to the pressure in chamber 2 [m^3]."""
     return mean.torque_per_pressure_2
 
 
 def whole_pressure(_mean: MeanChambers) -> float:
-    """1 [-], of a pressure that is controlled itself."""
+    """Return 1 [-]: derivative of a controlled pressure with respect to itself."""
     return 1.0
 
 
 def no_pressure(_mean: MeanChambers) -> float:
-    """Return 0 [-], by which the pressure of the other chamber enters a loop that controls one of them."""
+    """Return 0 [-]: derivative of a controlled pressure with respect to the pressure in the other chamber."""
     return 0.0
 
 
@@ -150,9 +151,9 @@ def loop_of(
     *,
     parts: LoopParts,
 ) -> TorqueLoop:
-    """The loop of a device at a constant volume: R = K q max(P_1 / V_1, P_2 / V_2), theta; K 1 or 0 for a pressure.
+    """Torque or pressure loop at constant volume: R = K q max(P_1 / V_1, P_2 / V_2), theta; K 1 or 0 for a pressure.
 
-    R is the larger one of the two places between which the joint is: there the loop is quickest.
+    R is the larger value of the two extreme joint angles, at which the loop is fastest; theta is the dead time.
     """
     first, last = parts.places(stops, signals)
     here = parts.chambers_at(settings, stops, around, first)
@@ -182,7 +183,7 @@ def reach_of(
     *,
     parts: LoopParts,
 ) -> float:
-    """Largest change of a torque [N m] or a pressure [Pa] that one supply gives while the other chamber is vented."""
+    """Largest change of torque [N m] or pressure [Pa] from one supply while the other chamber is vented."""
     place, _ = parts.places(stops, signals)
     mean = parts.chambers_at(settings, stops, around, place)
     gauge_1 = abs(around.supply_pressure - around.atmospheric_pressure)
@@ -193,7 +194,7 @@ def reach_of(
 def joint_of(
     settings: Any, stops: Range, around: Surroundings, signals: Any, travel: float, *, parts: JointParts
 ) -> Joint:
-    """The joint of a device, with its gas at the atmosphere's pressure, which is the softest spring of it."""
+    """Joint of a device with its gas at atmospheric pressure, where the gas spring is softest."""
     mean = parts.mean_chambers(settings, stops, around)
     inertia, weight = parts.turning(signals)
     spring_1 = mean.torque_per_pressure_1 * mean.growth_1 * around.atmospheric_pressure / mean.volume_1
@@ -221,7 +222,7 @@ def slow_loop_of(
     *,
     parts: AngleParts,
 ) -> TorqueLoop:
-    """The loop of the angle that a law sees which opens the valve by its error."""
+    """Angle loop of a controller that opens the valve in proportion to its error."""
     loop = parts.torque_loop_of(settings, stops, around, numbers, valve, signals)
     return angle_loop.slow_loop(loop, parts.joint_of(settings, stops, around, signals, 0.0))
 
@@ -237,7 +238,7 @@ def gain_of_joint(
     *,
     parts: GainOfJointParts,
 ) -> float:
-    """Gain by a rule for the torque loop of a device and its joint, for a ``travel`` [rad] at a time."""
+    """Gain by a rule for the torque loop and the joint of a device, with ``travel`` [rad] per move."""
     loop = parts.torque_loop_of(settings, stops, around, numbers, valve, signals)
     return parts.rule(loop, parts.joint_of(settings, stops, around, signals, travel))
 
@@ -266,7 +267,7 @@ def share_of_reach(
     *,
     parts: ReachParts,
 ) -> float:
-    """Number by a rule for the torque reach of a device."""
+    """Number by a rule for the torque or pressure reach of a device."""
     return parts.rule(parts.reach_of(settings, stops, around, numbers, valve, signals))
 
 
@@ -281,7 +282,7 @@ def gain_of_loop_and_setting(
     *,
     parts: GainParts,
 ) -> float:
-    """Gain by a rule for the torque loop of a device and another setting of the law."""
+    """Gain by a rule for the torque loop of a device and another setting of the controller."""
     return parts.rule(parts.loop_of(settings, stops, around, numbers, valve, signals), setting)
 
 
@@ -296,7 +297,7 @@ def opening_beyond_band(
     *,
     parts: GainParts,
 ) -> float:
-    """Command [-] for what a rule makes an opening of, of a valve that opens beyond a dead band."""
+    """Command [-] for the valve opening given by a rule, for a valve with a dead band."""
     opening = parts.rule(parts.loop_of(settings, stops, around, numbers, valve, signals), setting)
     return float(valve.dead_band + (1.0 - valve.dead_band) * opening)
 
@@ -310,13 +311,13 @@ _OF_LOOP: dict[str, Callable[[TorqueLoop], float]] = {
     RATE: torque_loop.torque_rate,
     DEAD_TIME: torque_loop.dead_time,
 }
-"""Rule of each number that follows the torque loop alone."""
+"""Rule for each number that depends on the torque loop alone."""
 _OF_REACH: dict[str, Callable[[float], float]] = {
     torque_loop.DEAD_ZONE: torque_loop.dead_zone,
     torque_loop.RELEASE: torque_loop.release,
     torque_loop.REACH: torque_loop.whole_reach,
 }
-"""Rule of each number that follows the torque reach of a device."""
+"""Rule for each number that depends on the torque reach of a device."""
 
 
 _OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
@@ -333,20 +334,21 @@ _OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
     angle_loop.TOLERANCE: angle_loop.tolerance,
     angle_loop.REST_DISTANCE: angle_loop.rest_distance,
 }
-"""Rule of each number that follows torque loop and joint."""
+"""Rule for each number that depends on torque loop and joint."""
 
 _PER_PRESSURE: dict[str, tuple[Callable[[MeanChambers], float], Callable[[MeanChambers], float]]] = {
     "pressure_1": (whole_pressure, no_pressure),
     "pressure_2": (no_pressure, whole_pressure),
     "pressure_difference": (whole_pressure, whole_pressure),
 }
-"""Derivatives of a controlled pressure by both chamber pressures."""
+"""Derivatives of a controlled pressure with respect to both chamber pressures."""
 
 
 class LoopFrames(NamedTuple):
-    """The loop of what is controlled and the torque loop, as functions of rows; the rows, what fills them, components.
+    """Loop of the controlled quantity, its reach, and the torque loop, as functions of rows.
 
-    ``reach`` is the reach of the torque or pressure. ``joint`` is the joint, None where it is not known.
+    ``rows`` are the row types and ``sources`` the paths that fill them. ``joint`` is the function for the joint, None
+    unless the controller controls an angle.
     """
 
     loop: PlainFunction
@@ -358,9 +360,9 @@ class LoopFrames(NamedTuple):
 
 
 def _frames(device: Device, seen: LawSignals, controlled: str, sonic: bool) -> LoopFrames:
-    """Return the loops of a device for a law that sees what is controlled in some way.
+    """Return the loop functions of a device for a controller with given signals.
 
-    With the valve's orifice as a sonic conductance or as an area.
+    ``sonic`` selects the valve's orifice as a sonic conductance instead of an area.
     """
     valve = VALVES[device.valve.kind]
     chambers = chambers_of(device)
@@ -397,9 +399,9 @@ def _frames(device: Device, seen: LawSignals, controlled: str, sonic: bool) -> L
 def loop_terms(
     device: Device, law: ControllerKind, seen: LawSignals, controlled: str = TORQUE
 ) -> dict[str, LinkFunction]:
-    """Return what the gains of a law follow on a device, by the names of ``control.torque_loop`` and ``angle_loop``.
+    """Return the functions for default gains, by the names of ``control.torque_loop`` and ``angle_loop``.
 
-    ``controlled`` says what the law controls, ``seen`` how it sees that.
+    ``controlled`` is the controlled quantity, ``seen`` the signals of the controller.
     """
     of_area, of_sonic = (_frames(device, seen, controlled, sonic) for sonic in (False, True))
     names = {quantity.name for quantity in VALVES[device.valve.kind].quantities}

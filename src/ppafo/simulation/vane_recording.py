@@ -1,4 +1,4 @@
-"""Recording and metrics of a run of a vane alone, from its rows: most runs of many are never looked at."""
+"""Recording and metrics of a run of a vane alone, computed from its rows."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -26,7 +26,7 @@ from ppafo.simulation.scenario import Scenario, vane_motion
 
 
 def measured_vane(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
-    """Return recording and metrics of a vane, whose T_ex of equation (1) is constant, or keeps it on its path."""
+    """Return recording and metrics of a vane; T_ex of equation (1) is constant, or moves the vane along its path."""
     path, plant = vane_motion(scenario).profile, run.plant
 
     def external_torque(torque: Floats) -> Floats:
@@ -47,10 +47,10 @@ def measured(
     external_torque: Callable[[Floats], Floats],
     of_leg: Mapping[str, tuple[Floats, str]] | None = None,
 ) -> Measured:
-    """Return recording and metrics of rows (samples,) by path, at times [s].
+    """Return recording and metrics from rows (samples,) by path, at times [s].
 
-    ``external_torque`` makes T_ex of equation (1) [N m] of the torque of the actuator [N m]; ``of_leg`` are channels of
-    a leg.
+    ``external_torque`` computes T_ex of equation (1) [N m] from the actuator torque [N m]; ``of_leg`` are the channels
+    of a leg.
     """
     angle, rate = rows["state.angle"], rows["state.angular_velocity"]
     actuator = run.program.actuator
@@ -91,10 +91,10 @@ def measured(
 
 
 def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
-    """Return what a run records of its gas beside pressures, in SI with the unit, from rows (samples,) by path.
+    """Return the recorded gas channels except pressures, in SI with unit, from rows (samples,) by path.
 
-    Line pressures and the gas through the bottle's regulator where there are lines; true masses, temperatures and
-    energies where the gas has an energy balance.
+    With supply lines: line pressures and the gas through the bottle's regulator. With an energy balance: true masses,
+    temperatures and energies.
     """
     channels: dict[str, tuple[Floats, str]] = {}
     if run.lines is not None:
@@ -119,7 +119,7 @@ def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tu
 
 
 def net_torques(run: Run, rows: Mapping[str, Floats], torque: Floats) -> Floats:
-    """Net torque [N m] at each sample of a vane that another ``torque`` [N m] than loads drives. Equation (1)."""
+    """Net torque [N m] on a vane at each sample; ``torque`` [N m] is the driving torque before loads. Equation (1)."""
     angle, rate = rows["state.angle"], rows["state.angular_velocity"]
     largest: Any = run.plant.dynamic_torque
     if "friction_in_motion" in run.program.ports_with_laws:
@@ -132,7 +132,7 @@ def net_torques(run: Run, rows: Mapping[str, Floats], torque: Floats) -> Floats:
 
 
 def _with_effects(run: Run, rows: Mapping[str, Floats], function: PlainFunction, *given: Any) -> Any:
-    """Value of a function of the model at each sample, with the effects of a run in it."""
+    """Value of a model function at each sample, including the effects of a run."""
     states = {
         name: rebuilt(row, [rows[path] for path in leaf_paths(row, name)])
         for name, row in run.program.effect_states.items()

@@ -1,1 +1,1 @@
-"""Common basis of the analyses with random draws: study files, distributions, draws, runs, intervals."""
+"""Common basis of analyses with random draws: study files, distributions, draws, runs, intervals."""

@@ -1,7 +1,7 @@
-"""The layout of a study file: what is run, what is varied, how it is sampled, and what is kept of each run.
+"""Layout of a study file: configurations, varied paths, sampling, and outputs of each run.
 
-Values are texts with their unit, as in a scenario file; ``loading`` converts them, because only the path of a value
-says which unit it needs.
+Values are texts with their unit, as in a scenario file; ``loading`` converts them, because the unit depends on the path
+of a value.
 """
 
 from typing import Annotated, Any, Literal, get_args
@@ -39,7 +39,7 @@ class ConfigurationSection(StrictTable):
 
 
 class Grid(StrictTable):
-    """Values at equal distances, both ends among them."""
+    """Equally spaced values, ends included."""
 
     path: _Path
     kind: Literal["grid"]
@@ -51,7 +51,7 @@ class Grid(StrictTable):
 
 
 class Listed(StrictTable):
-    """Values one by one; crossed with every other list and grid."""
+    """Explicit list of values; combined with every value of all other lists and grids."""
 
     path: _Path
     kind: Literal["list"]
@@ -60,7 +60,7 @@ class Listed(StrictTable):
 
 
 class Uniform(StrictTable):
-    """Every value between two bounds equally likely."""
+    """Uniform distribution between two bounds."""
 
     path: _Path
     kind: Literal["uniform"]
@@ -70,7 +70,7 @@ class Uniform(StrictTable):
 
 
 class LogUniform(StrictTable):
-    """The logarithm equally likely between two bounds above 0."""
+    """Distribution whose logarithm is uniform between the logarithms of two bounds above 0."""
 
     path: _Path
     kind: Literal["log_uniform"]
@@ -80,7 +80,7 @@ class LogUniform(StrictTable):
 
 
 class Normal(StrictTable):
-    """Entry of a study file: a number drawn from a normal distribution."""
+    """Normal distribution."""
 
     path: _Path
     kind: Literal["normal"]
@@ -90,7 +90,7 @@ class Normal(StrictTable):
 
 
 class TruncatedNormal(StrictTable):
-    """A normal distribution of which only the part between two bounds is drawn; mean and deviation are of the whole."""
+    """Normal distribution truncated to two bounds; mean and standard deviation are of the untruncated one."""
 
     path: _Path
     kind: Literal["truncated_normal"]
@@ -102,7 +102,7 @@ class TruncatedNormal(StrictTable):
 
 
 class LogNormal(StrictTable):
-    """A distribution whose logarithm is normal: median, and the factor that one standard deviation is."""
+    """Log-normal distribution: median, and the factor that corresponds to one standard deviation."""
 
     path: _Path
     kind: Literal["log_normal"]
@@ -112,7 +112,7 @@ class LogNormal(StrictTable):
 
 
 class Triangular(StrictTable):
-    """A density that rises in a line to the mode and falls in a line from it."""
+    """Triangular distribution: its density rises linearly to the mode and falls linearly from there."""
 
     path: _Path
     kind: Literal["triangular"]
@@ -133,7 +133,7 @@ class Choice(StrictTable):
 
 
 class WholeNumbers(StrictTable):
-    """Equally likely whole numbers, both bounds among them; for the seed of the noise."""
+    """Discrete uniform distribution of integers, bounds included; for the seed of the noise."""
 
     path: _Path
     kind: Literal["whole_numbers"]
@@ -143,7 +143,7 @@ class WholeNumbers(StrictTable):
 
 
 class Stated(StrictTable):
-    """Normal, with value and uncertainty as the parameter set states them; a half width of 95 % is 1.96 deviations."""
+    """Normal distribution as stated by the parameter set; a 95 % half width is 1.96 standard deviations."""
 
     path: _Path
     kind: Literal["stated"]
@@ -151,7 +151,7 @@ class Stated(StrictTable):
 
 
 class SameAs(StrictTable):
-    """The value that another varied path has in the same run."""
+    """Same value as another varied path in the same run."""
 
     path: _Path
     kind: Annotated[Literal["same_as"], Field(description="optional")] = "same_as"
@@ -160,14 +160,14 @@ class SameAs(StrictTable):
 
 
 class Correlation(StrictTable):
-    """Correlation of two distributions: the correlation of their normal scores (a Gaussian copula)."""
+    """Correlation of two distributions: correlation coefficient of their normal scores (a Gaussian copula)."""
 
     between: Annotated[tuple[Text, Text], Field(strict=False, description="two paths that have distributions")]
     coefficient: Annotated[float, Field(gt=-1.0, lt=1.0)]
 
 
 class SamplingSection(StrictTable):
-    """Sampling: number and method of the draws; the whole sample is taken at every point of the grid."""
+    """Sampling: number and method of the draws; every point of the grid gets the whole sample."""
 
     method: Literal["random", "latin_hypercube", "sobol"]
     runs: Annotated[int, Field(ge=1, le=MAXIMUM_RUNS, description="draws; each is run in every configuration")]
@@ -175,7 +175,7 @@ class SamplingSection(StrictTable):
 
 
 class OutputsSection(StrictTable):
-    """Section of a study file: which metrics, traces and bands are kept of every run."""
+    """Section of a study file: metrics, traces and bands to keep of every run."""
 
     metrics: Annotated[Texts | Literal["all"], Field(description="names of metrics, or 'all'")] = ()
     trajectories: Annotated[Texts, Field(description="channels kept for every run")] = ()

@@ -1,6 +1,6 @@
-"""Distributions as functions from uniform numbers in (0, 1) to values in SI units, the inverses of their fractions.
+"""Distributions as quantile functions, from probabilities in (0, 1) to values in SI units.
 
-Each one has ``values(uniform)``, which takes and returns an array of any shape.
+Each class has ``values(uniform)``, which takes and returns an array of any shape.
 """
 
 import math
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 
 class Distribution(Protocol):
-    """A distribution from which uniform numbers are turned into values."""
+    """Distribution given by its quantile function."""
 
     def values(self, uniform: Floats) -> Floats:
         """Return the quantile [SI] at each probability."""
@@ -25,7 +25,7 @@ class Distribution(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class UniformBetween:
-    """A uniform distribution between two bounds [SI]."""
+    """Uniform distribution between two bounds [SI]."""
 
     minimum: float
     maximum: float
@@ -37,7 +37,7 @@ class UniformBetween:
 
 @dataclass(frozen=True, slots=True)
 class LogUniformBetween:
-    """The logarithm equally likely between two bounds above 0."""
+    """Distribution whose logarithm is uniform between two bounds above 0."""
 
     minimum: float
     maximum: float
@@ -49,7 +49,7 @@ class LogUniformBetween:
 
 @dataclass(frozen=True, slots=True)
 class NormalAround:
-    """A normal distribution by mean and standard deviation [SI]."""
+    """Normal distribution with mean and standard deviation [SI]."""
 
     mean: float
     standard_deviation: float
@@ -63,7 +63,7 @@ class NormalAround:
 
 @dataclass(frozen=True, slots=True)
 class NormalBetween:
-    """The part between two bounds of a normal with mean and standard deviation."""
+    """Normal distribution, truncated to two bounds; mean and standard deviation are of the untruncated one."""
 
     mean: float
     standard_deviation: float
@@ -71,7 +71,7 @@ class NormalBetween:
     maximum: float
 
     def values(self, uniform: Floats) -> Floats:
-        """Return the quantile [SI] at each probability; computed in the tail that keeps its digits."""
+        """Return the quantile [SI] at each probability, computed in the tail with the smaller rounding error."""
         from scipy.special import ndtr, ndtri
 
         # Above the mean, 1 - ndtr would cancel: the upper tail is the lower tail of the mirrored distribution.
@@ -86,7 +86,7 @@ class NormalBetween:
 
 @dataclass(frozen=True, slots=True)
 class LogNormalAround:
-    """Log-normal with its median and the factor that one standard deviation is."""
+    """Log-normal distribution: median, and the factor that corresponds to one standard deviation."""
 
     median: float
     factor: float
@@ -100,7 +100,7 @@ class LogNormalAround:
 
 @dataclass(frozen=True, slots=True)
 class ShiftedDistribution:
-    """Another distribution less a number, as an absolute pressure less the atmosphere."""
+    """Another distribution minus a constant ``zero``, such as an absolute pressure minus the atmospheric pressure."""
 
     other: Distribution
     zero: float
@@ -112,7 +112,7 @@ class ShiftedDistribution:
 
 @dataclass(frozen=True, slots=True)
 class TriangularBetween:
-    """A density that rises to the mode and falls from it."""
+    """Triangular distribution: its density rises linearly to the mode and falls linearly from there."""
 
     minimum: float
     mode: float
@@ -129,7 +129,7 @@ class TriangularBetween:
 
 @dataclass(frozen=True, slots=True)
 class OneOf:
-    """Discrete distribution; ``cumulated`` are the cumulated weights, the last one 1."""
+    """Discrete distribution; ``cumulated`` are the cumulative weights, of which the last is 1."""
 
     choices: tuple[float, ...]
     cumulated: tuple[float, ...]
@@ -143,25 +143,25 @@ class OneOf:
 
 @dataclass(frozen=True, slots=True)
 class WholeNumbersBetween:
-    """Equally likely whole numbers, both ends among them."""
+    """Discrete uniform distribution of integers, ends included."""
 
     minimum: float
     maximum: float
 
     def values(self, uniform: Floats) -> Floats:
-        """Return the value at each probability of the cumulated weights."""
+        """Return the quantile, an integer, at each probability."""
         return np.minimum(np.floor(self.minimum + (self.maximum - self.minimum + 1.0) * uniform), self.maximum)
 
 
 FEWEST_EFFECTIVE = 50.0
-"""Draws that must carry a mean before its interval by the central limit theorem is believed to half a percent."""
+"""Smallest effective number of draws for which a normal interval is accurate to half a percent."""
 
 
 def replicates_interval(values: Floats, replicates: int, confidence: float) -> ConfidenceInterval:
-    """Return the mean with Student's interval from the spread between replicates.
+    """Return the mean with Student's confidence interval from the spread between replicates.
 
-    Value j belongs to replicate j % ``replicates``; nan has no value. Without a value in every replicate the ends are
-    infinite.
+    Value j belongs to replicate j % ``replicates``; nan stands for a missing value. If a replicate has no value, the
+    interval is infinite.
     """
     from scipy.special import stdtrit
 
@@ -176,10 +176,10 @@ def replicates_interval(values: Floats, replicates: int, confidence: float) -> C
 
 
 def floored_interval(values: Floats, replicates: int, confidence: float) -> ConfidenceInterval:
-    """Return the mean with the wider of two intervals: spread between replicates, and as many independent draws.
+    """Return the mean with the wider of two intervals: from the spread between replicates, and for independent draws.
 
-    Evenly placed draws make replicates agree on what all of them miss: where rare values decide, the spread between
-    replicates is smaller than the error, and nobody knows beforehand that none decide.
+    Evenly spaced draws make replicates agree in the values that all of them miss: if rare values dominate, the spread
+    between replicates is smaller than the error, and it is not known beforehand that none dominates.
     """
     from scipy.special import ndtri
 
@@ -194,9 +194,9 @@ def floored_interval(values: Floats, replicates: int, confidence: float) -> Conf
 
 
 def jackknife_reach(left_out: Floats, confidence: float) -> Floats:
-    """Return the half width of the interval of an estimate from independent replicates, by Student's distribution.
+    """Return the half width of the interval of an estimate from independent replicates (Student's distribution).
 
-    ``left_out`` (replicates, ...) is the estimate without each of them in turn (Tukey's jackknife), so that an
+    ``left_out`` (replicates, ...) is the estimate without each replicate in turn (Tukey's jackknife), so that an
     estimate may be a ratio or a quantile of all replicates together.
     """
     from scipy.special import stdtrit
@@ -208,10 +208,10 @@ def jackknife_reach(left_out: Floats, confidence: float) -> Floats:
 
 
 def effective_sample_size(values: Floats) -> float:
-    """Return how many draws determine the mean: their number over the square of their skewness, at most their number.
+    """Return the effective number of draws for the mean: their number divided by the squared skewness, if above 1.
 
-    An interval by the central limit theorem misses the mean by about a quarter of the inverse of this more often than
-    it says (Hall, The Bootstrap and Edgeworth Expansion, 1992, section 2.6). 1 where a single draw decides.
+    The coverage error of a confidence interval by the central limit theorem is about a quarter of the inverse of this
+    number (Hall, The Bootstrap and Edgeworth Expansion, 1992, section 2.6). The number is 1 if a single draw dominates.
     """
     away = values - np.mean(values)
     square = float(np.mean(away**2))
@@ -222,18 +222,18 @@ def effective_sample_size(values: Floats) -> float:
 
 
 def is_carried(effective: float, draws: int) -> bool:
-    """Tell whether enough of some draws determine a mean for its interval to be believed.
+    """Tell whether the effective number of draws is large enough for a reliable confidence interval of the mean.
 
-    Of few draws half must: an interval without width, in which all are the same, is carried by all.
+    For few draws, half of their number suffices: if all values are equal, the interval has no width and is reliable.
     """
     return effective >= min(FEWEST_EFFECTIVE, 0.5 * draws)
 
 
 def noise_interval(values: Floats, others: Floats, confidence: float) -> ConfidenceInterval | None:
-    """Return the fraction of the variance that is due to noise, with its interval; None where nothing varies.
+    """Return the fraction of the variance due to noise, with its confidence interval; None if nothing varies.
 
-    ``others`` (draws,) are the first of the draws of ``values`` with an independent noise stream: half the mean square
-    of the difference is the variance within a draw. The interval of this ratio of means is by the delta method.
+    ``others`` (draws,) repeats the first draws of ``values`` with an independent noise stream: half the mean square of
+    the difference is the variance within a draw. The interval of this ratio of means is by the delta method.
     """
     from scipy.special import ndtri
 
@@ -255,7 +255,7 @@ def noise_interval(values: Floats, others: Floats, confidence: float) -> Confide
 
 
 def fraction_interval(hits: int, draws: int, confidence: float) -> ConfidenceInterval:
-    """Return a fraction with the exact interval of Clopper and Pearson (1934)."""
+    """Return a fraction with the exact confidence interval of Clopper and Pearson (1934)."""
     from scipy.special import betaincinv
 
     tail = 0.5 - 0.5 * confidence
@@ -265,10 +265,11 @@ def fraction_interval(hits: int, draws: int, confidence: float) -> ConfidenceInt
 
 
 def share_interval(hits: Floats, replicates: int, confidence: float) -> ConfidenceInterval:
-    """Return the fraction of draws with a property, and its interval from the spread between replicates.
+    """Return the fraction of draws with a property, with a confidence interval from the spread between replicates.
 
-    ``hits`` (draws,) is 1 where a draw has it, 0 where not, nan where that is not known. Where fewer than two draws for
-    each replicate have it, or have it not, the spread says too little: the interval is exact for independent draws.
+    ``hits`` (draws,) is 1 for a draw with the property, 0 without, nan if unknown. If fewer than two draws per
+    replicate have the property, or lack it, the spread is not reliable, and the interval is the exact one for
+    independent draws.
     """
     known = hits[np.isfinite(hits)]
     count = int(np.count_nonzero(known))
@@ -280,10 +281,10 @@ def share_interval(hits: Floats, replicates: int, confidence: float) -> Confiden
 
 
 def quantile_interval(values: Floats, share: float, confidence: float) -> ConfidenceInterval:
-    """Return a quantile with the interval of two order statistics, which holds for any distribution.
+    """Return a quantile with a confidence interval between two order statistics, which is valid for any distribution.
 
-    The number of draws below the quantile is binomial (David and Nagaraja, Order Statistics, section 7.1). An end is
-    infinite where there are too few draws for it.
+    The number of draws below the quantile is binomial (David and Nagaraja, Order Statistics, section 7.1). An end of
+    the interval is infinite if there are too few draws.
     """
     from scipy.stats import binom
 
@@ -298,5 +299,5 @@ def quantile_interval(values: Floats, share: float, confidence: float) -> Confid
 
 
 def fraction_text(fraction: ConfidenceInterval) -> str:
-    """Return a fraction with its interval in percent."""
+    """Return a fraction with its confidence interval in percent."""
     return f"{100.0 * fraction.value:.3g} % [{100.0 * fraction.low:.3g}, {100.0 * fraction.high:.3g}]"

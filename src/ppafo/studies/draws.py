@@ -16,19 +16,19 @@ from ppafo.studies.study import Configuration, RandomValue, SamplingPlan, Study,
 from ppafo.wording import nearest_name
 
 FEWEST_DRAWS, MAXIMUM_DRAWS = 32, 2**26
-"""Two in each replicate, whose spread needs them, and what Sobol replicates are even for."""
+"""Smallest number of draws, two per replicate, and largest number, for which Sobol replicates are balanced."""
 # Few enough that each keeps the evenness of a Sobol sequence, enough for Student's interval (2.13 for 95 %).
 REPLICATES = 16
-"""Independent scrambles of the Sobol sequence among which draws are dealt out in turn."""
+"""Number of independent scrambles of the Sobol sequence to which draws are assigned in turn."""
 Columns = dict[str, Floats]
 
 
 @dataclass(frozen=True, slots=True)
 class Uncertainty:
-    """Distributions of some paths, and the Cholesky factor of the correlation of their normal scores (None: none).
+    """Distributions of some paths, and Cholesky factor of the correlation of their normal scores (None: uncorrelated).
 
-    ``same`` has the path that a path follows, by path. Values of the paths in ``gauge`` count from the atmosphere of
-    their run.
+    ``same`` maps a path to the path whose draws it shares. Paths in ``gauge`` hold gauge pressures relative to the
+    atmosphere of each run.
     """
 
     drawn: tuple[RandomValue, ...]
@@ -38,25 +38,25 @@ class Uncertainty:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """The uncertain paths."""
+        """Paths with a distribution."""
         return tuple(drawn.path for drawn in self.drawn)
 
     def columns(self, uniform: Floats) -> Columns:
-        """Return values [SI] (draws,) by path for uniform numbers in (0, 1), shape (draws, paths)."""
+        """Return values [SI] (draws,) by path from uniform numbers in (0, 1), shape (draws, paths)."""
         fractions = uniform if self.scores is None else correlate(uniform, self.scores)
         values = {drawn.path: drawn.distribution.values(fractions[:, row]) for row, drawn in enumerate(self.drawn)}
         return with_followers(values, self.same)
 
     def random_columns(self, first: int, count: int, seed: int) -> Columns:
-        """Return independent draws number ``first`` to ``first + count - 1`` of the stream that ``seed`` names."""
+        """Return independent draws ``first`` to ``first + count - 1`` of the sequence given by ``seed``."""
         sample = SamplingPlan("random", first + count, seed)
         return self.columns(uniform_numbers(sample, len(self.drawn), first, count))
 
     def replicated_columns(self, first: int, count: int, seed: int) -> Columns:
-        """Return draws number ``first`` to ``first + count - 1`` of randomised Sobol replicates.
+        """Return draws ``first`` to ``first + count - 1`` of randomised Sobol replicates.
 
-        Draw j is number j // REPLICATES of the scramble j % REPLICATES. The scrambles are independent, so that the
-        spread between their means says how well a mean is known (Owen, 1997).
+        Draw j is point j // REPLICATES of scramble j % REPLICATES. The scrambles are independent, so that the spread
+        between their means estimates the error of a mean (Owen, 1997).
         """
         # Dealt out in turn: any number of draws from the start has all replicates to within one draw.
         numbers = np.arange(first, first + count)
@@ -70,7 +70,7 @@ class Uncertainty:
         return self.columns(uniform)
 
     def with_noise_of(self, scenarios: Iterable[Scenario]) -> "Uncertainty":
-        """Return the uncertainty with a noise stream for each draw as well, where any of some scenarios is noisy."""
+        """Return the uncertainty with an additional noise stream for each draw, if any of the scenarios has noise."""
         drawn, scores = with_noise(self.drawn, self.scores, scenarios, self.paths)
         return replace(self, drawn=drawn, scores=scores)
 
@@ -86,9 +86,9 @@ def replicate_seed(seed: int, replicate: int) -> int:
 
 
 def seeds_of_noise(scenarios: Iterable[Scenario], paths: Sequence[str], first: int, count: int, seed: int) -> Floats:
-    """Return what names streams of noise (streams,), from number ``first`` on of the stream that ``seed`` names.
+    """Return the seeds of ``count`` noise streams (streams,), from number ``first`` on, of the sequence of ``seed``.
 
-    None where no controller of the scenarios receives noise, or where the noise is among the ``paths`` that vary.
+    The array is empty if no controller of the scenarios receives noise, or if the noise is among the varied ``paths``.
     """
     noise = Uncertainty(with_noise((), None, scenarios, paths)[0])
     return noise.random_columns(first, count, seed)[NOISE] if noise.has_noise else np.zeros(0)
@@ -100,7 +100,7 @@ def study_of(
     draws: int | None = None,
     seed: int | None = None,
 ) -> Study:
-    """Return a study as it is, or as ``load_study`` reads a name, file or data; StudyError for both at once."""
+    """Return a loaded study unchanged, else load a name, file or data; StudyError for changes of a loaded one."""
     if not isinstance(study, Study):
         return load_study(study, overrides, draws=draws, seed=seed)
     if tuple(overrides) or draws is not None or seed is not None:
@@ -109,7 +109,7 @@ def study_of(
 
 
 def uncertainty_of(study: Study) -> Uncertainty:
-    """Return the distributions of a study; StudyError where it has none, or has a grid, which has no probability."""
+    """Return the distributions of a study; StudyError if it has none, or has a grid, which has no probabilities."""
     # A grid has values and no probabilities: a mean over it would be of the grid, not of the device.
     if study.axes:
         raise StudyError(
@@ -122,7 +122,7 @@ def uncertainty_of(study: Study) -> Uncertainty:
 
 
 def uncertainty_in(study: Study, configuration: Configuration) -> Uncertainty:
-    """Return the distributions that hold in one configuration; StudyError where none does."""
+    """Return the distributions that apply in one configuration; StudyError if none does."""
     whole = uncertainty_of(study)
     kept = [row for row, drawn in enumerate(whole.drawn) if study.varies(drawn.path, configuration.name)]
     if not kept:
@@ -141,7 +141,7 @@ def uncertainty_in(study: Study, configuration: Configuration) -> Uncertainty:
 
 
 def choose_configuration(study: Study, name: str | None) -> Configuration:
-    """Return a configuration by its name; without a name the only one. StudyError where that leaves a choice."""
+    """Return a configuration by name, or the only one if ``name`` is None; StudyError if there are several."""
     names = [configuration.name for configuration in study.configurations]
     if name is None:
         if len(names) > 1:
@@ -156,9 +156,9 @@ def choose_configuration(study: Study, name: str | None) -> Configuration:
 def drawn_in(
     study: Study | str | Path | Mapping[str, Any], overrides: Iterable[str], name: str | None, independent: bool = False
 ) -> tuple[Study, Configuration, Uncertainty]:
-    """Return a study, one of its configurations, and what is drawn in that, the noise of the sensors with it.
+    """Return a study, one of its configurations, and the distributions in this configuration, with sensor noise.
 
-    ``independent`` leaves the correlations out.
+    ``independent`` omits the correlations.
     """
     chosen = study_of(study, overrides)
     base = choose_configuration(chosen, name)

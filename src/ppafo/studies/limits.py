@@ -1,4 +1,4 @@
-"""Metrics that a question names, and the levels, differences, limits and fractions that it states of them."""
+"""Metrics of an analysis, and texts for their levels, differences, limits and fractions."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ _DIFFERENCES = {"Pa": "Pa_d", "-": ""}
 
 
 def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
-    """Refuse a metric that does not exist, or that needs what the scenario has not."""
+    """Raise StudyError for a metric that does not exist or that the scenario cannot have."""
     for name in metrics:
         if name not in METRICS:
             known = offered(scenario)
@@ -32,25 +32,25 @@ def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
 
 
 def check_fraction(value: float, name: str, least: float = 0.0) -> None:
-    """Refuse a number that is below the least one, or not less than 1."""
+    """Raise StudyError for a number below ``least``, or not below 1."""
     if not least <= value < 1.0:
         raise StudyError(f"{name} = {value!r}: must be at least {least:g} and less than 1")
 
 
 CONFIDENCE = "confidence", 0.5
-"""Name and lower limit of a confidence for ``check_fraction``: below a half it is a mistake, such as 0.05."""
+"""Name and lower limit of a confidence level for ``check_fraction``; a level below 0.5, such as 0.05, is a mistake."""
 
 
 def atmosphere_of(scenario: Scenario, varied: Collection[str]) -> float | None:
-    """Return the pressure [Pa absolute] from which gauge pressures of a scenario count; None where it is varied."""
+    """Return the atmospheric pressure [Pa absolute] for gauge pressures of a scenario; None if it is varied."""
     return None if ATMOSPHERE_PATH in varied else scenario.device.supply.atmospheric_pressure
 
 
 def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> float:
-    """Return a value of a metric in SI; gauge pressure counts from ``atmosphere`` [Pa absolute].
+    """Return a value of a metric in SI; gauge pressures are relative to ``atmosphere`` [Pa absolute].
 
-    StudyError, whose message ``what`` begins, where the unit does not fit, and for a gauge pressure where the runs have
-    no one atmosphere, which is None then.
+    Raises StudyError, prefixed with ``what``, for a wrong unit, and for a gauge pressure if ``atmosphere`` is None
+    because it varies between the runs.
     """
     atmospheres = (0.0, STANDARD_ATMOSPHERE) if atmosphere is None else (atmosphere,)
     # The same under two atmospheres: an absolute pressure, or no pressure at all.
@@ -78,7 +78,7 @@ def _number(text: str, unit: str, what: str, atmosphere: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class MetricLimit:
-    """A metric with the largest value that it may have [SI], or the smallest where not ``is_most``, and its text."""
+    """Limit of a metric [SI] and its text: an upper limit if ``is_most``, else a lower one."""
 
     metric: str
     limit: float
@@ -86,10 +86,10 @@ class MetricLimit:
     text: str
 
     def is_kept(self, values: Any) -> Any:
-        """Return whether, or where, values of the metric [SI] keep it; nan, of a run without a value, does not."""
+        """Return elementwise whether values of the metric [SI] satisfy the limit; False for nan (no value)."""
         return values <= self.limit if self.is_most else values >= self.limit
 
     @property
     def words(self) -> str:
-        """The limit as it is written, after 'at most' or 'at least'."""
+        """Limit as written, after 'at most' or 'at least'."""
         return f"at {'most' if self.is_most else 'least'} {self.text}"

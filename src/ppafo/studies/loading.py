@@ -107,7 +107,7 @@ def load_study(
 
 @dataclass(frozen=True, slots=True)
 class StudySource:
-    """Source of a study: its name in messages, folder of its relative paths, and its bytes, None for data."""
+    """Source of a study: its name in messages, folder of its relative paths, and text in bytes, None for data."""
 
     file: str
     folder: Path
@@ -115,7 +115,7 @@ class StudySource:
 
 
 def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], StudySource]:
-    """Return a document that may be changed, and where it is from: a file of a kind, by name or path, or data."""
+    """Return a document that may be modified, and its source: a file of a kind, by name or path, or data."""
     if isinstance(named, Mapping):
         kind.check_depth(named, kind.noun)
         return copy.deepcopy(dict(named)), StudySource(kind.noun, Path(), b"")
@@ -124,7 +124,7 @@ def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[
 
 
 def _build(parsed: declared.StudyFile, document: dict[str, Any], source: StudySource) -> Study:
-    """Return the study of a file, with everything in SI units; StudyError for what cannot be run as it is written.
+    """Return the study of a file, with everything in SI units; StudyError for a study that cannot be run.
 
     ``document`` is the file as plain data, which the study keeps.
     """
@@ -175,7 +175,7 @@ def _build(parsed: declared.StudyFile, document: dict[str, Any], source: StudySo
 
 
 def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Configuration]) -> None:
-    """Refuse a value that is set in a configuration in which it, or another form of it, also varies."""
+    """Raise an error for a value that is set in a configuration in which the value (in any form) also varies."""
     for each, loaded in zip(parsed.configurations, configurations, strict=True):
         given = read_overrides(each.overrides, StudyError)
         override = override_set(given, StudyError, valve=loaded.scenario.device.valve_name)
@@ -196,14 +196,14 @@ def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Co
 
 
 def _configuration(entry: declared.ConfigurationSection, folder: Path, overrides: Sequence[str] = ()) -> Configuration:
-    """Return a configuration whose scenario has its own overrides and, over these, others."""
+    """Return a configuration; ``overrides`` apply on top of the configuration's own."""
     with refused_as(StudyError, f"configuration '{entry.name}'", ScenarioError, ParameterError, DataError):
         scenario = load_scenario(placed(entry.scenario, folder), entry.overrides)
         return Configuration(entry.name, reloaded(scenario, overrides) if overrides else scenario)
 
 
 def _check_requests(parsed: declared.StudyFile) -> None:
-    """Refuse a study that varies nothing, or one path twice, or the length of what is kept over time."""
+    """Raise an error for a study that varies nothing, or one path twice, or the duration of runs with traces."""
     outputs = parsed.outputs
     if not parsed.vary and len(parsed.configurations) == 1:
         raise StudyError("varies nothing: give at least one [[vary]] or a second configuration")
@@ -219,7 +219,7 @@ def _check_requests(parsed: declared.StudyFile) -> None:
 def _common_path(
     entry: declared.Varied, configurations: Sequence[Configuration], parsed: declared.StudyFile
 ) -> VariedPath:
-    """Return the path with its declaration, which must be the same in all configurations that vary it."""
+    """Return a varied path with its declaration, which must be the same in all its configurations."""
     names = [configuration.name for configuration in configurations]
     for name in entry.only:
         if name not in names:
@@ -246,7 +246,7 @@ def _common_path(
 def _axis_or_drawn(
     entry: declared.Varied, varied_path: VariedPath, configurations: Iterable[Configuration]
 ) -> Axis | RandomValue:
-    """Return the values of a grid or a list, or the distribution of a path, in SI units."""
+    """Return the values of a grid or list, or the distribution of a path, in SI units."""
     with refused_as(StudyError, f"vary '{entry.path}'", UnitError):
         if not isinstance(entry, declared.Stated):
             return axis_or_distribution(entry, varied_path)
@@ -263,7 +263,7 @@ def _axis_or_drawn(
 
 
 def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, VariedPath]) -> dict[str, str]:
-    """Return the path that a path follows, by path; refuses one that does not vary, or has another unit."""
+    """Return the followed path for each path that shares draws; error if it does not vary or has another unit."""
     independent = [entry.path for entry in parsed.vary if not isinstance(entry, declared.SameAs)]
     followed: dict[str, str] = {}
     for entry in parsed.vary:
@@ -282,7 +282,7 @@ def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, Varie
 
 
 def _units(varied_paths: Mapping[str, VariedPath], drawn: Iterable[RandomValue]) -> dict[str, str]:
-    """Return the unit in SI of all that varies, by path; the noise, which no [[vary]] has, is a plain number."""
+    """Return the SI unit of each varied path; the noise, which has no [[vary]] table, is a plain number."""
     units = {path: varied.quantity.unit or "-" for path, varied in varied_paths.items()}
     return units | {number.path: "-" for number in drawn if number.path not in units}
 
@@ -293,7 +293,7 @@ def _varying(entry: declared.Varied, configurations: Iterable[Configuration]) ->
 
 
 def _scores(parsed: declared.StudyFile, drawn: Sequence[RandomValue]) -> Factor | None:
-    """Return the lower Cholesky factor of the correlation of the normal scores; None where none are correlated."""
+    """Return the lower Cholesky factor of the correlation of the normal scores; None without correlations."""
     if not parsed.correlations:
         return None
     paths = [number.path for number in drawn]
@@ -324,7 +324,7 @@ def _scores(parsed: declared.StudyFile, drawn: Sequence[RandomValue]) -> Factor 
 
 
 def _sample(parsed: declared.StudyFile, drawn: Sequence[RandomValue]) -> SamplingPlan:
-    """Return how the distributions are drawn; without any, one run at each point of the grid."""
+    """Return the sampling plan of the distributions; without distributions, one run at each point of the grid."""
     if not drawn:
         if parsed.sample is not None:
             raise StudyError("[sample] is given, but nothing has a distribution; omit it")

@@ -1,15 +1,15 @@
-"""Uniform numbers of the draws from ``first`` on, in any order of asking: draw number j is always the same.
+"""Uniform numbers of the draws from ``first`` on: draw number j is the same in any order of requests.
 
 Random numbers come from Philox, a generator that can start anywhere (Salmon et al., SC 2011). SciPy's Sobol sequence
-can only be wound forward, which is kept cheap by remembering where it stands. SciPy's Latin hypercube holds all draws
-in memory at once; here the order of the strata is a permutation of 0 .. n - 1 that gives the place of one number
-without making the others: a Feistel network on the next even number of bits, followed until the result is below n
-(cycle walking; Black and Rogaway, CT-RSA 2002). Words are mixed as in SplitMix64 (Steele et al., OOPSLA 2014).
+can only be advanced forward, so its engines and their positions are cached. SciPy's Latin hypercube stores all draws in
+memory at once; here the order of the strata is a permutation of 0 .. n - 1 that maps one number without computing the
+others: a Feistel network on the next even number of bits, applied repeatedly until the result is below n (cycle
+walking; Black and Rogaway, CT-RSA 2002). Words are mixed as in SplitMix64 (Steele et al., OOPSLA 2014).
 
-Correlations hold for normal scores: a Gaussian copula, which leaves each distribution as it was.
+Correlations apply to normal scores: a Gaussian copula, which leaves each distribution unchanged.
 
 A scenario has one seed, so that a single run can be repeated. A statement about a device must not depend on that one
-realisation: where sensors are noisy, every draw gets a noise stream of its own.
+noise realisation: with noisy sensors, every draw gets a noise stream of its own.
 """
 
 import threading
@@ -29,9 +29,9 @@ Factor = tuple[tuple[float, ...], ...]
 _ROUNDS = 6
 """Rounds of a Feistel network: four are a pseudo-random permutation (Luby and Rackoff, 1988), six leave a margin."""
 _WORDS_PER_STEP = 4
-"""Words of 64 bits that a step of Philox makes."""
+"""Number of 64-bit words from one step of Philox."""
 _FRACTION_BITS = 53
-"""Bits of a float's fraction, with the one that is not stored."""
+"""Bits of a float's significand, including the implicit one."""
 _SOBOL_BITS = 32
 """Bits of a number of the Sobol sequence, which repeats after 2**32 draws."""
 MAXIMUM_SOBOL_DIMENSIONS = 21201
@@ -74,14 +74,14 @@ def uniform_numbers(sample: SamplingPlan, dimensions: int, first: int, count: in
 
 
 _ENGINES: dict[tuple[int, int], Any] = {}
-"""Scipy's Sobol engines by seed and dimensions, wound to where they were last used."""
+"""SciPy's Sobol engines by seed and dimensions, at their last position."""
 _LOCK = threading.Lock()
 _MAXIMUM_ENGINES = 64
-"""Engines that are remembered; the one that was made first goes first."""
+"""Number of cached engines; the oldest one is dropped first."""
 
 
 def permute(numbers: Words, size: int, seed: int, stream: int) -> Words:
-    """Return the places of numbers below ``size``; another seed or stream is another permutation."""
+    """Return the images of numbers below ``size`` under a permutation, determined by seed and stream."""
     half = np.uint64(max(1, -(-(size - 1).bit_length() // 2)))
     keys = _mix(np.arange(1, _ROUNDS + 1, dtype=np.uint64) + np.uint64((seed << 24) + (stream << 8)))
     mask = (np.uint64(1) << half) - np.uint64(1)
@@ -103,11 +103,11 @@ def _mix(words: Words) -> Words:
 
 
 _LEAST_SPREAD = 1.0e-6
-"""Standard deviation of a normal score that is left, the others given, from which it is not one of them once more."""
+"""Smallest conditional standard deviation of a normal score, given the others, for a positive definite correlation."""
 
 
 def cholesky_factor(matrix: Floats) -> Factor | None:
-    """Return the lower factor of a correlation, row by row; None where it is not positive definite beyond rounding."""
+    """Return the lower Cholesky factor of a correlation matrix, row by row; None if not positive definite."""
     try:
         factor = np.linalg.cholesky(matrix)
     except np.linalg.LinAlgError:
@@ -120,7 +120,7 @@ def cholesky_factor(matrix: Floats) -> Factor | None:
 def correlate(uniform: Floats, factor: Factor) -> Floats:
     """Return uniform numbers of the same shape (draws, paths) with correlated normal scores.
 
-    Summed term by term: a matrix product may round otherwise for another number of draws.
+    Sums are term by term: the rounding of a matrix product may depend on the number of draws.
     """
     from scipy.special import ndtr, ndtri
 
@@ -137,18 +137,18 @@ def correlate(uniform: Floats, factor: Factor) -> Floats:
 
 
 NOISE = "sensors.seed"
-"""The path by which a run is given its realisation of the noise."""
+"""Path of the seed of a run's noise."""
 _NOISE_LEVELS = ("sensors.angle_noise", "sensors.pressure_noise", "sensors.force_noise")
 _KEY = 1
-"""Seed of the permutation that makes other seeds of noise."""
+"""Seed of the permutation from which other noise seeds follow."""
 
 
 def with_noise(
     drawn: tuple[RandomValue, ...], scores: Factor | None, scenarios: Iterable[Scenario], paths: Sequence[str]
 ) -> tuple[tuple[RandomValue, ...], Factor | None]:
-    """Return distributions and factor with the noise last among them, independent of the others, if there is any.
+    """Return distributions and Cholesky factor with independent sensor noise appended, if any scenario has noise.
 
-    ``paths`` are all that vary; a seed among them is left as it is.
+    ``paths`` are all varied paths; a seed among them is left unchanged.
     """
     # An open-loop controller uses no sensor; levels may be arrays (runs,).
     closed = [scenario for scenario in scenarios if not scenario.controller.is_open_loop]
@@ -166,15 +166,15 @@ def with_noise(
 
 
 NOISE_DRAWS = 512
-"""Draws that are run again with other noise, at most: its fraction of the variance is then known to some percent."""
+"""Largest number of draws repeated with other noise; enough to know the noise fraction of the variance to some percent."""
 
 
 def with_new_noise(columns: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Return the first ``NOISE_DRAWS`` draws, each with another noise stream and all else as it was."""
+    """Return the first ``NOISE_DRAWS`` draws, each with another noise stream and otherwise unchanged."""
     first = {path: column[:NOISE_DRAWS] for path, column in columns.items()}
     return first | {NOISE: other_noise(first[NOISE])}
 
 
 def other_noise(seeds: Floats) -> Floats:
-    """Return for each seed the seed of another stream."""
+    """Return the seed of another noise stream for each seed."""
     return permute(seeds.astype(np.uint64), LARGEST_SEED + 1, _KEY, 0).astype(np.float64)

@@ -1,4 +1,4 @@
-"""A study as frozen values in SI units: what it keeps, its runs, grid points and draws, and its configurations."""
+"""Study as frozen values in SI units: configurations, grid points, draws, runs, and outputs."""
 
 import math
 import re
@@ -23,9 +23,11 @@ from ppafo.wording import first_twice, nearest_name
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """Metrics, channels kept for every run and as bands, time between two samples [s], quantiles from 0 to 1.
+    """Outputs of a study.
 
-    ``errors`` is true where the estimated error of each metric is kept as well.
+    ``metrics`` are the names of metrics, ``trajectories`` the channels kept for every run, ``bands`` the channels kept
+    as quantile bands; ``every`` is the time between two samples [s], ``quantiles`` are from 0 to 1. ``errors`` is true
+    if the estimated error of each metric is kept as well.
     """
 
     metrics: tuple[str, ...]
@@ -37,7 +39,7 @@ class Outputs:
 
     @property
     def traces(self) -> tuple[str, ...]:
-        """Every channel that is needed over time, each once."""
+        """Every channel needed over time, each once."""
         return tuple(dict.fromkeys((*self.trajectories, *self.bands)))
 
 
@@ -82,7 +84,7 @@ def valid_outputs(outputs: declared.OutputsSection, scenarios: Sequence[Scenario
 
 
 def _check_names(key: str, requested: Sequence[str], known: Collection[str], shown: Collection[str] = ()) -> None:
-    """Refuse an unknown or repeated name; ``shown`` are the names that apply here, by default all that are known."""
+    """Raise an error for an unknown or repeated name; ``shown`` are the applicable names, by default all known ones."""
     for name in requested:
         if name not in known:
             what, apply = "metric" if key == "metrics" else "channel", shown or known
@@ -98,7 +100,7 @@ SamplingMethod = Literal["random", "latin_hypercube", "sobol"]
 
 @dataclass(frozen=True, slots=True)
 class Configuration:
-    """A base scenario under the name that tables and figures give it."""
+    """Base scenario with its name in tables and figures."""
 
     name: str
     scenario: Scenario
@@ -106,7 +108,7 @@ class Configuration:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """The values of a grid or list [SI], in the order of the study file."""
+    """Values of a grid or list [SI], in the order of the study file."""
 
     path: str
     values: tuple[float, ...]
@@ -114,7 +116,7 @@ class Axis:
 
 @dataclass(frozen=True, slots=True)
 class RandomValue:
-    """A path and the distribution of its values [SI]."""
+    """Path, and distribution of its values [SI]."""
 
     path: str
     distribution: Distribution
@@ -122,7 +124,7 @@ class RandomValue:
 
 @dataclass(frozen=True, slots=True)
 class SamplingPlan:
-    """Method, number of draws and seed; one draw, without a method, where nothing has a distribution."""
+    """Method, number of draws and seed; one draw, without a method, for a study without distributions."""
 
     method: SamplingMethod | None
     runs: int
@@ -130,20 +132,21 @@ class SamplingPlan:
 
 
 NO_SAMPLE = "'sample' is missing: distributions need [sample] with method and runs"
-"""Refusal of a study that is to be drawn, and does not say how often."""
+"""Message for a study that is to be drawn but has no number of draws."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Study:
     """Configurations, each run at every grid point with every draw.
 
-    ``same`` has the path that a path follows, by path; ``units`` the SI unit of every varied path, ``only`` the
-    configurations of the paths that do not vary in all; values of the paths in ``gauge`` count from the atmosphere of
-    their run [Pa], all others are absolute; ``scores`` is the lower Cholesky factor of the correlation of the
-    normal scores, None where there is none; ``runs_of_chunk`` is how many runs are computed together, None for a
-    choice that keeps memory small; ``document`` is the study file as plain data, with what was changed on the command
-    line; ``text`` the bytes of the file, none where the study came as data. ``given`` has the unit in which the values
-    of a path were given, by path, where it is not the package's own.
+    ``axes`` are grids and lists, ``drawn`` the paths with distributions, ``sample`` the sampling plan. ``same`` maps a
+    path to the path whose values it shares. ``scores`` is the lower Cholesky factor of the correlation of the normal
+    scores, None for none. ``runs_of_chunk`` is the number of runs computed together, None for a number that keeps
+    memory small. ``units`` maps each varied path to its SI unit. ``only`` maps a path to its configurations, if it does
+    not vary in all. ``document`` is the study file as plain data, with changes from the command line; ``text`` is the
+    file in bytes, None for a study from data. Paths in ``gauge`` hold gauge pressures [Pa] relative to the atmosphere
+    of each run, all others absolute ones. ``given`` maps a path to the unit in which its values were given, if not the
+    package's own.
     """
 
     name: str
@@ -169,12 +172,12 @@ class Study:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """The varied paths: grid and lists first, then distributions."""
+        """Varied paths: grids and lists first, then distributions."""
         return (*(axis.path for axis in self.axes), *(number.path for number in self.drawn))
 
     @property
     def runs_of_configuration(self) -> int:
-        """Number of runs of every configuration: the draws, at each point of the grid."""
+        """Number of runs of each configuration: draws times grid points."""
         return math.prod(len(axis.values) for axis in self.axes) * self.sample.runs
 
     @property
@@ -183,11 +186,11 @@ class Study:
         return len(self.configurations) * self.runs_of_configuration
 
     def shown_for(self, scenario: Scenario) -> dict[str, str]:
-        """Return the units, by unit in SI, in which people read its runs of a scenario: as given, else the device's."""
+        """Return the display unit for each SI unit, for runs of a scenario: as given, else of the device."""
         return {**scenario.device.shown, **chosen_units(f"0 {unit}" for unit in self.given.values())}
 
     def same_in(self, configuration: str) -> dict[str, str]:
-        """Return the path that a path follows, by path, in a configuration."""
+        """Return, for a configuration, the paths that share the values of another path, mapped to the latter."""
         return {path: other for path, other in self.same.items() if self.varies(path, configuration)}
 
     def varies(self, path: str, configuration: str) -> bool:
@@ -196,7 +199,7 @@ class Study:
 
 
 def with_followers(columns: Mapping[str, Any], same: Mapping[str, str]) -> dict[str, Any]:
-    """Return the columns, with a column for each path that follows one of them."""
+    """Return the columns, with an additional column for each path that follows one of them."""
     return {**columns, **{path: columns[other] for path, other in same.items() if other in columns}}
 
 
@@ -208,7 +211,7 @@ Configurations = Mapping[str, Scenario | str | Path] | Sequence[Scenario | str |
 def choose_configurations(
     configurations: Configurations | None, study: Study | None, overrides: Iterable[str]
 ) -> tuple[Configuration, ...]:
-    """Return the given scenarios, else the configurations of the study; at least two, each with its own name."""
+    """Return the given scenarios, else the configurations of the study: at least two, with different names."""
     # Distributions that hold in some configurations only name those of the study, not the ones given here.
     if configurations is None:
         if study is None:
@@ -240,9 +243,9 @@ def choose_configurations(
 
 
 def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
-    """Return a scenario with overrides; StudyError where it was changed in Python, which would be lost.
+    """Return a scenario with overrides; StudyError if the scenario was changed in Python, which would be lost.
 
-    A Python object that controls it stays in charge.
+    A Python object that controls the scenario is kept.
     """
     changes = tuple(overrides)
     if not changes:
@@ -259,7 +262,7 @@ def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
 
 
 def check_can_be_swept(study: Study) -> None:
-    """Refuse a study that does not say how often it is drawn, or that keeps nothing: other commands need neither."""
+    """Raise StudyError for a study without a number of draws or without outputs, which only a sweep needs."""
     with refused_as(StudyError, f"study '{study.name}'", StudyError):
         if study.drawn and study.sample.method is None:
             raise StudyError(NO_SAMPLE)

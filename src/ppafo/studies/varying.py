@@ -1,4 +1,4 @@
-"""Varied values of a study: paths with units and limits, tables ``[[vary]]`` as axes and distributions in SI units."""
+"""Varied values of a study: paths with units and limits; conversion of ``[[vary]]`` tables to SI."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -38,22 +38,22 @@ from ppafo.units.shown import shown_unit, shown_value
 from ppafo.wording import nearest_name
 
 WHOLE = (NOISE, "wearer.person")
-"""Paths of numbers that name one of many: a random seed, and a person of the population."""
+"""Paths of index-like numbers: a random seed, and a person of the population."""
 _UNIT_OF_DIFFERENCE = {"Pa_a": "Pa_d"}
 _OFFSET_UNITS = ("degC", "°C")
 DEVIATIONS_IN_HALF_WIDTH = 1.959963984540054
 """Standard deviations of a normal distribution in the half width of its 95 % interval."""
 _STATED_DIFFERENCES = {"psi_g": "psi_d", "psi_a": "psi_d", "degC": "K", "°C": "K"}
 _SMALLEST_SAID, _LARGEST_SAID = 1.0e-3, 1.0e7
-"""Size of a number between which it is said in the unit in which it was given."""
+"""Range of numbers that are displayed in the unit in which they were given."""
 
 
 @dataclass(frozen=True, slots=True)
 class VariedPath:
-    """A path with its declaration, and the pressure [Pa absolute] from which gauge pressures count.
+    """Varied path with its declaration, and the atmospheric pressure [Pa absolute] for its gauge pressures.
 
-    Values of one that ``is_gauge`` are counted from the atmosphere of their run, which varies; others are absolute.
-    ``given`` is the unit in which values were given, "" where they were not.
+    With ``is_gauge`` the values are gauge pressures relative to the varying atmosphere of each run, else absolute.
+    ``given`` is the unit in which values were given, "" if unknown.
     """
 
     path: str
@@ -63,7 +63,7 @@ class VariedPath:
     given: str = ""
 
     def level(self, value: str | float) -> float:
-        """Return a value of the path in SI; UnitError where the unit does not fit or the path does not allow it."""
+        """Return a value of the path in SI; UnitError for a wrong unit or a value out of range."""
         number = self._in_si(value, self.quantity)
         if not is_within(number, self.quantity):
             given = split_quantity(value)[1] if isinstance(value, str) else ""
@@ -79,7 +79,7 @@ class VariedPath:
         return self._in_si(value, replace(self.quantity, unit=unit))
 
     def quote(self, value: float) -> str:
-        """Return a value of the path as messages write it, with six digits, in the unit in which it was given."""
+        """Return a value of the path for messages, with six digits, in the unit in which it was given."""
         unit = self.given or shown_unit(self.quantity.unit)
         unit, zero = (f"{split_pressure_kind(unit)[0]}_g", 0.0) if self.is_gauge else (unit, self.atmosphere)
         return f"{shown_value(value, self.quantity.unit, unit, zero):.6g} {unit}".rstrip()
@@ -93,7 +93,7 @@ class VariedPath:
 
 
 def _parse(text: str, quantity: Quantity, atmosphere: float) -> float:
-    """Return a text in SI, in any of the units that a parameter set may use too."""
+    """Return the SI value of a text in any of the units that a parameter set may use too."""
     refused: UnitError | None = None  # the first refusal: it names the unit that the declaration prefers
     for unit in alternatives(quantity):
         try:
@@ -104,7 +104,7 @@ def _parse(text: str, quantity: Quantity, atmosphere: float) -> float:
 
 
 def varied_path(path: str, scenario: Scenario) -> VariedPath:
-    """Return a path of a scenario; ScenarioError with the nearest one where there is none."""
+    """Return a path of a scenario; ScenarioError with the nearest name for an unknown path."""
     find_effects([path])
     known = declared_numbers(scenario)
     if path not in known:
@@ -116,7 +116,7 @@ def varied_path(path: str, scenario: Scenario) -> VariedPath:
 
 
 def value_at(path: str, scenario: Scenario) -> float | None:
-    """Return the value [SI] of a scenario at a path as in overrides; None where it has none there."""
+    """Return the value [SI] of a scenario at a path as in overrides; None if there is none."""
     run, period = scenario.run, scenario.controller.period
     of_clock = {
         "controller.period": period,
@@ -132,9 +132,9 @@ def value_at(path: str, scenario: Scenario) -> float | None:
 
 
 def given_in(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
-    """Return a path whose values are said in the unit of the first text that has one.
+    """Return a path with the unit of the first text that has one as display unit.
 
-    A unit in which the number needs a power of ten, as 1.451e-5 m^3, is for writing and not for reading.
+    A unit in which the number needs a power of ten, such as 1.451e-5 m^3, is not used for display.
     """
     number, unit = next((split_quantity(str(text)) for text in texts if unit_in(text)), (0.0, ""))
     is_plain = number == 0.0 or _SMALLEST_SAID <= abs(number) < _LARGEST_SAID
@@ -142,9 +142,10 @@ def given_in(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
 
 
 def in_its_unit(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
-    """Return the place of values that vary together with the atmosphere, for texts with units such as ``50 psi_g``.
+    """Return a path for values that vary together with the atmosphere, given as texts with units such as ``50 psi_g``.
 
-    Gauge pressures then count from the atmosphere of their run. UnitError for gauge and absolute pressures together.
+    Gauge pressures are then relative to the atmosphere of each run. Raises UnitError for a mix of gauge and absolute
+    pressures.
     """
     units = [split_quantity(text)[1] for text in texts if isinstance(text, str)]
     gauge = [bool(gauge_link(varied.path, 0.0, unit)) for unit in units]
@@ -159,13 +160,13 @@ def in_its_unit(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
 
 
 def texts_of(entry: declared.Varied) -> list[object]:
-    """Return the values of a table in the order of its keys, without differences and shares."""
+    """Return the values of a table in the order of its keys, except differences and fractions."""
     keys = ("first", "last", "minimum", "maximum", "mean", "median", "mode")
     return [*(getattr(entry, key) for key in keys if hasattr(entry, key)), *getattr(entry, "values", ())]
 
 
 def axis_or_distribution(entry: declared.Varied, varied: VariedPath) -> Axis | RandomValue:
-    """Return what a table asks for; UnitError with the key where a value is not usable or contradicts another."""
+    """Return the axis or distribution of a table; UnitError with the key for an unusable or contradictory value."""
     is_counted, is_whole = entry.path in WHOLE, entry.kind == "whole_numbers"
     if is_whole and not is_counted:
         raise UnitError(f"kind = 'whole_numbers' is for {' and '.join(WHOLE)} alone; use 'choice' or 'uniform'")
@@ -200,7 +201,7 @@ def _bounded(made: Callable[[float, float], Distribution], entry: Any, varied: V
 
 
 def _logarithmic(entry: declared.LogUniform | declared.LogNormal, varied: VariedPath) -> Distribution:
-    """Return the distribution of a number whose logarithm is uniform or normal; UnitError where it may be 0."""
+    """Return a log-uniform or log-normal distribution; UnitError if the number may be 0."""
     # Of the absolute pressure: a gauge pressure may be 0 or below, where there is no logarithm.
     absolute = replace(varied, is_gauge=False)
     distribution: Distribution
@@ -218,14 +219,14 @@ def _logarithmic(entry: declared.LogUniform | declared.LogNormal, varied: Varied
 
 
 def _normal(entry: declared.Normal | declared.TruncatedNormal, varied: VariedPath) -> Distribution:
-    """Return a normal distribution, whole or between two bounds."""
+    """Return a normal distribution, truncated or not."""
     bounds = _bounds(entry, varied) if isinstance(entry, declared.TruncatedNormal) else None
     mean, deviation = _key(entry, "mean", varied), _deviation(entry, varied)
     return NormalAround(mean, deviation) if bounds is None else NormalBetween(mean, deviation, *bounds)
 
 
 def _triangular(entry: declared.Triangular, varied: VariedPath) -> Distribution:
-    """Return a triangular distribution; UnitError where the mode is not between the bounds."""
+    """Return a triangular distribution; UnitError if the mode is not between the bounds."""
     minimum, maximum = _bounds(entry, varied)
     mode = _key(entry, "mode", varied)
     if not minimum <= mode <= maximum:
@@ -236,7 +237,7 @@ def _triangular(entry: declared.Triangular, varied: VariedPath) -> Distribution:
 
 
 def _choice(entry: declared.Choice, varied: VariedPath) -> Distribution:
-    """Return the distribution of one of some values; UnitError where the weights do not fit them."""
+    """Return a discrete distribution; UnitError if the number of weights does not fit the values."""
     values = _all_whole(entry.path, tuple(_level("values", value, varied) for value in entry.values))
     weights = entry.weights or (1.0,) * len(values)
     if len(weights) != len(values):
@@ -287,7 +288,7 @@ def _level(key: str, value: str | float, varied: VariedPath) -> float:
 
 
 def stated_normal(varied: VariedPath, scenario: Scenario) -> tuple[NormalAround, str]:
-    """Return the distribution of a path, and its unit in the set; UnitError where that states no uncertainty for it."""
+    """Return the distribution of a path and its unit in the parameter set; UnitError without a stated uncertainty."""
     origin, path = scenario.origin, varied.path
     # What the set reports with the overrides of the scenario: one that replaces a value takes its uncertainty away.
     parameters = parameter_set_of(origin)

@@ -1,9 +1,8 @@
-"""The cache of this computer: compiled programs, and texts that are expensive to compose.
+"""Cache of this computer: compiled programs, and texts that are expensive to compose.
 
-Loading compiled code runs it, so the folder is used only where no other user can write to it (``folder.py``), and a
-program only where every byte has its recorded hash (``kept.py``). ``programs.py`` finds a program or has it made
-(``making.py``): by one process while others wait, with a word where it takes long.
-What nobody uses any more goes by itself (``tidying.py``). Texts are kept by a key of what they were composed from
-(``texts.py``). If anything is wrong with the folder, the model is compiled in memory and runs; only the next start has
-to compile again.
+Loading compiled code executes it. The folder is therefore used only if no other user can write to it (``folder.py``),
+and a program only if every file has its recorded hash (``kept.py``). ``programs.py`` finds a program or has it compiled
+(``making.py``): one process compiles while others wait, with a message if compilation takes long. Unused entries are
+removed automatically (``tidying.py``). Texts are stored under a key of their inputs (``texts.py``). If the folder
+cannot be used, the model is compiled in memory, and the next process has to compile it again.
 """

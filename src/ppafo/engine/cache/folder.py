@@ -13,16 +13,16 @@ CACHE_VARIABLE = "PPAFO_CACHE_DIR"
 TEXTS = "made"
 """Folder of texts inside the folder of the programs."""
 LOCK = ".lock-"
-"""Beginning of the name of a lock file; the rest is the program's."""
+"""Prefix of lock file names; the name of the program follows."""
 NOTE = "not-working-"
-"""Beginning of the name of a file that says why a compiler does not work on this computer."""
+"""Prefix of the names of files with the reason why a compiler does not work on this computer."""
 LEFT_OUT_FOR = 86400.0
-"""Seconds after which a compiler that did not work is tried again: headers may have been installed."""
+"""Time [s] after which a compiler that failed is tried again, because missing headers may have been installed."""
 _WRITTEN_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def cache_folder() -> Path | None:
-    """Return the folder of the programs: ``PPAFO_CACHE_DIR``, or the user's cache; None where the user has no home."""
+    """Return the cache folder of programs: ``PPAFO_CACHE_DIR``, or the user's cache; None without a home folder."""
     if os.environ.get(CACHE_VARIABLE):
         return Path(os.environ[CACHE_VARIABLE]).absolute()
     import platformdirs
@@ -35,10 +35,10 @@ def cache_folder() -> Path | None:
 
 
 def refusal(folder: Path | None) -> str:
-    """Return why programs are neither read from nor kept in a folder, as the end of a sentence; empty where they are.
+    """Return the reason why a cache folder cannot be used, as the end of a sentence; empty if the folder can be used.
 
-    The folder is made if need be. It must be this user's own and no link, and nobody else may write it or put another
-    in its place.
+    A missing folder is created. The folder must belong to this user and must not be a link, and no other user may be
+    able to write to it or to replace it.
     """
     if folder is None:
         return "this user has no home folder"
@@ -66,7 +66,7 @@ def refusal(folder: Path | None) -> str:
 
 
 def _can_be_exchanged(folder_status: os.stat_result) -> bool:
-    """Return whether another user can rename what lies in a folder."""
+    """Return whether another user can rename entries of a folder."""
     if folder_status.st_uid not in (0, os.geteuid()):
         return True
     # A sticky folder such as /tmp lets each user rename only what is his own.
@@ -76,7 +76,7 @@ def _can_be_exchanged(folder_status: os.stat_result) -> bool:
 
 @cache
 def _is_own_group(number: int) -> bool:
-    """Return whether a group is this user's alone: many systems give each user one, which may write where they may."""
+    """Return whether only this user belongs to a group; many systems give each user a private group."""
     import grp
     import pwd
 
@@ -88,7 +88,7 @@ def _is_own_group(number: int) -> bool:
 
 
 def is_own_file(status: os.stat_result, above: os.stat_result) -> bool:
-    """Return whether a file and its folder are this user's, or root's, and nobody else can write into either."""
+    """Return whether a file and its folder belong to this user or root and are writable for nobody else."""
     if not (stat.S_ISREG(status.st_mode) and stat.S_ISDIR(above.st_mode)):
         return False
     if not hasattr(os, "geteuid"):
@@ -98,9 +98,10 @@ def is_own_file(status: os.stat_result, above: os.stat_result) -> bool:
 
 
 def is_own(kept: Path, files: Collection[str]) -> bool:
-    """Return whether a program and all in it is this user's, and nobody else can write into its ``files`` and folders.
+    """Return whether a program folder and all its files belong to this user and are writable for nobody else.
 
-    What came while others could write stays theirs. Nobody else can then change a file between this look and its use.
+    Files created while others could write still belong to others. Nobody else can change a file between this check and
+    its use.
     """
     statuses = [kept.lstat()]
     for entry in kept.rglob("*"):

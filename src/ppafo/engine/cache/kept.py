@@ -1,4 +1,4 @@
-"""A compiled program in its place: its name, whether it is whole, and how its module is filled."""
+"""Compiled program in the cache: name, integrity check, and loading of its module."""
 
 import contextlib
 import hashlib
@@ -25,28 +25,28 @@ CHECKSUMS = "checksums.json"
 
 @dataclass(frozen=True, slots=True)
 class RequestedProgram:
-    """A program: its text, and what compiles it."""
+    """Source text of a program, and the compiler that is to compile it."""
 
     source: str
     compiler: Compiler
 
     @property
     def name(self) -> str:
-        """Name of its module."""
+        """Name of the module."""
         digest = hashlib.sha256(without_origins(self.source).encode()).hexdigest()[:24]
         return f"ppafo_{self.compiler.name}_{self.compiler.effort.name.lower()}_{digest}"
 
     def place(self, folder: Path) -> Path:
-        """Path of the cached file in ``folder``."""
+        """Path of the cached program in ``folder``."""
         return folder / f"{self.name}-{short_hash(self.compiler.identity())}"
 
     def compile(self, path: Path) -> ModuleType:
-        """Compile it, beside ``path`` where that is a place."""
+        """Compile the program; the result is stored next to ``path`` if ``path`` is absolute."""
         return execute(self.name, self.source, path, self.compiler.compile_text)
 
 
 def load_kept_module(kept: Path, wanted: RequestedProgram) -> ModuleType | None:
-    """Return the module of a program that is there and whole; one that is damaged is removed."""
+    """Return the module of a cached program; None if it is missing. A damaged program is removed."""
     if not os.path.lexists(kept):
         return None
     if not is_whole(kept):
@@ -63,7 +63,7 @@ def load_kept_module(kept: Path, wanted: RequestedProgram) -> ModuleType | None:
 
 
 def execute(name: str, source: str, path: Path, execute: Callable[[str, str, ModuleType], None]) -> ModuleType:
-    """Return the module that ``execute`` fills; Python's own compiled file, which may be damaged, is not asked."""
+    """Return the module filled by ``execute``; Python's own bytecode file, which may be damaged, is not used."""
     module = ModuleType(name)
     module.__file__ = str(path)
     sys.modules[name] = module
@@ -77,12 +77,12 @@ def execute(name: str, source: str, path: Path, execute: Callable[[str, str, Mod
 
 
 def short_hash(described: str) -> str:
-    """Return a short name of what a compiler says of itself."""
+    """Return a short hash of the identity of a compiler."""
     return hashlib.sha256(described.encode()).hexdigest()[:12]
 
 
 def is_whole(kept: Path) -> bool:
-    """Return whether a program's folder is as it was written, file by file."""
+    """Return whether all files of a program folder have their recorded hashes."""
     try:
         stated = json.loads(read_regular_file(kept / CHECKSUMS))
         # What else lies there is no part of it.
@@ -98,9 +98,9 @@ def is_whole(kept: Path) -> bool:
 
 
 def remove(folder: Path) -> None:
-    """Remove a program, a file or a link; what cannot be removed stays.
+    """Remove a program, a file or a link; failures to remove are ignored.
 
-    A folder is moved aside first: to another process a program is there and whole, or not there.
+    A folder is first renamed, so that other processes see either the complete program or none.
     """
     with contextlib.suppress(OSError):
         if folder.is_dir() and not folder.is_symlink():
@@ -112,6 +112,6 @@ def remove(folder: Path) -> None:
 
 
 def is_kept(source: str, compiler: Compiler) -> bool:
-    """True where a program was loaded by this compiler already, or lies in the cache."""
+    """Return whether a program was already loaded with this compiler or is in the cache."""
     wanted, folder = RequestedProgram(source, compiler), cache_folder()
     return wanted.name in sys.modules or (folder is not None and os.path.lexists(wanted.place(folder)))

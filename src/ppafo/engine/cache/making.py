@@ -1,4 +1,4 @@
-"""Compilation into the cache: into a temporary file, by one process while others wait, announced where it is slow."""
+"""Compilation into the cache: into a temporary folder, by one process while others wait, with a message if slow."""
 
 import contextlib
 import hashlib
@@ -29,14 +29,14 @@ except ImportError:  # not on this system: each process compiles for itself
     fcntl = None  # type: ignore[assignment]
 
 LONGEST_WAIT = 300.0
-"""Seconds after which a process compiles for itself, whoever holds the lock; one that has died holds none."""
+"""Longest wait for a lock [s], after which a process compiles for itself; a dead process holds no lock."""
 # Between two tries to get the lock [s]: short beside the seconds of a compilation.
 _PAUSE = 0.05
 
 
 @contextlib.contextmanager
 def one_process(kept: Path) -> Iterator[None]:
-    """Hold the lock of a program while it is compiled; where none can be had, go on without."""
+    """Lock a program during its compilation; continue without a lock if none is available."""
     file = kept.with_name(LOCK + kept.name)
     held = _lock(file)
     try:
@@ -49,7 +49,7 @@ def one_process(kept: Path) -> Iterator[None]:
 
 
 def _lock(place: Path) -> int | None:
-    """Open and lock a file, waiting for its present owner; None where that cannot be done."""
+    """Open and lock a file, waiting for its present owner; None if the file cannot be locked."""
     if fcntl is None:
         return None
     end = time.monotonic() + LONGEST_WAIT
@@ -77,15 +77,15 @@ def _lock(place: Path) -> int | None:
 logger = logging.getLogger("ppafo")
 
 QUIET = 2.0
-"""Seconds of compiling that nobody has to hear of."""
+"""Duration of a compilation [s] below which no message is shown."""
 _models: ContextVar[int] = ContextVar("models that are compiled together", default=0)
 
 
 @contextlib.contextmanager
 def announce(where: str, models: int = 1) -> Iterator[None]:
-    """Say, once it takes longer than ``QUIET``, that models are compiled, and how it ended.
+    """Log that models are being compiled, once this takes longer than ``QUIET``, and log the end.
 
-    Nothing is said of one of several models that are announced together.
+    Models that are announced together are not announced individually.
     """
     if _models.get():
         yield
@@ -107,7 +107,7 @@ def announce(where: str, models: int = 1) -> Iterator[None]:
 
 
 def make(wanted: RequestedProgram, kept: Path | None) -> ModuleType:
-    """Compile a program and keep it at its place, or in memory alone where there is none or it cannot be kept."""
+    """Compile a program into the cache, or in memory if there is no cache folder or the program cannot be stored."""
     if kept is not None:
         try:
             with one_process(kept):
@@ -120,7 +120,7 @@ def make(wanted: RequestedProgram, kept: Path | None) -> ModuleType:
 
 
 def load_all(programs: Iterable[tuple[str, Effort]], compiler: Compiler, load: Callable[[str, Effort], object]) -> None:
-    """Import programs, given by source and effort, by ``load``; those to be compiled are compiled side by side."""
+    """Load programs, given by source and effort, with ``load``; missing programs are compiled in parallel."""
     missing = [
         (source, effort)
         for source, effort in dict.fromkeys(programs)
@@ -146,7 +146,7 @@ def load_all(programs: Iterable[tuple[str, Effort]], compiler: Compiler, load: C
 
 
 def _compile_and_keep(kept: Path, wanted: RequestedProgram) -> ModuleType:
-    """Compile a program in a folder aside, which takes its place when it is whole."""
+    """Compile a program in a temporary folder, which is renamed to its final name when complete."""
     # Written aside and renamed: to other processes a program is whole, or not there.
     aside = kept.with_name(f".writing-{secrets.token_hex(8)}")
     try:

@@ -1,4 +1,4 @@
-"""Compiled programs: found in the cache where they are whole, else compiled and kept."""
+"""Compiled programs: loaded from the cache if intact, otherwise compiled and stored."""
 
 import logging
 import sys
@@ -15,10 +15,10 @@ _LOADING: dict[str, threading.RLock] = {}
 
 
 def load_generated(source: str, compiler: Compiler) -> ModuleType:
-    """Import the module with this source, from the cache where it is there and whole; else it is compiled.
+    """Import the module with this source, from the cache if available and intact, otherwise after compilation.
 
-    ProgramError where it cannot be compiled, in terms of the file that the function at fault was written in;
-    CompilerError where the compiler does not work.
+    Raises ProgramError if the source cannot be compiled, with the source file of the faulty function, and CompilerError
+    if the compiler does not work.
     """
     wanted = RequestedProgram(source, compiler)
     # A second thread must not get a module of which only the beginning has run.
@@ -40,5 +40,5 @@ def load_generated(source: str, compiler: Compiler) -> ModuleType:
 
 
 def note_name(compiler: Compiler) -> str:
-    """Name of the file in the cache that says why a compiler does not work on this computer."""
+    """Return the name of the cache file with the reason why a compiler does not work on this computer."""
     return f"{NOTE}{compiler.name}-{short_hash(compiler.identity())}"

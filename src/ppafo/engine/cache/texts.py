@@ -1,4 +1,4 @@
-"""Texts that are expensive to compose, kept by a key of what they were composed from."""
+"""Texts that are expensive to compose, stored under a key of their inputs."""
 
 import contextlib
 import hashlib
@@ -11,13 +11,13 @@ from ppafo.documents.regular_file import read_regular_file
 from ppafo.engine.cache.folder import TEXTS, cache_folder, is_own_file, refusal
 
 MAXIMUM_BYTES = 50_000_000
-"""Size of all texts above which those that were not used for longest are removed."""
+"""Total size of all texts [byte] above which the least recently used texts are removed."""
 
 _HASH_BYTES = hashlib.sha256().digest_size
 
 
 def kept_bytes(kind: str, made_from: str, make: Callable[[], bytes]) -> bytes:
-    """Return what ``make`` makes of ``made_from``, all that it depends on; from the disk where it was made before."""
+    """Return the result of ``make`` for the inputs ``made_from``, from the cache if it was stored before."""
     folder = cache_folder()
     if folder is None or refusal(folder):
         return make()

@@ -1,4 +1,4 @@
-"""Contents of the cache folder, and their removal: automatic, or when a user clears it."""
+"""Contents of the cache folder, and their removal: automatically, or when a user clears the cache."""
 
 import contextlib
 import os
@@ -14,24 +14,24 @@ from ppafo.engine.cache.kept import remove
 from ppafo.wording import one_line
 
 LONGEST_UNUSED = 90.0 * 86400.0
-"""Seconds after which a program or text that no run has used is removed: about a season."""
+"""Time [s] after which an unused program or text is removed: about three months."""
 
 MAXIMUM_BYTES = 500_000_000
-"""Size of all programs above which those that were not used for longest are removed; one has some 300 kB."""
+"""Total size of all programs [byte] above which the least recently used are removed; one program has about 300 kB."""
 
 PROGRAM = re.compile(r"ppafo_[a-z]+(_[a-z]+)?_[0-9a-f]{24}(-[0-9a-f]{12}|\..+)?")
-"""Names of programs, ``ppafo_COMPILER_EFFORT_HASH-HASH``; also of earlier releases, in other forms."""
+"""Pattern of program names, ``ppafo_COMPILER_EFFORT_HASH-HASH``, including the forms of earlier releases."""
 _ASIDE = re.compile(rf"\.writing-[0-9a-f]{{16}}|{re.escape(LOCK)}{PROGRAM.pattern}|{NOTE}[a-z]+-[0-9a-f]{{12}}")
-"""Names of what lies beside the programs: one that is being written, locks, and notes on compilers that do not work."""
+"""Pattern of other names in the folder: programs being written, locks, and notes on compilers that do not work."""
 _TEXT = re.compile(r"[a-z]+-[0-9a-f]{32}|\.writing-[0-9a-f]{16}")
-"""Names of texts, ``KIND-HASH``, and of one that is being written."""
+"""Pattern of text names, ``KIND-HASH``, and of a text being written."""
 _LONGEST_ASIDE = 86400.0
-"""Seconds, longer than any compilation, after which what lies aside was left by a process that was killed."""
+"""Age [s] after which temporary files were left by a killed process; longer than any compilation."""
 
 
 @dataclass(frozen=True, slots=True)
 class CacheEntry:
-    """A file or folder in the cache: where it is, its bytes, and when it was last used, in seconds since 1970."""
+    """File or folder in the cache: path, size [byte], and time of last use [s since 1970]."""
 
     path: Path
     size: int
@@ -39,20 +39,20 @@ class CacheEntry:
 
 
 def list_programs(folder: Path) -> list[CacheEntry]:
-    """Return the programs in a cache folder, the one that was used last first."""
+    """Return the programs in a cache folder, most recently used first."""
     return measured([*entries_named(folder, PROGRAM), *entries_named(folder / "__pycache__", PROGRAM)])
 
 
 def list_texts(folder: Path) -> list[CacheEntry]:
-    """Return the texts in a cache folder, the one that was used last first.
+    """Return the texts in a cache folder, most recently used first.
 
-    What others put beside them is left alone, and so is all where their folder is a link.
+    Other files in the folder are ignored, and so are all files if the folder is a link.
     """
     return [] if (folder / TEXTS).is_symlink() else measured(entries_named(folder / TEXTS, _TEXT))
 
 
 def list_left_out(folder: Path) -> dict[str, str]:
-    """Return why compilers were left out lately, by their names."""
+    """Return the recorded reasons why compilers do not work, by compiler name."""
     reasons = {}
     for entry in entries_named(folder, _ASIDE):
         if entry.name.startswith(NOTE):
@@ -64,7 +64,7 @@ def list_left_out(folder: Path) -> dict[str, str]:
 
 
 def clear(folder: Path) -> int:
-    """Remove all that is kept, and the folder where nothing else is in it; return how many bytes that freed."""
+    """Remove all cached entries, and the folder if it is then empty; return the number of bytes freed."""
     freed = 0
     for entry in [*list_programs(folder), *measured(entries_named(folder, _ASIDE)), *list_texts(folder)]:
         remove(entry.path)
@@ -76,7 +76,7 @@ def clear(folder: Path) -> int:
 
 
 def evict(folder: Path) -> None:
-    """Remove programs unused for ``LONGEST_UNUSED``, those beyond ``MAXIMUM_BYTES``, and what a killed process left."""
+    """Remove programs unused for ``LONGEST_UNUSED`` or beyond ``MAXIMUM_BYTES``, and remains of killed processes."""
     evict_beyond(list_programs(folder), MAXIMUM_BYTES)
     for entry in measured(entries_named(folder, _ASIDE)):
         if time.time() - entry.used > _LONGEST_ASIDE:
@@ -84,7 +84,7 @@ def evict(folder: Path) -> None:
 
 
 def evict_beyond(entries: Iterable[CacheEntry], maximum_bytes: int) -> None:
-    """Remove entries unused for ``LONGEST_UNUSED`` and those beyond ``maximum_bytes``; the last used come first."""
+    """Remove entries unused for ``LONGEST_UNUSED`` and the least recently used entries beyond ``maximum_bytes``."""
     now, total = time.time(), 0
     # The list begins with what was used last, so that the total passes the limit at what is dropped.
     for entry in entries:
@@ -94,7 +94,7 @@ def evict_beyond(entries: Iterable[CacheEntry], maximum_bytes: int) -> None:
 
 
 def entries_named(folder: Path, pattern: re.Pattern[str]) -> list[Path]:
-    """Return the entries of a folder with such a name, in no order; none where there is no such folder."""
+    """Return the entries of a folder whose names match a pattern, unsorted; empty if the folder does not exist."""
     try:
         return [entry for entry in folder.iterdir() if pattern.fullmatch(entry.name)]
     except OSError:
@@ -102,7 +102,7 @@ def entries_named(folder: Path, pattern: re.Pattern[str]) -> list[Path]:
 
 
 def measured(paths: Iterable[Path]) -> list[CacheEntry]:
-    """Return files and folders with their sizes, the one that was used last first."""
+    """Return files and folders with their sizes, most recently used first."""
     entries = []
     for path in paths:
         try:

@@ -1,1 +1,1 @@
-"""Formulas of one step of the lane scheme: pure functions with selections only, no powers, no library call but sqrt."""
+"""Formulas of one integration step: pure functions without branches, powers or library calls other than sqrt."""

@@ -1,4 +1,4 @@
-"""An actuator of any kind: the functions of its own, for those that take them as ``parts``, and values from Python."""
+"""Actuators of any kind: chamber and torque functions for compiled steps, and their evaluation from Python."""
 
 from functools import lru_cache, partial
 from typing import Any
@@ -36,14 +36,14 @@ from ppafo.model.plant import (
 
 
 def rest_volumes(plant: PlantParameters, angle: float, *, parts: ActuatorFunctions) -> tuple[float, float]:
-    """Volumes of both chambers [m^3] at the pressures of their supplies: what errors of gas are seen against."""
+    """Volumes of both chambers [m^3] at the supply pressures, used as the reference for errors of the gas."""
     # At the supplies' pressures, not the present ones: what an error is measured against must not move with it.
     still = parts.chambers(plant, angle, plant.supply_pressure, plant.dorsiflexion_pressure)
     return still.volume_1, still.volume_2
 
 
 def rest_pressures_per_mass(plant: PlantParameters, angle: float, *, parts: ActuatorFunctions) -> tuple[float, float]:
-    """Pressures over masses [Pa/kg] of both chambers at the pressures of their supplies."""
+    """Pressure divided by mass [Pa/kg] of both chambers, with the volumes at the supply pressures."""
     volume_1, volume_2 = rest_volumes(plant, angle, parts=parts)
     return plant.gas_product / volume_1, plant.gas_product / volume_2
 
@@ -51,7 +51,7 @@ def rest_pressures_per_mass(plant: PlantParameters, angle: float, *, parts: Actu
 def pressures_held(
     plant: PlantParameters, held: HeldChambers, state: PlantState, *, parts: ActuatorFunctions
 ) -> tuple[float, float]:
-    """Absolute pressures [Pa] of the gas of a state at the angle that is held, of chambers that may give."""
+    """Absolute pressures [Pa] of a state at the angle of ``held``, for chambers that may expand under pressure."""
     return parts.pressures(plant, held.angle, state.mass_1, state.mass_2)
 
 
@@ -64,9 +64,9 @@ def begin_shaped_gas(
     *,
     parts: ActuatorFunctions,
 ) -> MovingGas:
-    """First stage of one step [s] in which the angle runs to ``next_angle`` [rad]; as ``begin_moving_gas``.
+    """First stage of one step [s] as ``begin_moving_gas``, for chambers that expand under pressure.
 
-    Mass answers to pressure as V + p dV/dp: a chamber that gives takes up more gas.
+    Mass responds to pressure in proportion to ``V + p dV/dp``: a compliant chamber takes up more gas.
     """
     pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
     # Volumes at both angles at one pressure: the drift is what the angle alone does.
@@ -100,7 +100,7 @@ VANE_FUNCTIONS = ActuatorFunctions(
 
 @lru_cache(maxsize=256)
 def functions_of_actuator(actuator: ActuatorModel) -> ActuatorFunctions:
-    """Return the functions of an actuator; the vane's volumes depend on no pressure, which spares divisions."""
+    """Return the functions of an actuator; volumes of a vane do not depend on pressure, which saves divisions."""
     if actuator == VANE:
         return VANE_FUNCTIONS
     own = VANE_FUNCTIONS._replace(chambers=actuator.chambers, pressures=actuator.pressures, torque=actuator.torque)
@@ -112,7 +112,7 @@ def functions_of_actuator(actuator: ActuatorModel) -> ActuatorFunctions:
 
 
 def _of_plant(actuator: ActuatorModel, function: PlainFunction, plant: Any, *given: Any) -> Any:
-    """Result of a function of a model for numbers any of which may be arrays of one length."""
+    """Return the result of a model function, whose arguments may be numbers or arrays of one length."""
     if actuator is VANE:
         return function(plant, *given)
     # A kind's function takes floats: where numbers are columns it is called for each combination.
@@ -133,7 +133,7 @@ def pressures_of(actuator: ActuatorModel, plant: Any, angle: Any, mass_1: Any, m
 
 
 def filled_chambers(actuator: ActuatorModel, plant: Any, angle: Any, pressure_1: Any, pressure_2: Any) -> Chambers:
-    """Both chambers at an angle [rad] and two absolute pressures [Pa]."""
+    """Volumes and compliances of both chambers at an angle [rad] and two absolute pressures [Pa]."""
     filled: Chambers = _of_plant(actuator, actuator.chambers, plant, angle, pressure_1, pressure_2)
     return filled
 

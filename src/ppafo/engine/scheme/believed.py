@@ -1,6 +1,6 @@
-"""Chamber volumes that a walking observer assumes for an actuator other than the vane: those of its kind.
+"""Chamber volumes assumed by the observer of a walk for actuators other than the vane.
 
-Its settings say how far they are from the device's: by the dead volumes, and by the mean growth with the angle.
+The settings of the observer give the assumed dead volumes and the assumed mean volume change with angle.
 """
 
 from typing import Any
@@ -13,7 +13,7 @@ from ppafo.model.plant import ActuatorFunctions, PlantParameters
 
 
 def as_believed(plant: PlantParameters, nominal: NominalDevice, filled: Chambers) -> tuple[float, float]:
-    """Volumes [m^3] of both chambers of the device with the dead volumes and the growth that are believed."""
+    """Assumed volumes [m^3] of both chambers, with the dead volumes and the displacement of the observer settings."""
     scale = nominal.nominal_displacement_per_radian / plant.displacement_per_radian
     # A reading that no chamber can have, as of a sensor that failed, must not leave a volume of nothing.
     return (
@@ -31,14 +31,14 @@ def kind_volumes(
     *,
     parts: ActuatorFunctions,
 ) -> tuple[float, float]:
-    """Volumes of both chambers [m^3] at a measured angle [rad], not beyond the stops, and two readings [Pa]."""
+    """Assumed volumes of both chambers [m^3] at a measured angle [rad], limited to the stops, and pressures [Pa]."""
     return as_believed(plant, nominal, parts.chambers(plant, clamp_angle(plant, angle), pressure_1, pressure_2))
 
 
 def kind_mean_volumes(
     plant: PlantParameters, nominal: NominalDevice, pressure_1: float, pressure_2: float, *, parts: ActuatorFunctions
 ) -> tuple[float, float]:
-    """Gas content per pressure [m^3] of both chambers in the middle of the range, at two readings [Pa]."""
+    """Change of gas content with pressure [m^3] of both chambers at mid-range, for two measured pressures [Pa]."""
     middle = parts.chambers(plant, 0.5 * (plant.angle_min + plant.angle_max), pressure_1, pressure_2)
     volume_1, volume_2 = as_believed(plant, nominal, middle)
     # What an error of a pressure is in content: p V changes by V, and by what the chamber gives.
@@ -46,7 +46,7 @@ def kind_mean_volumes(
 
 
 def chambers_of_observer(functions: ActuatorFunctions) -> dict[Any, Any]:
-    """Functions of an actuator's chambers for the ports of an observer; each takes the row ``plant`` first."""
+    """Functions of an actuator's chambers for the observer; each function takes the row ``plant`` first."""
     return {
         believed_volumes: made_of(kind_volumes, "kind_volumes", functions),
         mean_volumes: made_of(kind_mean_volumes, "kind_mean_volumes", functions),

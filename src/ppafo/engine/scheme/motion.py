@@ -1,11 +1,11 @@
-"""Step of the vane, unconstrained between its stops or with a prescribed angle, with the gas in the chambers.
+"""Integration step of the vane, unconstrained between its stops or with a prescribed angle, coupled to the gas.
 
-Order of a free step: the angle is predicted with the present acceleration; the gas runs with volumes that lead to the
-predicted angle; the angular velocity follows from the trapezoidal rule with the new pressures. What ends or starts
-motion inside the step (breakaway, reversal, a stop) is located by interpolation, and the rest of the step is integrated
-from there with a torque that runs linearly.
+Order of a free step: the angle is predicted with the present acceleration; the gas is integrated with volumes that lead
+to the predicted angle; the angular velocity follows from the trapezoidal rule with the new pressures. Events inside the
+step (breakaway, reversal, impact on a stop) are located by interpolation. The rest of the step is integrated from the
+event with a linearly changing torque.
 
-A step may be done in parts, each of which ends where something changes abruptly, and is as long as its error allows.
+A step may be divided into parts. Each part ends at an abrupt change, and its length follows from error control.
 """
 
 import math
@@ -27,45 +27,48 @@ from ppafo.model.ports import friction_at_rest, friction_in_motion, rebound
 
 SAME_INSTANT = 1.0e-9
 SHORTEST_PART = 1.0e-6
-"""A part [s] this short is taken as it is."""
+"""Length [s] below which a part is accepted whatever its error."""
 LOST = 1.0e5
-"""Error of a part over what is allowed by default beyond which a run is lost: a fifth of the range of the angle."""
+"""Ratio of the error of a part to the default tolerance beyond which a run has failed: a fifth of the angle range."""
 # sqrt(0.81 / E) is 0.9 / sqrt(E), the error being of second order; squares here spare roots in the clip.
 SAFETY = 0.81
 MINIMUM_ERROR = 0.2025
 MAXIMUM_ERROR = 20.25
-"""Errors over what is allowed at which the length of a part changes by the largest factors, 2 and 0.2."""
+"""Largest error ratio used in step control; ``MINIMUM_ERROR`` and this value give the length factors 2 and 0.2."""
 
 
 class StepControl(NamedTuple):
-    """Length [s] that the error of the last part allows the next one."""
+    """Length [s] allowed for the next part by the error of the last part."""
 
     length: float
 
 
 def until_jump(jump: float, remaining: float) -> float:
-    """Length [s] of the part of a step with ``remaining`` [s] left of it and a jump of the valve in ``jump`` [s].
+    """Length [s] of the next part when the valve jumps after ``jump`` [s] and ``remaining`` [s] of the step are left.
 
-    The jumps that are due at its beginning happen first; a jump within 1 ns of the end belongs to the next step.
+    Jumps due at the start of the part have already happened; a jump within 1 ns of the end belongs to the next step.
     """
     return jump if jump < remaining - SAME_INSTANT else remaining
 
 
 def part_length(pace: StepControl, remaining: float) -> float:
-    """Length [s] of a part: what the error allows, in equal parts where two of them reach the end."""
+    """Length [s] of the next part: the allowed length, or half the remainder if two parts suffice."""
     # Two equal parts rather than a long one and a stub.
     halves = 0.5 * remaining if remaining < 2.0 * pace.length else pace.length
     return remaining if remaining <= pace.length else halves
 
 
 def is_refused(error: float, length: float) -> bool:
-    """True for a part whose error [-] over what is allowed is above 1, or no number, and that can be shorter."""
+    """Return whether a part has an error ratio above 1 or NaN [-] and can still be shortened."""
     # The negated comparison refuses NaN, too.
     return not error <= 1.0 and length > SHORTEST_PART
 
 
 def next_pace(pace: StepControl, error: float, length: float, refused: bool, longest: float) -> StepControl:
-    """Length of the next part after one of ``length`` [s] with an error [-]; one that an event cut says little."""
+    """Allowed length [s] of the next part, after a part of ``length`` [s] with the given error ratio [-].
+
+    A part that was cut short by an event does not reduce the allowed length.
+    """
     factor = math.sqrt(SAFETY / max(MINIMUM_ERROR, min(MAXIMUM_ERROR, error)))
     wanted = length * factor
     # A part that an event cut short had little error for that reason: the next may be as long as before.
@@ -74,25 +77,25 @@ def next_pace(pace: StepControl, error: float, length: float, refused: bool, lon
 
 
 ALLOWED_OF_ANGLE = 2.0e-6
-"""Error of one part over the range of the angle; with it a run keeps to 2e-4 of the range."""
+"""Allowed error of one part divided by the angle range [-]; the error of a run then stays below 2e-4 of the range."""
 ALLOWED_BY_GAS = 3.0e-6
-"""Error of one part over the angle in which the smaller chamber would close."""
+"""Allowed error of one part divided by the angle that would close the smaller chamber [-]."""
 MISSED_FRACTION = 0.2
-"""Fraction of the way between where the gas took the vane to be and where an event left it that counts as an error."""
+"""Fraction [-] of the difference between the assumed angle and the angle after an event that counts as error."""
 SIXTH = 1.0 / 6.0
 LOWEST_REBOUND = 1.0e-7
-"""Height over the range of the angle below which a rebound is none."""
+"""Height of a rebound divided by the angle range [-] below which the vane stays at the stop."""
 
 
 class FrictionTorques(NamedTuple):
-    """Sizes of the friction torque [N m]: the largest at rest, and in motion."""
+    """Magnitudes of the friction torque [N m]: largest static friction, and kinetic friction."""
 
     at_rest: float
     in_motion: float
 
 
 class Departure(NamedTuple):
-    """Second part of a step: where it begins (fraction of the step), angle [rad], angular velocity [rad/s]."""
+    """Start of the second part of a step: fraction of the step [-], angle [rad] and angular velocity [rad/s]."""
 
     fraction: float
     angle: float
@@ -100,7 +103,7 @@ class Departure(NamedTuple):
 
 
 class FreeStep(NamedTuple):
-    """Predicted free step: angle without stops [rad], acceleration [rad/s^2], driving torque now [N m]."""
+    """Predicted free step: angle without stops [rad], acceleration [rad/s^2], driving torque at the start [N m]."""
 
     free_angle: float
     acceleration: float
@@ -108,9 +111,9 @@ class FreeStep(NamedTuple):
 
 
 class FreeEnd(NamedTuple):
-    """Second stage of a free step: driving torque [N m], angle [rad] and angular velocity [rad/s] at its end.
+    """Second stage of a free step: driving torque [N m], angle [rad] and angular velocity [rad/s] at the end.
 
-    ``departs`` is 1 where an event inside the step leads elsewhere: a stop, a reversal, or a vane at rest.
+    ``departs`` is 1 if the step contains an event (a stop, a reversal) or the vane is at rest, else 0.
     """
 
     torque: float
@@ -122,8 +125,12 @@ class FreeEnd(NamedTuple):
 class FreePart(NamedTuple):
     """First stage of a part of a step, which ends at a stop at the latest.
 
-    Direction in which the vane slides (1, -1, 0 at rest), acceleration [rad/s^2], driving torque now [N m], where the
-    part would lead without reversal [rad], and 1 where it ends at a stop.
+    Attributes:
+        way: direction of sliding, 1 or -1; 0 at rest
+        acceleration: acceleration [rad/s^2]
+        torque: driving torque at the start [N m]
+        next_angle: angle at the end without reversal [rad]
+        meets_stop: 1 if the part ends at a stop, else 0
     """
 
     way: float
@@ -134,9 +141,9 @@ class FreePart(NamedTuple):
 
 
 class PartSlide(NamedTuple):
-    """End of a part without an event: driving torque [N m], sizes of friction, angular velocity [rad/s].
+    """End of a part without an event: driving torque [N m], friction torques [N m], angular velocity [rad/s].
 
-    ``departs`` is 1 where an event leads elsewhere: a reversal, or a vane that begins to move.
+    ``departs`` is 1 if the vane reverses or starts to move in the part, else 0.
     """
 
     torque: float
@@ -146,7 +153,7 @@ class PartSlide(NamedTuple):
 
 
 class PartEnd(NamedTuple):
-    """Angle [rad] and angular velocity [rad/s] at the end of a part, and error of the angle over what is allowed."""
+    """Angle [rad] and angular velocity [rad/s] at the end of a part; angle error divided by the allowed error [-]."""
 
     angle: float
     rate: float
@@ -166,14 +173,14 @@ def direction_of(value: float) -> float:
 
 
 def clamp_angle(plant: PlantParameters, angle: float) -> float:
-    """The ``angle`` [rad] of a joint, or the stop beyond which it lies."""
+    """Return ``angle`` [rad] limited to the range between the stops."""
     return max(plant.angle_min, min(plant.angle_max, angle))
 
 
 def next_velocity(
     plant: PlantParameters, angular_velocity: float, acceleration: float, torque: float, duration: float
 ) -> float:
-    """Angular velocity [rad/s] after ``duration`` [s], trapezoidal rule; ``torque`` [N m] is undamped, at the end."""
+    """Angular velocity [rad/s] after ``duration`` [s], trapezoidal rule; final ``torque`` [N m] without damping."""
     half = 0.5 * duration
     # Damping is implicit: a strongly damped vane settles instead of ringing.
     momentum = plant.inertia * (angular_velocity + half * acceleration)
@@ -181,7 +188,7 @@ def next_velocity(
 
 
 def time_to_stop(distance: float, angular_velocity: float, acceleration: float) -> float:
-    """Time [s] to cover ``distance`` [rad] towards a stop at constant acceleration, all along the motion."""
+    """Time [s] to reach a stop ``distance`` [rad] ahead at constant acceleration, all positive along the motion."""
     # 2 d / (v + sqrt(v^2 + 2 a d)) subtracts no near numbers, unlike the textbook root, and holds for a = 0.
     reach = max(angular_velocity * angular_velocity + 2.0 * acceleration * distance, 0.0)
     return 2.0 * distance / max(angular_velocity + math.sqrt(reach), 1.0e-30)
@@ -190,7 +197,7 @@ def time_to_stop(distance: float, angular_velocity: float, acceleration: float) 
 def friction_now(
     plant: PlantParameters, angular_velocity: float, pressure_1: float, pressure_2: float
 ) -> FrictionTorques:
-    """Sizes of friction [N m] at an angular velocity [rad/s] and two absolute pressures [Pa]. Equation (10)."""
+    """Friction torques [N m] at an angular velocity [rad/s] and two absolute pressures [Pa]. Equation (10)."""
     return FrictionTorques(
         at_rest=friction_at_rest(plant.static_torque, pressure_1, pressure_2),
         in_motion=friction_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2),
@@ -205,9 +212,10 @@ def depart(
     friction: FrictionTorques,
     step: float,
 ) -> tuple[float, float]:
-    """Angle and angular velocity at the end of a step whose last part begins with ``departure``.
+    """Angle [rad] and angular velocity [rad/s] at the end of a step whose last part starts at ``departure``.
 
-    ``torque`` and ``next_torque`` [N m] drive the vane at the departure and at the end, and run linearly between.
+    ``torque`` and ``next_torque`` [N m] drive the vane at the departure and at the end; the torque is linear in
+    between.
     """
     at_lower = departure.angle <= plant.angle_min
     at_upper = departure.angle >= plant.angle_max
@@ -245,10 +253,10 @@ def depart(
 def begin_part(
     plant: PlantParameters, state: PlantState, added_torque: float, longest: float, *, parts: ActuatorFunctions
 ) -> tuple[FreePart, float]:
-    """Predicted part of a step of an unconstrained vane, up to ``longest`` [s] or to a stop, and its length [s].
+    """Predicted part of a step of an unconstrained vane, and its length [s]: ``longest`` [s], or up to a stop.
 
-    So the gas works against the motion that happens. A vane at rest whose torque is above static friction slides.
-    ``added_torque`` [N m] is the leg's at the beginning, beside the plant's own.
+    The gas then works against the motion that actually happens. A vane at rest slides if the torque exceeds static
+    friction. ``added_torque`` [N m] is the torque of the leg at the start, in addition to the torque of the plant.
     """
     velocity = state.angular_velocity
     pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
@@ -286,8 +294,8 @@ def slide_part(
 ) -> tuple[PartSlide, PartEnd]:
     """End of a part of a step for an unconstrained vane that slides on or stays at rest.
 
-    ``state`` has the new gas and the motion of the begin; ``added_torque`` [N m] is the leg's at the end, where the
-    part would lead without reversal.
+    ``state`` has the new gas and the angle and velocity at the start. ``added_torque`` [N m] is the torque of the leg
+    at the end, at the predicted angle without reversal.
     """
     velocity, way = state.angular_velocity, begun.way
     next_1, next_2 = parts.pressures(plant, begun.next_angle, state.mass_1, state.mass_2)
@@ -329,7 +337,7 @@ def depart_part(
     *,
     parts: ActuatorFunctions,
 ) -> PartEnd:
-    """The end of a part in which a vane turns or begins to move; any other part ends as it did.
+    """End of a part in which the vane reverses or starts to move; for any other part ``ended`` is returned unchanged.
 
     ``state`` is as in ``slide_part``.
     """
@@ -358,7 +366,7 @@ def part_error(
     *,
     parts: ActuatorFunctions,
 ) -> float:
-    """Error of the angle [rad] at which a part ends over what is allowed [-]."""
+    """Ratio of the error of the angle at the end of a part [rad] to the allowed error [-]."""
     friction, rate = begun.way * slid.friction.in_motion, slid.angular_velocity
     damping = viscous_torque(plant.viscous_damping, rate)
     last = net_torque(slid.torque, friction, damping, begun.next_angle, rate) * (1.0 / plant.inertia)
@@ -374,7 +382,7 @@ def part_error(
 
 
 def rebound_velocity(plant: PlantParameters, angular_velocity: float, torque: float) -> float:
-    """Angular velocity [rad/s] after an impact; a vane that the torque [N m] presses on the stop rests."""
+    """Angular velocity [rad/s] after an impact; 0 if the torque [N m] presses the vane firmly on the stop."""
     after = rebound(angular_velocity)
     # Height of the next bounce: kinetic energy against the work of the torque that presses the vane on the stop.
     pressing = max(torque * direction_of(angular_velocity), 0.0)
@@ -390,9 +398,10 @@ def first_event(
     full_velocity: float,
     step: float,
 ) -> Departure:
-    """Start of the remainder of a step: at a stop, at a reversal, or, for a vane at rest, at once.
+    """First event of a step: impact on a stop, reversal, or, for a vane at rest, departure at the start of the step.
 
-    ``free_angle`` [rad] and ``full_velocity`` [rad/s] are what the whole step would lead to without the event.
+    ``free_angle`` [rad] and ``full_velocity`` [rad/s] are the predicted values at the end of the step without the
+    event.
     """
     velocity = state.angular_velocity
     way = direction_of(velocity)
@@ -422,7 +431,7 @@ def begin_free(
 ) -> FreeStep:
     """Predicted step [s] of a vane that is unconstrained between its stops. Equations (1), (2), (10).
 
-    ``added_torque`` [N m] drives the vane beside the actuator at the beginning of the step, gravity in it.
+    ``added_torque`` [N m] is the torque at the start of the step in addition to the actuator, gravity included.
     """
     velocity = state.angular_velocity
     way = direction_of(velocity)
@@ -447,10 +456,10 @@ def end_free(
     *,
     parts: ActuatorFunctions,
 ) -> FreeEnd:
-    """The end of the step [s] of a vane that slides through, from ``state`` with the new gas and the old motion.
+    """End of the step [s] of a vane that slides without an event, from ``state`` with the new gas and the old motion.
 
-    ``ahead`` is of the chambers at the angle to which it slides; ``added_torque`` [N m] drives the vane beside the
-    actuator at the end of the step, gravity in it.
+    ``ahead`` are the chambers at the predicted angle. ``added_torque`` [N m] is the torque at the end of the step in
+    addition to the actuator, gravity included.
     """
     velocity = state.angular_velocity
     way = direction_of(velocity)
@@ -481,7 +490,7 @@ def depart_free(
     *,
     parts: ActuatorFunctions,
 ) -> tuple[float, float]:
-    """Angle [rad] and angular velocity [rad/s] at the end of the step [s] of a vane that does not slide through."""
+    """Angle [rad] and angular velocity [rad/s] at the end of the step [s] of a vane with an event in the step."""
     pressure_1, pressure_2 = parts.held_pressures(plant, ahead, state)
     friction = friction_now(plant, 0.0, pressure_1, pressure_2)
     departure = first_event(plant, state, begun.free_angle, begun.acceleration, ended.angular_velocity, step)
@@ -503,7 +512,7 @@ def with_motion(state: PlantState, angle: float, angular_velocity: float) -> Pla
 
 
 def with_gas(state: PlantState, gas: GasChange) -> PlantState:
-    """State of the plant with the gas that came and went in a step added, without motion."""
+    """State of the plant after adding the gas flows of a step, with the angle and the angular velocity unchanged."""
     vented = gas.supplied - gas.mass_1 - gas.mass_2
     return PlantState(
         angle=state.angle,

@@ -1,14 +1,14 @@
-"""Step of both chambers: two-stage L-stable Rosenbrock method on the two masses.
+"""Integration step of the gas in both chambers: two-stage L-stable Rosenbrock method on the two masses.
 
 The method is ROS2 of Verwer, Spee, Blom and Hundsdorfer (SIAM J. Sci. Comput. 20, 1999), gamma = 1 - 1/sqrt(2), with
-the exact Jacobian and the time derivative that comes from the moving volumes, which run linearly through the step.
-Gas totals are integrated by the same method as further unknowns, so that mass is conserved to rounding.
+the exact Jacobian and the time derivative due to the moving volumes, which change linearly through the step. Gas totals
+are integrated by the same method as further unknowns, so that mass is conserved to rounding.
 
-A step goes: the flows at its begin with their slopes (``sloped_flows``), the first stage (``begin_still_gas``,
-``begin_moving_gas``, ``begin_shaped_gas``), the flows at the pressures to which that leads (``stage_flows``), the
-second stage and what both change. The lanes find the flows in loops of their own: a flow waits long for its division
-and its root, and in a short loop the processor works on several lanes meanwhile. The first stage alone is a step of
-first order, and what the second adds to it is the estimate of the error.
+Order of a step: the flows at the start with their derivatives (``sloped_flows``), the first stage (``begin_still_gas``,
+``begin_moving_gas``, ``begin_shaped_gas``), the flows at the pressures after the first stage (``stage_flows``), the
+second stage, and the changes by both stages. The flows of many runs are computed in short loops of their own, because a
+division or a square root has a long latency and the processor overlaps several runs meanwhile. The first stage alone is
+a step of first order, and the contribution of the second stage is the error estimate.
 """
 
 from collections.abc import Callable
@@ -28,7 +28,7 @@ from ppafo.model.ports import leakage_path
 
 
 class LeakSlopes(NamedTuple):
-    """Flow across the vane from chamber 1 to 2 [kg/s], its derivatives with respect to both pressures [kg/(s Pa)]."""
+    """Leakage flow across the vane from chamber 1 to 2 [kg/s], and its derivatives by both pressures [kg/(s Pa)]."""
 
     flow: float
     by_1: float
@@ -36,7 +36,7 @@ class LeakSlopes(NamedTuple):
 
 
 class SlopedFlows(NamedTuple):
-    """Flows into both chambers and across the vane, with derivatives."""
+    """Flows into both chambers and leakage flow from chamber 1 to 2 [kg/s], with pressure derivatives [kg/(s Pa)]."""
 
     in_1: PortFlowSlopes
     in_2: PortFlowSlopes
@@ -44,7 +44,7 @@ class SlopedFlows(NamedTuple):
 
 
 class StageFlows(NamedTuple):
-    """Flows into both chambers and across the vane from chamber 1 to 2 [kg/s]."""
+    """Flows into both chambers, and leakage flow across the vane from chamber 1 to 2 [kg/s]."""
 
     in_1: PortFlow
     in_2: PortFlow
@@ -59,7 +59,7 @@ def sloped_flows(
     port_2: Any,
     port_flow_slopes: Callable[..., PortFlowSlopes],
 ) -> SlopedFlows:
-    """All flows at two chamber pressures [Pa absolute], with derivatives."""
+    """All flows [kg/s] at two absolute chamber pressures [Pa], with their derivatives by the pressures [kg/(s Pa)]."""
     flow, by_1, by_2 = orifice_flow_slopes(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
     return SlopedFlows(
         in_1=port_flow_slopes(pressure_1, port_1, plant.valve_curve),
@@ -76,7 +76,7 @@ def stage_flows(
     port_2: Any,
     port_flow: Callable[..., PortFlow],
 ) -> StageFlows:
-    """All flows at two chamber pressures [Pa absolute]."""
+    """All flows [kg/s] at two absolute chamber pressures [Pa]."""
     return StageFlows(
         in_1=port_flow(pressure_1, port_1, plant.valve_curve),
         in_2=port_flow(pressure_2, port_2, plant.valve_curve),
@@ -85,18 +85,19 @@ def stage_flows(
 
 
 def plant_with_leak_at(plant: PlantParameters, pressure_1: float, pressure_2: float) -> PlantParameters:
-    """The plant with the leak that it has at two chamber pressures [Pa absolute], where an effect acts on it.
+    """Plant with the leakage at two absolute chamber pressures [Pa], if an effect makes the leakage depend on pressure.
 
-    The matrix of a step takes this leak as constant: the method keeps its order with any matrix.
+    The matrix of a step treats this leakage as constant; the method keeps its order with any matrix.
     """
     conductance = leakage_path(plant.leak_conductance, pressure_1, pressure_2, plant.leak_curve)
     return plant._replace(leak_conductance=conductance)
 
 
 def plant_with_joined_chambers(plant: PlantParameters, opening: float) -> PlantParameters:
-    """The plant whose vane leak has a valve beside it that joins both chambers, open by ``opening`` [-], 0 to 1.
+    """Plant with an additional valve between the chambers, parallel to the vane leakage; ``opening`` [-], 0 to 1.
 
-    Both openings follow the mean of their flow curves by conductance: exact where these have the same ratios.
+    The common flow curve is the mean of both curves weighted by conductance: exact if both have the same pressure
+    ratios.
     """
     joining = opening * plant.valve_conductance
     conductance = plant.leak_conductance + joining
@@ -106,7 +107,7 @@ def plant_with_joined_chambers(plant: PlantParameters, opening: float) -> PlantP
 
 
 def mean_curve(first: FlowCurve, second: FlowCurve, share: float) -> FlowCurve:
-    """The flow curve of two orifices side by side, of whose conductance the second has ``share`` [-]."""
+    """Flow curve of two parallel orifices; ``share`` [-] is the conductance fraction of the second orifice."""
     a, b = first.coefficients, second.coefficients
     return FlowCurve(
         critical_ratio=first.critical_ratio + share * (second.critical_ratio - first.critical_ratio),
@@ -128,15 +129,15 @@ def mean_curve(first: FlowCurve, second: FlowCurve, share: float) -> FlowCurve:
 GAMMA = 0.2928932188134524
 SHORTEST = 1.0e-30
 ALLOWED_OF_PRESSURE = 2.5e-5
-"""Error of one step over the pressure that matters; with it a run keeps to ``KEPT_OF_PRESSURE``."""
+"""Allowed error of one step divided by the reference pressure [-]; a run then stays within ``KEPT_OF_PRESSURE``."""
 KEPT_OF_PRESSURE = 1.0e-3
-"""Error of a pressure over the pressure range [-] that a run keeps to by default."""
+"""Error of a pressure divided by the pressure range [-] that a run does not exceed at the default tolerance."""
 MINIMUM_PRESSURE = 0.02
-"""The least pressure that matters, as a fraction of the atmosphere's."""
+"""Lowest reference pressure for errors, as a fraction of the atmospheric pressure [-]."""
 
 
 class GasChange(NamedTuple):
-    """Change over one step of both chambers, of the gas drawn from the source and of the vane leak (1 to 2) [kg]."""
+    """Changes over one step [kg]: both chamber masses, gas drawn from the source, vane leakage from chamber 1 to 2."""
 
     mass_1: float
     mass_2: float
@@ -145,7 +146,7 @@ class GasChange(NamedTuple):
 
 
 class Flows(NamedTuple):
-    """Rates of both masses and both totals [kg/s]."""
+    """Rates of both chamber masses, of the supplied mass and of the leaked mass [kg/s]."""
 
     mass_1: float
     mass_2: float
@@ -154,9 +155,14 @@ class Flows(NamedTuple):
 
 
 class Linearisation(NamedTuple):
-    """The matrix 1 - gamma h J of both masses by rows, one over its determinant, and gamma h times the source's slopes.
+    """Linearised flows of a step: the matrix ``1 - gamma h J`` of both masses, and the derivatives of the supply flow.
 
-    The leak has no entries of its own: gamma h times its slopes are ``-c`` and ``b``.
+    Attributes:
+        a, b, c, d: matrix elements by rows [-]
+        scale: 1 divided by the determinant [-]
+        supplied_by_1, supplied_by_2: gamma h times the derivatives of the supply flow with respect to both masses [-]
+
+    The leakage needs no elements of its own: gamma h times its derivatives are ``-c`` and ``b``.
     """
 
     a: float
@@ -169,7 +175,7 @@ class Linearisation(NamedTuple):
 
 
 class StillGas(NamedTuple):
-    """First stage of a step with fixed volumes: the linearised flows, the stage, the pressures it leads to [Pa]."""
+    """First stage of a step with fixed volumes: linearised flows, stage slopes [kg/s], final pressures [Pa]."""
 
     linear: Linearisation
     first: Flows
@@ -178,9 +184,10 @@ class StillGas(NamedTuple):
 
 
 class HeldChambers(NamedTuple):
-    """Pressures over masses [Pa/kg] of both chambers at an angle [rad].
+    """Pressure divided by mass [Pa/kg] of both chambers, at an angle [rad].
 
-    Of chambers that give under pressure these are at rest, and the angle says the rest.
+    For chambers that expand under pressure, the ratios apply at the supply pressures; pressures are computed from the
+    angle.
     """
 
     per_mass_1: float
@@ -189,25 +196,25 @@ class HeldChambers(NamedTuple):
 
 
 def held_chambers(plant: PlantParameters, angle: float, *, parts: ActuatorFunctions) -> HeldChambers:
-    """Both chambers at an angle [rad]. Equation (3)."""
+    """Ratios of pressure to mass of both chambers at an angle [rad]. Equation (3)."""
     per_mass_1, per_mass_2 = parts.rest_pressures_per_mass(plant, angle)
     return HeldChambers(per_mass_1=per_mass_1, per_mass_2=per_mass_2, angle=angle)
 
 
 def held_pressures(_plant: PlantParameters, held: HeldChambers, state: PlantState) -> tuple[float, float]:
-    """Absolute pressures [Pa] of the gas of a state at the angle that is held, as ``chamber_pressures`` has them."""
+    """Absolute pressures [Pa] of both chambers from stored pressure-to-mass ratios, as ``chamber_pressures``."""
     return state.mass_1 * held.per_mass_1, state.mass_2 * held.per_mass_2
 
 
 class MovingGas(NamedTuple):
-    """First stage with moving volumes: as ``StillGas``, and gamma h times the change of all flows in time [kg/s]."""
+    """First stage with moving volumes: as ``StillGas``, with gamma h times the time derivative of all flows [kg/s]."""
 
     still: StillGas
     drift: Flows
 
 
 def response(linear: Linearisation, rate_1: float, rate_2: float) -> Flows:
-    """Gamma h times the change of all flows in time [kg/s] while the masses change at two rates [kg/s]."""
+    """Gamma h times the rate of change of all flows [kg/s], for given rates of change of both masses [kg/s]."""
     return Flows(
         mass_1=(1.0 - linear.a) * rate_1 - linear.b * rate_2,
         mass_2=(1.0 - linear.d) * rate_2 - linear.c * rate_1,
@@ -217,7 +224,7 @@ def response(linear: Linearisation, rate_1: float, rate_2: float) -> Flows:
 
 
 def added_flows(one: Flows, other: Flows) -> Flows:
-    """Rates [kg/s] of two sets of flows together."""
+    """Sum of two sets of flows [kg/s]."""
     return Flows(
         mass_1=one.mass_1 + other.mass_1,
         mass_2=one.mass_2 + other.mass_2,
@@ -229,7 +236,7 @@ def added_flows(one: Flows, other: Flows) -> Flows:
 def solve_stage(linear: Linearisation, right: Flows) -> Flows:
     """Stage slopes k [kg/s] from the right-hand sides of both masses and both totals [kg/s].
 
-    ``(1 - gamma h J) k = right`` by Cramer's rule; the totals follow, because nothing depends on them.
+    ``(1 - gamma h J) k = right`` is solved by Cramer's rule; the totals follow, because no flow depends on them.
     """
     rate_1 = (linear.d * right.mass_1 - linear.b * right.mass_2) * linear.scale
     rate_2 = (linear.a * right.mass_2 - linear.c * right.mass_1) * linear.scale
@@ -242,9 +249,9 @@ def solve_stage(linear: Linearisation, right: Flows) -> Flows:
 
 
 def linearise(per_mass_1: float, per_mass_2: float, flowing: SlopedFlows, step: float) -> tuple[Linearisation, Flows]:
-    """Linearisation of the flows at the beginning of a step [s], and what they add up to. Equations (3), (6) to (9).
+    """Linearised flows at the start of a step [s], and the resulting rates [kg/s]. Equations (3), (6) to (9).
 
-    ``per_mass_1`` and ``per_mass_2`` are pressures over masses [Pa/kg].
+    ``per_mass_1`` and ``per_mass_2`` are pressure divided by mass [Pa/kg].
     """
     in_1, in_2 = flowing.in_1, flowing.in_2
     leak, leak_by_1, leak_by_2 = flowing.leak.flow, flowing.leak.by_1, flowing.leak.by_2
@@ -270,7 +277,7 @@ def linearise(per_mass_1: float, per_mass_2: float, flowing: SlopedFlows, step: 
 
 
 def begin_still_gas(state: PlantState, held: HeldChambers, flowing: SlopedFlows, step: float) -> StillGas:
-    """First stage of one step [s] in which the vane stands still."""
+    """First stage of one step [s] with a vane at rest."""
     linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
     first = solve_stage(linear, flows)
     return StillGas(
@@ -291,7 +298,7 @@ def begin_moving_gas(
     *,
     parts: ActuatorFunctions,
 ) -> MovingGas:
-    """First stage of one step [s] in which the volumes run linearly towards ``next_angle`` [rad]."""
+    """First stage of one step [s] with volumes that change linearly up to ``next_angle`` [rad]."""
     linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
     return begin_moving_stage(plant, state, held, next_angle, linear, flows, step, parts=parts)
 
@@ -307,7 +314,7 @@ def begin_moving_stage(
     *,
     parts: ActuatorFunctions,
 ) -> MovingGas:
-    """First stage of one step [s] with moving volumes, from all flows at its beginning and their linearisation."""
+    """First stage of one step [s] with moving volumes, from the rates at its start and their linearisation."""
     volumes = parts.rest_volumes(plant, state.angle)
     next_volumes = parts.rest_volumes(plant, next_angle)
     # A growing volume lowers the pressure as a loss of mass at this rate would; parts of a step may have no length.
@@ -325,7 +332,7 @@ def begin_moving_stage(
 
 
 def second_right_sides(first: Flows, flowing: StageFlows) -> Flows:
-    """Right-hand sides of the second stage [kg/s] with fixed volumes, from the flows it begins with. Equation (9)."""
+    """Right-hand sides of the second stage [kg/s] with fixed volumes, from the flows after the first. Equation (9)."""
     flow_1, flow_2, leak = flowing.in_1, flowing.in_2, flowing.leak
     return Flows(
         mass_1=flow_1.total - leak - 2.0 * first.mass_1,
@@ -336,7 +343,7 @@ def second_right_sides(first: Flows, flowing: StageFlows) -> Flows:
 
 
 def both_stages(first: Flows, second: Flows, step: float) -> GasChange:
-    """Changes of mass [kg] in a step of ``step`` [s], of the mean of both stages."""
+    """Mass changes [kg] in a step of ``step`` [s], from the weighted sum of both stages."""
     return GasChange(
         # Weights of the method: 3/2 of the first stage and 1/2 of the second.
         mass_1=step * (1.5 * first.mass_1 + 0.5 * second.mass_1),
@@ -347,12 +354,12 @@ def both_stages(first: Flows, second: Flows, step: float) -> GasChange:
 
 
 def second_still_stage(begun: StillGas, flowing: StageFlows) -> Flows:
-    """Second stage [kg/s] of a step in which the vane stands still."""
+    """Slopes of the second stage [kg/s] for a step with a vane at rest."""
     return solve_stage(begun.linear, second_right_sides(begun.first, flowing))
 
 
 def second_moving_stage(begun: MovingGas, flowing: StageFlows) -> Flows:
-    """Second stage [kg/s] of a step with moving volumes."""
+    """Slopes of the second stage [kg/s] for a step with moving volumes."""
     right, drift = second_right_sides(begun.still.first, flowing), begun.drift
     return solve_stage(
         begun.still.linear,
@@ -366,7 +373,7 @@ def second_moving_stage(begun: MovingGas, flowing: StageFlows) -> Flows:
 
 
 def still_change(plant: PlantParameters, begun: StillGas, second: Flows, step: float) -> GasChange:
-    """Changes of mass [kg] in one step [s] in which the vane stands still, from both stages."""
+    """Mass changes [kg] in one step [s] with a vane at rest, from both stages."""
     change = both_stages(begun.first, second, step)
     # Only a leak can push gas towards the source here, hardly any: what would go back counts as vented.
     supplied = admitted_flow(change.supplied, plant.relieving)
@@ -374,10 +381,10 @@ def still_change(plant: PlantParameters, begun: StillGas, second: Flows, step: f
 
 
 def moving_change(plant: PlantParameters, begun: StillGas, second: Flows, step: float) -> GasChange:
-    """Changes of mass [kg] in one step [s] with moving volumes, from both stages.
+    """Mass changes [kg] in one step [s] with moving volumes, from both stages.
 
-    Where the supplies are not relieving, the draw is at least nothing: a chamber that rises above its source inside a
-    step has slopes from below it, which would push the gas out again. That gas stays in the chamber that is fed.
+    Without relieving supplies, the drawn mass is at least 0. If the pressure of a chamber rises above its supply inside
+    a step, the linearised flow would push gas back into the supply; this gas stays in the chamber.
     """
     change = both_stages(begun.first, second, step)
     supplied = admitted_flow(change.supplied, plant.relieving)
@@ -398,10 +405,11 @@ def gas_error(
     *,
     parts: ActuatorFunctions,
 ) -> float:
-    """Estimated error of both pressures at the end of a step [s] over what is allowed [-].
+    """Ratio of the estimated error of both pressures at the end of a step [s] to the allowed error [-].
 
-    What the second stage adds to the first, damped once by the matrix of the step, so that a chamber that has settled
-    asks for no short step; and what a supply that is not relieving would have taken, because it shuts inside the step.
+    The estimate is the contribution of the second stage, damped once by the matrix of the step, so that a settled
+    chamber does not require short steps. Gas that a supply without relief would have taken back inside the step is
+    added.
     """
     linear = begun.linear
     drawn = 1.5 * begun.first.supplied + 0.5 * second.supplied
@@ -418,7 +426,7 @@ def gas_error(
 
 
 def larger_share(part_1: float, whole_1: float, part_2: float, whole_2: float) -> float:
-    """The larger of both parts over their wholes, which are above 0; in one division."""
+    """Larger of ``part_1 / whole_1`` and ``part_2 / whole_2`` with positive denominators, in one division."""
     # A division costs ten products.
     return max(part_1 * whole_2, part_2 * whole_1) / (whole_1 * whole_2)
 
@@ -432,10 +440,10 @@ def opening_error(
     *,
     parts: ActuatorFunctions,
 ) -> float:
-    """Error of taking a valve's mean opening in a step [s] over what is allowed [-].
+    """Error due to using the mean valve opening of a step [s], divided by the allowed error [-].
 
-    ``shift`` [-] is the relative change of the opening. Opening and flow change together, and a twelfth of the product
-    of both changes is missed; the matrix of the step says how the flow responds to itself.
+    ``shift`` [-] is the relative change of the opening. Opening and flow change together, and the mean misses a twelfth
+    of the product of both changes; the matrix of the step gives the change of the flow.
     """
     volume_1, volume_2 = parts.rest_volumes(plant, next_angle)
     response_1 = abs(begun.linear.a - 1.0) * abs(begun.first.mass_1)
@@ -448,12 +456,12 @@ def opening_error(
 
 
 def pressure_that_matters(plant: PlantParameters, pressure: float) -> float:
-    """Pressure [Pa] against which an error is seen: of the supplies or of the chamber, over the atmosphere."""
+    """Reference pressure for errors [Pa]: the gauge pressure of the supplies or of the chamber, whichever is larger."""
     return max(supply_range(plant), abs(pressure - plant.atmospheric_pressure))
 
 
 def supply_range(plant: PlantParameters) -> float:
-    """Pressure [Pa] between the atmosphere and the supply farther from it, not less than a fraction of the former."""
+    """Largest difference between a supply and the atmosphere [Pa], at least a fraction of the atmospheric pressure."""
     room = plant.atmospheric_pressure
     supplied = max(abs(plant.supply_pressure - room), abs(plant.dorsiflexion_pressure - room))
     return max(supplied, MINIMUM_PRESSURE * room)
@@ -464,16 +472,16 @@ STEPS_PER_FILLING = 70.0
 
 
 def filling_time(plant: PlantParameters, volume: float) -> float:
-    """Shortest time constant [s] of a chamber of ``volume`` [m^3] behind the fully open valve and the leak."""
+    """Shortest time constant [s] of a chamber of ``volume`` [m^3] filled through the open valve and the leakage."""
     return volume / ((plant.valve_conductance + plant.leak_conductance) * plant.gas_product)
 
 
 def is_slow(plant: PlantParameters, step: float, volume_1: float, volume_2: float, stiffness: float) -> bool:
-    """True where a step [s] is at most 1/70 of the time in which either chamber fills, of two volumes [m^3].
+    """Return whether a step [s] is at most 1/70 of the filling time of either chamber; volumes in m^3.
 
-    This keeps the error of a plain step below 1e-3 of the pressure range (docs/decisions/0002). ``stiffness`` [-] is
-    how much stiffer than at constant temperature the gas is: 1, or the heat capacity ratio, by which adiabatic chambers
-    also fill faster. Any of the numbers may be an array (runs,), and the result is one then.
+    The error of an undivided step then stays below 1e-3 of the pressure range (docs/decisions/0002). ``stiffness`` [-]
+    is the stiffness of the gas divided by the isothermal stiffness: 1, or the heat capacity ratio for adiabatic
+    chambers, which also fill faster. Any argument may be an array (runs,), and the result is then an array.
     """
     # The smaller chamber fills fastest. 1e-9 above, so that a step that was made from this very limit passes.
     filling = filling_time(plant, smaller(volume_1, volume_2))

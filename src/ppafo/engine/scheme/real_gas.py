@@ -1,7 +1,7 @@
-"""Gas of one temperature whose pressure is not in proportion to its density: the step of ``pneumatics`` on true masses.
+"""Isothermal real gas, whose pressure is not proportional to its density: the step of ``pneumatics`` on true masses.
 
-``PlantState`` counts the gas as its gas content, ``P V M / (R T_0)``, so that all that reads pressures stays as it is;
-the true masses stand beside it. The ports ``gas_density`` and ``ideal_density`` give the equation of state.
+``PlantState`` stores the gas content, ``P V M / (R T_0)``, so that code which reads pressures applies unchanged; the
+true masses are stored in addition. The ports ``gas_density`` and ``ideal_density`` give the equation of state.
 """
 
 from typing import NamedTuple
@@ -24,7 +24,7 @@ from ppafo.model.ports import gas_density, ideal_density
 
 
 class RealGas(NamedTuple):
-    """First stage of a step, and both volumes [m^3] to which it leads."""
+    """First stage of a step with real gas, and both chamber volumes [m^3] at its end."""
 
     moving: MovingGas
     volume_1: float
@@ -32,7 +32,7 @@ class RealGas(NamedTuple):
 
 
 class RealChange(NamedTuple):
-    """Change over one step: fields of ``GasChange`` [kg], and of the gas contents of both chambers [kg]."""
+    """Changes over one step [kg]: true masses and totals as in ``GasChange``, and gas contents of both chambers."""
 
     gas: GasChange
     content_1: float
@@ -40,26 +40,26 @@ class RealChange(NamedTuple):
 
 
 def true_mass(content: float, volume: float) -> float:
-    """True mass [kg] of the gas in a volume [m^3] from its content [kg]. Equation (3)."""
+    """True mass [kg] of gas with the given content [kg] in a volume [m^3]. Equation (3)."""
     return volume * gas_density(content / volume)
 
 
 def masses_at_start(plant: PlantParameters, initial: PlantState, *, parts: ActuatorFunctions) -> TrueMasses:
-    """True masses [kg] of the gas in both chambers of a state, whose masses are those of an ideal gas."""
+    """True masses [kg] of the gas in both chambers, for a state whose masses are ideal-gas contents."""
     volume_1, volume_2 = parts.rest_volumes(plant, initial.angle)
     return TrueMasses(true_mass(initial.mass_1, volume_1), true_mass(initial.mass_2, volume_2))
 
 
 def content_of(mass: float, volume: float) -> float:
-    """Content [kg] of a true mass [kg] in a volume [m^3]: the mass of an ideal gas at its pressure. Equation (3)."""
+    """Content [kg] of a true mass [kg] in a volume [m^3]: mass of ideal gas at the same pressure. Equation (3)."""
     ideal, _ = ideal_density(mass / volume)
     return volume * ideal
 
 
 def content_rate(content: float, volume: float, growth: float, flow: float) -> float:
-    """Rate of a content [kg/s] in a volume [m^3] that grows [m^3/s] while gas flows in [kg/s].
+    """Rate of a content [kg/s] in a volume [m^3] that grows at ``growth`` [m^3/s], with an inflow ``flow`` [kg/s].
 
-    With the density u of the content and rho of the gas, ``d(u V)/dt = du/drho (flow - rho V') + u V'``.
+    With the ideal-gas density u and the true density rho, ``d(u V)/dt = du/drho (flow - rho V') + u V'``.
     """
     density = gas_density(content / volume)
     ideal, stiffness = ideal_density(density)
@@ -76,7 +76,7 @@ def begin_real_gas(
     *,
     parts: ActuatorFunctions,
 ) -> RealGas:
-    """First stage of one step [s] in which the angle runs to ``next_angle`` [rad]; as ``begin_moving_gas``."""
+    """First stage of one step [s] as ``begin_moving_gas``, for a real gas; the angle runs to ``next_angle`` [rad]."""
     volume_1, volume_2 = parts.rest_volumes(plant, state.angle)
     next_1, next_2 = parts.rest_volumes(plant, next_angle)
     density_1, density_2 = masses.mass_1 / volume_1, masses.mass_2 / volume_2
@@ -98,7 +98,7 @@ def begin_real_gas(
 def real_change(
     plant: PlantParameters, state: PlantState, masses: TrueMasses, begun: RealGas, second: Flows, step: float
 ) -> RealChange:
-    """Changes by both stages of one step [s]."""
+    """Changes [kg] in one step [s] from both stages."""
     # The totals count true masses; the contents follow from these at the volumes of the end.
     gas = moving_change(plant, begun.moving.still, second, step)
     return RealChange(
@@ -109,7 +109,7 @@ def real_change(
 
 
 def with_real_gas(state: PlantState, masses: TrueMasses, change: RealChange) -> tuple[PlantState, TrueMasses]:
-    """State and true masses with the gas of one step added."""
+    """State and true masses after adding the gas of one step."""
     gas = change.gas
     vented = gas.supplied - gas.mass_1 - gas.mass_2
     return (
@@ -129,6 +129,6 @@ def with_real_gas(state: PlantState, masses: TrueMasses, change: RealChange) -> 
 def at_angle(
     plant: PlantParameters, state: PlantState, masses: TrueMasses, angle: float, *, parts: ActuatorFunctions
 ) -> PlantState:
-    """State with the gas contents at the angle [rad] that the vane reached."""
+    """State with the gas contents at the angle [rad] reached by the vane."""
     volume_1, volume_2 = parts.rest_volumes(plant, angle)
     return state._replace(mass_1=content_of(masses.mass_1, volume_1), mass_2=content_of(masses.mass_2, volume_2))

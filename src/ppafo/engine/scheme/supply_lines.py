@@ -1,9 +1,10 @@
-"""Step of both chambers with their supply lines: both gas schemes with supply pressures that change.
+"""Integration step of both chambers with supply lines, isothermal or with an energy balance.
 
-The stages of ``pneumatics`` keep their second order with any matrix: this one says that a line loses
-what its chamber gains, so that a chamber that has come to the pressure of a small line asks for no small step. The
-lines follow after each stage, with what the valves took from each of them. Gas in a line has the reference temperature,
-with an energy balance of the chambers too: what a warm chamber pushes back gives its heat to the line's walls.
+The stages of ``pneumatics`` keep their second order with any matrix. The matrix here takes into account that a line
+loses the gas that its chamber gains, so that a chamber in equilibrium with a small line does not require small steps.
+The lines are integrated after each stage, with the gas drawn by the valves. Gas in a line has the reference
+temperature, also with an energy balance of the chambers: warm gas pushed back from a chamber gives its heat to the
+walls of the line.
 """
 
 import math
@@ -34,7 +35,14 @@ from ppafo.model.regulator import LineState, LineStep, SupplyLines, line_pressur
 
 
 class FedGas(NamedTuple):
-    """First stage: both chambers, flow out of line 2 and gamma h times its change [kg/s], both lines after it."""
+    """First stage of a step with supply lines.
+
+    Attributes:
+        chambers: first stage of the gas in both chambers
+        taken_2: flow out of line 2 [kg/s]
+        drift_2: gamma h times the time derivative of the flow out of line 2 [kg/s]
+        lines: both lines after the stage
+    """
 
     chambers: MovingGas
     taken_2: float
@@ -43,7 +51,7 @@ class FedGas(NamedTuple):
 
 
 def plant_at_line_pressures(plant: PlantParameters, lines: SupplyLines, state: LineState) -> PlantParameters:
-    """The plant with the pressures of its lines in place of those that the regulators are set to."""
+    """Plant whose supply pressures are the line pressures instead of the set pressures of the regulators."""
     pressure_1, pressure_2 = line_pressures(lines, plant.gas_product, state)
     return plant._replace(supply_pressure=pressure_1, dorsiflexion_pressure=pressure_2)
 
@@ -57,13 +65,13 @@ def lines_after(
     inlet_rise: float,
     step: float,
 ) -> LineStep:
-    """Both lines after a step [s], as ``step_lines``, with regulators that are set to the pressures of the plant."""
+    """Both lines after a step [s], as ``step_lines``, with the supply pressures of the plant as set pressures."""
     set_1, set_2 = plant.supply_pressure, plant.dorsiflexion_pressure
     return step_lines(lines, set_1, set_2, plant.gas_product, state, taken_1, taken_2, inlet_rise, step)
 
 
 def with_lines(linear: Linearisation, share_1: float, share_2: float) -> Linearisation:
-    """The linearisation with lines that lose what their chambers gain; shares are volumes of chamber over line [-]."""
+    """Linearisation that includes the gas lost by the lines; ``share`` is chamber volume divided by line volume [-]."""
     more_1, more_2 = linear.supplied_by_1 * share_1, linear.supplied_by_2 * share_2
     a, d = linear.a - more_1, linear.d - more_2
     scale = 1.0 / (a * d - linear.b * linear.c)
@@ -89,7 +97,7 @@ def begin_fed_gas(
     *,
     parts: ActuatorFunctions,
 ) -> FedGas:
-    """First stage of one step [s] with volumes that run towards ``next_angle`` [rad]; ports at line pressures."""
+    """First stage of one step [s] with ports at line pressures and volumes that change up to ``next_angle`` [rad]."""
     held = held_chambers(plant, state.angle, parts=parts)
     linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
     volumes = parts.rest_volumes(plant, state.angle)
@@ -113,7 +121,7 @@ def end_lines(
     from_2: float,
     step: float,
 ) -> LineState:
-    """Both lines at the end of the step [s]; ``change`` is what the chambers and totals gained in it.
+    """Both lines at the end of the step [s]; ``change`` are the mass changes of chambers and totals in the step.
 
     ``from_2`` is the flow [kg/s] out of line 2 in the second stage.
     """
@@ -127,9 +135,9 @@ def end_lines(
 
 
 def line_error(plant: PlantParameters, lines: SupplyLines, first: LineState, after: LineState) -> float:
-    """Estimated error of both line pressures at the end of a step over what is allowed [-], as ``gas_error``.
+    """Ratio of the estimated error of both line pressures after a step to the allowed error [-], as ``gas_error``.
 
-    ``first`` are the lines after the first stage, which is of first order; half of what the second stage moved them by.
+    ``first`` are the lines after the first stage, which is of first order; the error is half the change by the second.
     """
     first_1, first_2 = line_pressures(lines, plant.gas_product, first)
     after_1, after_2 = line_pressures(lines, plant.gas_product, after)
@@ -140,7 +148,7 @@ def line_error(plant: PlantParameters, lines: SupplyLines, first: LineState, aft
 
 
 class FedThermalGas(NamedTuple):
-    """First stage with an energy balance; beside the chambers as in ``FedGas``."""
+    """First stage of a step with supply lines and an energy balance; fields as in ``FedGas``."""
 
     chambers: ThermalGas
     taken_2: float
@@ -149,7 +157,7 @@ class FedThermalGas(NamedTuple):
 
 
 def with_line(flow: PortFlowSlopes, fraction: float) -> PortFlowSlopes:
-    """The flow of a port whose line loses what its chamber gains; ``fraction`` as in ``with_lines``."""
+    """Flow of a port with derivatives that include the gas lost by its line; ``fraction`` as in ``with_lines``."""
     # A chamber that draws lowers its own supply: the flow responds more strongly.
     more = flow.source_slope * fraction
     return PortFlowSlopes(
@@ -161,7 +169,7 @@ def with_line(flow: PortFlowSlopes, fraction: float) -> PortFlowSlopes:
 
 
 def mass_from_source(thermal: ThermalParameters, flow: float, state: PlantState, masses: ThermalState) -> float:
-    """True mass flow [kg/s] out of line 2 from the flow at the reference temperature; below 0, warm gas flows back."""
+    """True mass flow [kg/s] out of line 2 from the flow at the reference temperature; warm gas flows back below 0."""
     return flow * transport(thermal, flow, 1.0, math.sqrt(state.mass_2 / masses.mass_2)).mass
 
 
@@ -206,7 +214,7 @@ def end_thermal_lines(
     flow_2: float,
     step: float,
 ) -> LineState:
-    """Both lines at the end of the step [s], from the second stage of the gas and its flow out of line 2 [kg/s]."""
+    """Both lines at the end of the step [s], from the second stage of the gas and ``flow_2`` [kg/s] out of line 2."""
     gas = begun.chambers
     from_2 = mass_from_source(thermal, flow_2, gas.end, gas.end_masses)
     second_2 = from_2 - 2.0 * begun.taken_2 - begun.drift_2 + gas.matrix.slopes.supplied_by_2 * second.content_2

@@ -1,18 +1,19 @@
-"""Step of both chambers with an energy balance: the Rosenbrock method of ``pneumatics`` on energies and masses.
+"""Integration step of the gas with an energy balance: the Rosenbrock method of ``pneumatics`` on energies and masses.
 
-The energy of a chamber is counted as its gas content, ``P V M / (R T_0)`` [kg]: the mass that would give its pressure
-at the reference temperature. Content over true mass is ``T / T_0``. Gas comes from the source and from the atmosphere
-at ``T_0``. Where the gas is isothermal the content is the mass, so all that reads pressures from ``PlantState`` stays
-as it is; here the true masses stand beside it. The matrix leaves out how the flows depend on the temperature upstream,
-which changes no faster than a chamber fills; the method keeps its order with any matrix.
+The energy of a chamber is expressed as its gas content, ``P V M / (R T_0)`` [kg]: the mass that would give its pressure
+at the reference temperature. Content divided by true mass is ``T / T_0``. Gas from the source and from the atmosphere
+enters at ``T_0``. For isothermal gas the content is the mass, so that code which reads pressures from ``PlantState``
+applies unchanged; the true masses are stored in addition. The matrix neglects the dependence of the flows on the
+upstream temperature, which changes no faster than a chamber fills; the method keeps its order with any matrix.
 
-A chamber may give under pressure: ``V(angle, P)`` then takes part of what enters as work on its wall. With ``c`` the
-content, ``e`` the rate of content that enters with gas and heat, ``g`` the rate at which the angle alone widens the
-chamber, ``x = P/V dV/dP`` and the heat capacity ratio ``k``, the energy balance of ``P V/(k - 1)`` is
+A chamber may expand under pressure. With its volume ``V(angle, P)``, part of the entering energy becomes work on the
+wall. Let ``c`` be the content, ``e`` the rate of content that enters with gas and heat, ``g`` the rate of change of the
+volume due to the angle alone, ``x = P/V dV/dP``, and ``k`` the heat capacity ratio. The energy balance of ``P V/(k -
+1)`` is
 
     dc/dt = e - (k - 1) c/V dV/dt,   dV/dt = g + dV/dP dP/dt,   P V = R T_0/M c.
 
-The last one in time, ``dP/dt (V + P dV/dP) = R T_0/M dc/dt - P g``, takes dP/dt and dV/dt out of it:
+The time derivative of the last equation, ``dP/dt (V + P dV/dP) = R T_0/M dc/dt - P g``, eliminates dP/dt and dV/dt:
 
     dc/dt = (e (1 + x) - (k - 1) c g/V) / (1 + k x).
 
@@ -49,9 +50,16 @@ from ppafo.model.plant import (
 
 
 class ThermalFlows(NamedTuple):
-    """Rates of both contents and both masses, of the gas drawn from the source and of the vane leak (1 to 2) [kg/s].
+    """Rates of gas with an energy balance [kg/s].
 
-    Then the contents that come from the source, that pass both ports, and that the walls give [kg/s].
+    Attributes:
+        content_1, content_2: contents of both chambers
+        mass_1, mass_2: true masses of both chambers
+        supplied: mass drawn from the source
+        leaked: mass through the vane leakage from chamber 1 to 2
+        source_content: content drawn from the source
+        port_content: content through both ports
+        heat: content equivalent to the heat from the chamber walls
     """
 
     content_1: float
@@ -66,9 +74,10 @@ class ThermalFlows(NamedTuple):
 
 
 class FlowSlopes(NamedTuple):
-    """Gamma h times the derivatives of ``ThermalFlows`` with respect to both contents; walls and work left out.
+    """Gamma h times the derivatives of ``ThermalFlows`` with respect to both contents [-], without walls and work.
 
-    Those of contents are what enters the chambers, of which they keep the shares ``kept_1`` and ``kept_2`` [-].
+    Derivatives of contents apply to the content that enters the chambers; the chambers retain the fractions ``kept_1``
+    and ``kept_2`` [-].
     """
 
     content_1_by_1: float
@@ -90,9 +99,9 @@ class FlowSlopes(NamedTuple):
 
 
 class WarmChambers(NamedTuple):
-    """Both chambers at one end of a step: volumes [m^3], and rates at which the angle widens them [m^3/s].
+    """Both chambers at one end of a step: volumes [m^3], and rates of volume change due to the angle [m^3/s].
 
-    ``give`` is P dV/dP over the volume [-], 0 of a rigid chamber.
+    ``give`` is the relative compliance ``P/V dV/dP`` [-], 0 for a rigid chamber.
     """
 
     volume_1: float
@@ -104,31 +113,32 @@ class WarmChambers(NamedTuple):
 
 
 class Transport(NamedTuple):
-    """Mass [kg/s] and content [kg/s] that a flow carries, each over the flow at the reference temperature [-]."""
+    """Mass and content carried by a flow, each divided by the flow at the reference temperature [-]."""
 
     mass: float
     content: float
 
 
 def transport(thermal: ThermalParameters, flow: float, root_from: float, root_to: float) -> Transport:
-    """Mass and enthalpy carried by a flow, by its direction; roots of ``T / T_0`` on both sides [-]."""
+    """Mass and content carried by a flow according to its direction; roots are ``sqrt(T / T_0)`` [-]."""
     root = root_from if flow >= 0.0 else root_to
     return Transport(mass_flow_ratio(root), enthalpy_flow_ratio(root, thermal.heat_capacity_ratio))
 
 
 ALLOWED_OF_TEMPERATURE = 2.5e-4
-"""Error of one step over the reference temperature; with it a run keeps to 2e-3 of it."""
+"""Allowed error of one step divided by the reference temperature [-]; the error of a run then stays below 2e-3."""
 NEARLY_EQUAL = 1.0e-4
-"""Difference of two pressures over one of them below which gas may turn within a step."""
+"""Relative difference of two pressures [-] below which the flow may reverse within a step."""
 
 
 def steeper_transport(
     thermal: ThermalParameters, flow: float, turns: float, root_from: float, root_to: float
 ) -> Transport:
-    """Transport of a flow [kg/s]; below ``turns``, where it may reverse, the larger value of both sides.
+    """Transport of a flow [kg/s]; the larger value of both sides below ``turns`` [kg/s], where the flow may reverse.
 
-    Cold gas that leaves a settled chamber would turn into warm gas that enters, more of it than the matrix knows: a
-    matrix that is too steep damps that, one that is too flat makes it grow from step to step.
+    When the flow of a settled chamber reverses, outflowing cold gas becomes inflowing warm gas, more than the matrix
+    assumes. A matrix that is too steep damps this error; a matrix that is too flat lets the error grow from step to
+    step.
     """
     steeper = max(root_from, root_to)
     is_settled = abs(flow) < turns
@@ -136,17 +146,17 @@ def steeper_transport(
 
 
 def wall_rate(thermal: ThermalParameters, volume: float, content: float, mass: float) -> float:
-    """Content [kg/s] that the wall of a chamber gives to its gas."""
+    """Heat flow from the wall of a chamber to its gas, as a rate of content [kg/s]."""
     return thermal.wall_exchange * volume * (1.0 - content / mass)
 
 
 def kept_share(ratio: float, give: float) -> float:
-    """Share of the energy that enters which stays in a chamber [-]; the rest is work on a wall that gives."""
+    """Fraction of the entering energy that stays in a chamber [-]; the rest is work on a compliant wall."""
     return (1.0 + give) / (1.0 + ratio * give)
 
 
 def content_rate(thermal: ThermalParameters, entering: float, work: float, heat: float, give: float) -> float:
-    """Rate of a content [kg/s] from what enters with gas, the work by the angle and the heat of the wall [kg/s]."""
+    """Rate of a content [kg/s] from the entering gas, the work due to the angle and the heat from the wall [kg/s]."""
     kept = 1.0 + give
     return (entering * kept - work + heat * kept) / (1.0 + thermal.heat_capacity_ratio * give)
 
@@ -160,7 +170,7 @@ def thermal_flows(
     in_2: PortFlow,
     leak: float,
 ) -> ThermalFlows:
-    """All rates from the flows at the reference temperature [kg/s]: enthalpy that passes, work, heat of the walls."""
+    """All rates of gas with an energy balance [kg/s], from the flows at the reference temperature [kg/s]."""
     root_1 = math.sqrt(state.mass_1 / masses.mass_1)
     root_2 = math.sqrt(state.mass_2 / masses.mass_2)
     vent_1 = in_1.total - in_1.from_source
@@ -210,9 +220,10 @@ def flow_slopes(
     near_2: float,
     at: WarmChambers,
 ) -> FlowSlopes:
-    """Derivatives of all flows by both contents; weights are gamma h times pressure per content [Pa s/kg].
+    """Gamma h times the derivatives of all flows with respect to both contents [-].
 
-    ``near_1`` and ``near_2`` [Pa] are differences of pressure below which a flow may turn.
+    ``root_1`` and ``root_2`` are ``sqrt(T / T_0)`` of both chambers [-]. The weights are gamma h times pressure divided
+    by content [Pa s/kg]. ``near_1`` and ``near_2`` [Pa] are pressure differences below which a flow may reverse.
     """
     leak_carries = transport(thermal, leak.flow, root_1, root_2)
     source_1 = transport(thermal, in_1.from_source, 1.0, root_1)
@@ -249,7 +260,7 @@ def flow_slopes(
 
 
 def flow_response(slopes: FlowSlopes, content_1: float, content_2: float) -> ThermalFlows:
-    """Gamma h times the change of all flows but heat [kg/s] while both contents change at two rates [kg/s]."""
+    """Gamma h times the rate of change of all flows except heat [kg/s], for given rates of both contents [kg/s]."""
     return ThermalFlows(
         content_1=slopes.kept_1 * (slopes.content_1_by_1 * content_1 + slopes.content_1_by_2 * content_2),
         content_2=slopes.kept_2 * (slopes.content_2_by_1 * content_1 + slopes.content_2_by_2 * content_2),
@@ -265,7 +276,7 @@ def flow_response(slopes: FlowSlopes, content_1: float, content_2: float) -> The
 
 
 def combine_flows(one: ThermalFlows, factor_one: float, other: ThermalFlows, factor_other: float) -> ThermalFlows:
-    """Two sets of rates [kg/s], each times a factor [-], added."""
+    """Sum of two sets of rates [kg/s], each multiplied by a factor [-]."""
     return ThermalFlows(
         content_1=factor_one * one.content_1 + factor_other * other.content_1,
         content_2=factor_one * one.content_2 + factor_other * other.content_2,
@@ -280,7 +291,15 @@ def combine_flows(one: ThermalFlows, factor_one: float, other: ThermalFlows, fac
 
 
 class ThermalMatrix(NamedTuple):
-    """Matrix of both contents after the masses are eliminated, by rows; how the walls respond to the masses [-]."""
+    """Matrix of a step with an energy balance, after elimination of the masses.
+
+    Attributes:
+        slopes: derivatives of all flows with respect to both contents
+        a, b, c, d: matrix elements by rows [-]
+        scale: 1 divided by the determinant [-]
+        wall_1, wall_2: gamma h times the derivatives of the wall heat with respect to the masses [-]
+        cooling_1, cooling_2: gamma h times the decrease of the wall heat with the contents [-]
+    """
 
     slopes: FlowSlopes
     a: float
@@ -295,7 +314,7 @@ class ThermalMatrix(NamedTuple):
 
 
 class ThermalBegin(NamedTuple):
-    """Both chambers at the begin of a step, and how their absolute pressures follow their contents [Pa/kg]."""
+    """Both chambers at the start of a step, and derivatives of absolute pressures by contents [Pa/kg]."""
 
     chambers: WarmChambers
     per_content_1: float
@@ -303,7 +322,16 @@ class ThermalBegin(NamedTuple):
 
 
 class ThermalGas(NamedTuple):
-    """First stage of a step: its matrix, the stage, the changes in time, the gas and chambers it leads to."""
+    """First stage of a step with an energy balance.
+
+    Attributes:
+        matrix: matrix of the step
+        first: stage slopes [kg/s]
+        drift: gamma h times the time derivatives of all flows [kg/s]
+        end: state of the plant after the stage
+        end_masses: true masses and totals after the stage
+        ended: chambers after the stage
+    """
 
     matrix: ThermalMatrix
     first: ThermalFlows
@@ -321,7 +349,7 @@ def thermal_matrix(
     weight: float,
     slopes: FlowSlopes,
 ) -> ThermalMatrix:
-    """The matrix of a step; ``weight`` is gamma h [s]."""
+    """Matrix of a step with an energy balance; ``weight`` is gamma h [s]."""
     cooling_1 = weight * thermal.wall_exchange * at.volume_1 / masses.mass_1
     cooling_2 = weight * thermal.wall_exchange * at.volume_2 / masses.mass_2
     wall_1 = cooling_1 * state.mass_1 / masses.mass_1
@@ -375,7 +403,7 @@ def solve_thermal_stage(matrix: ThermalMatrix, right: ThermalFlows) -> ThermalFl
 
 
 class WarmFunctions(NamedTuple):
-    """Functions of chambers with an energy balance, which an actuator has of its own."""
+    """Functions of an actuator for chambers with an energy balance."""
 
     chambers_at_begin: Callable[..., ThermalBegin]
     chambers_at_end: Callable[..., WarmChambers]
@@ -394,13 +422,13 @@ def begin_thermal_gas(
     *,
     parts: WarmFunctions,
 ) -> ThermalGas:
-    """First stage of one step [s] in which the volumes run linearly towards ``next_angle`` [rad]."""
+    """First stage of one step [s] with an energy balance; volumes change linearly up to ``next_angle`` [rad]."""
     at_begin = parts.chambers_at_begin(plant, state, next_angle, step)
     return begin_thermal_stage(plant, thermal, state, masses, at_begin, next_angle, flowing, step, parts=parts)
 
 
 def chambers_at_begin(plant: PlantParameters, state: PlantState, next_angle: float, step: float) -> ThermalBegin:
-    """Both chambers at the begin of a step [s] whose volumes run towards ``next_angle`` [rad]. Equation (3)."""
+    """Both chambers at the start of a step [s] with volumes that change up to ``next_angle`` [rad]. Equation (3)."""
     volume_1, volume_2 = chamber_volumes(plant, state.angle)
     next_1, _ = chamber_volumes(plant, next_angle)
     # The chambers of a vane are opposite: what one gains in volume the other loses.
@@ -418,7 +446,7 @@ def chambers_at_begin(plant: PlantParameters, state: PlantState, next_angle: flo
 def chambers_at_end(
     plant: PlantParameters, begun: WarmChambers, _state: PlantState, _end: PlantState, next_angle: float, _step: float
 ) -> WarmChambers:
-    """Both chambers at ``next_angle`` [rad], to which a step [s] leads that has ``begun`` with these. Equation (3)."""
+    """Both chambers at the end of a step [s] at ``next_angle`` [rad], with the rates of ``begun``. Equation (3)."""
     volume_1, volume_2 = chamber_volumes(plant, next_angle)
     return begun._replace(volume_1=volume_1, volume_2=volume_2)
 
@@ -435,7 +463,7 @@ def begin_thermal_stage(
     *,
     parts: WarmFunctions,
 ) -> ThermalGas:
-    """First stage of one step [s] with chambers that run to ``next_angle`` [rad], from all flows and their slopes."""
+    """First stage of one step [s] that ends at ``next_angle`` [rad], from all flows with their derivatives."""
     in_1, in_2, leak = flowing.in_1, flowing.in_2, flowing.leak
     at = at_begin.chambers
     per_content_1, per_content_2 = at_begin.per_content_1, at_begin.per_content_2
@@ -466,7 +494,7 @@ def begin_thermal_stage(
 
 
 def end_pressures(plant: PlantParameters, begun: ThermalGas) -> tuple[float, float]:
-    """Absolute pressures [Pa] to which the first stage leads. Equation (3)."""
+    """Absolute pressures [Pa] of both chambers after the first stage. Equation (3)."""
     return (
         begun.end.mass_1 * plant.gas_product / begun.ended.volume_1,
         begun.end.mass_2 * plant.gas_product / begun.ended.volume_2,
@@ -474,7 +502,7 @@ def end_pressures(plant: PlantParameters, begun: ThermalGas) -> tuple[float, flo
 
 
 def second_thermal_stage(thermal: ThermalParameters, begun: ThermalGas, flowing: StageFlows) -> ThermalFlows:
-    """Flows of mass [kg/s] and of energy [W] in the second stage of a step, of gas with an energy balance."""
+    """Slopes of the second stage [kg/s] of a step with an energy balance."""
     flows = thermal_flows(thermal, begun.end, begun.end_masses, begun.ended, flowing.in_1, flowing.in_2, flowing.leak)
     # Right-hand side of ROS2: the flows at the end of the first stage less twice that stage, less the drift.
     right = combine_flows(combine_flows(flows, 1.0, begun.first, -2.0), 1.0, begun.drift, -1.0)
@@ -484,7 +512,7 @@ def second_thermal_stage(thermal: ThermalParameters, begun: ThermalGas, flowing:
 def thermal_change(
     plant: PlantParameters, thermal: ThermalParameters, begun: ThermalGas, second: ThermalFlows, step: float
 ) -> ThermalFlows:
-    """Changes [kg] in one step [s] from both stages; supplies that are not relieving are as in ``moving_change``."""
+    """Changes [kg] in one step [s] from both stages; supplies without relief are treated as in ``moving_change``."""
     change = combine_flows(begun.first, 1.5 * step, second, 0.5 * step)
     supplied = admitted_flow(change.supplied, plant.relieving)
     kept = supplied - change.supplied
@@ -505,16 +533,16 @@ def thermal_change(
 
 
 def thermal_error(plant: PlantParameters, begun: ThermalGas, second: ThermalFlows, step: float) -> float:
-    """Estimated error of pressures and temperatures after a step [s] over what is allowed [-], as ``gas_error``.
+    """Estimated error of pressures and temperatures after a step [s] divided by the allowed error, as ``gas_error``.
 
-    A chamber that gas flushes within a step has a pressure that is settled and a temperature that is not.
+    In a chamber that is flushed within a step, the pressure is settled but the temperature is not.
     """
     added = solve_thermal_stage(begun.matrix, combine_flows(begun.first, 1.0, second, 1.0))
     return 0.5 * max(over_allowed(plant, begun, added.content_1, added.content_2, step), warming(begun, added, step))
 
 
 def warming(begun: ThermalGas, added: ThermalFlows, step: float) -> float:
-    """Errors of contents and masses [kg/s] over a step [s], as the larger of both temperatures' over the allowed."""
+    """Larger temperature error divided by the allowed error [-], from rates of content and mass errors [kg/s]."""
     # The temperature over the reference is content over mass: what a little of both changes it by.
     mass_1, mass_2 = begun.end_masses.mass_1, begun.end_masses.mass_2
     warmer_1 = (added.content_1 - begun.end.mass_1 / mass_1 * added.mass_1) / mass_1
@@ -523,14 +551,14 @@ def warming(begun: ThermalGas, added: ThermalFlows, step: float) -> float:
 
 
 def thermal_opening_error(plant: PlantParameters, begun: ThermalGas, shift: float, step: float) -> float:
-    """Error of taking a valve's mean opening in a step [s] over what is allowed [-], as ``opening_error``."""
+    """Error due to the mean valve opening of a step [s] divided by the allowed error [-], as ``opening_error``."""
     response_1 = (begun.matrix.a - 1.0) * begun.first.content_1
     response_2 = (begun.matrix.d - 1.0) * begun.first.content_2
     return shift / (12.0 * GAMMA) * over_allowed(plant, begun, response_1, response_2, step)
 
 
 def over_allowed(plant: PlantParameters, begun: ThermalGas, rate_1: float, rate_2: float, step: float) -> float:
-    """Errors of both contents [kg/s] over a step [s], as the larger of both pressures' over what is allowed [-]."""
+    """Larger pressure error divided by the allowed error [-], from content errors [kg/s] over a step [s]."""
     end_1, end_2 = end_pressures(plant, begun)
     larger = max(
         abs(rate_1) / (begun.ended.volume_1 * pressure_that_matters(plant, end_1)),
@@ -542,7 +570,7 @@ def over_allowed(plant: PlantParameters, begun: ThermalGas, rate_1: float, rate_
 def after_motion(
     plant: PlantParameters, thermal: ThermalParameters, state: PlantState, assumed_angle: float, angle: float
 ) -> PlantState:
-    """State whose gas did its work up to the angle [rad] that the vane reached, where the stages assumed another."""
+    """State after isentropic correction of the gas from the assumed angle [rad] to the angle reached [rad]."""
     assumed_1, assumed_2 = chamber_volumes(plant, assumed_angle)
     volume_1, volume_2 = chamber_volumes(plant, angle)
     half = 0.5 * (thermal.heat_capacity_ratio - 1.0)
@@ -561,7 +589,7 @@ def after_motion(
 
 
 def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlows) -> tuple[PlantState, ThermalState]:
-    """State, true masses and totals with the changes [kg] of one step added; work comes later."""
+    """State, true masses and totals after adding the changes [kg] of one step, without the work of the gas."""
     vented = change.supplied - change.mass_1 - change.mass_2
     return (
         PlantState(
@@ -585,7 +613,7 @@ def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlo
 
 
 def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, after: PlantState) -> ThermalState:
-    """True masses and totals with the work of the gas between two states, along the motion that happened."""
+    """True masses and totals after adding the work of the gas between two states along the actual motion."""
     before_1, before_2 = chamber_pressures(plant, before.angle, before.mass_1, before.mass_2)
     after_1, after_2 = chamber_pressures(plant, after.angle, after.mass_1, after.mass_2)
     # The mean of the pressures at both ends, over the motion that happened: the trapezoidal rule, as for the vane.
@@ -606,7 +634,7 @@ def masses_at_start(
     *,
     parts: ActuatorFunctions,  # noqa: ARG001 - those of a gas that is not ideal need them
 ) -> ThermalState:
-    """True masses [kg] of gas at the reference temperature, where they are what the state counts, and no energy yet."""
+    """True masses [kg] of gas at the reference temperature, equal to the masses in the state; energy totals are 0."""
     return ThermalState(
         mass_1=initial.mass_1,
         mass_2=initial.mass_2,

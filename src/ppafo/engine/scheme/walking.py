@@ -1,6 +1,6 @@
-"""Step of a leg that walks with the device: foot free or on the ground, and the transition between them.
+"""Integration step of a walking leg with the device: foot free or on the ground, and the transition between both.
 
-First the torques on the ankle beside actuator, friction and damping: wearer, ground, foot and foot plate.
+The torques on the ankle in addition to actuator, friction and damping come from wearer, ground, foot and foot plate.
 """
 
 from typing import NamedTuple
@@ -36,9 +36,9 @@ from ppafo.model.ports import friction_in_motion
 class DeviceShare(NamedTuple):
     """Contribution of foot plate and vane to the leg: inertia [kg m^2], damping [N m s/rad], mass moment [kg m].
 
-    The last is mass times distance from the ankle. They turn with the foot, so the shank's motion moves them too:
-    equation (1) holds for a shank at rest. The plant of a walking leg carries the sums of leg and device, and no
-    gravity of its own.
+    The mass moment is mass times distance from the ankle. Foot plate and vane turn with the foot, so that the motion of
+    the shank moves them too; equation (1) holds for a shank at rest. The plant of a walking leg has the sums of leg and
+    device, and no gravity torque.
     """
 
     inertia: float
@@ -47,21 +47,26 @@ class DeviceShare(NamedTuple):
 
 
 class Direction(NamedTuple):
-    """Sine and cosine of the angle of the foot over the horizontal."""
+    """Sine and cosine [-] of the angle of the foot above the horizontal."""
 
     sine: float
     cosine: float
 
 
 class CarriedFoot(NamedTuple):
-    """Torques [N m] of shank, knee and weight about the ankle: on the foot, on foot plate and vane."""
+    """Torques [N m] about the ankle due to shank motion, knee motion and weight.
+
+    Attributes:
+        foot: torque on the foot [N m]
+        plate: torque on foot plate and vane [N m]
+    """
 
     foot: float
     plate: float
 
 
 def foot_direction(shank: float, angle: float) -> Direction:
-    """Direction of the foot at a shank angle and an ankle angle [rad]."""
+    """Direction of the foot for a shank angle [rad] and an ankle angle [rad]."""
     sine, cosine = sine_and_cosine_of_turns(ground.foot_angle(shank, angle) * TURNS_OF_RADIAN)
     return Direction(sine, cosine)
 
@@ -69,12 +74,12 @@ def foot_direction(shank: float, angle: float) -> Direction:
 def torque_with_carried(
     leg: LegParameters, contact: float, now: GaitNow, ground_angle: float, angle: float, carried: CarriedFoot
 ) -> float:
-    """Torque on the ankle [N m] beside actuator, friction, damping and inertia, positive in plantarflexion.
+    """Torque on the ankle [N m] without actuator, friction, damping and inertia, positive in plantarflexion.
 
-    The ankle's row of equation (11) with the prescribed shank, the wearer, tissue, the foot plate, and the ground
-    under the heel. Muscles are what a healthy ankle adds to tissue and ground along the measured angles, on the heel
-    the measured moment less tissue, so that a wearer who has all of them and no device walks the measured gait.
-    ``ground_angle`` [rad] of a flat foot, ``carried`` the torques of foot and foot plate.
+    Ankle row of equation (11) with prescribed shank: wearer, passive tissue, foot plate, and the ground under the heel.
+    The muscle torque is the torque of a healthy ankle along the measured angles minus tissue and ground; on the heel,
+    the measured moment minus tissue. A wearer with full muscle torque and without a device therefore walks the measured
+    gait. ``ground_angle`` [rad] is the foot angle of a flat foot, ``carried`` are the torques of foot and foot plate.
     """
     heel = ground.heel_torque(contact, now, leg, ground_angle, angle)
     active = now.moment if contact == ground.HEEL else now.healthy_torque
@@ -85,7 +90,7 @@ def torque_with_carried(
 
 
 def carried_foot(leg: LegParameters, share: DeviceShare, now: GaitNow, foot: Direction) -> CarriedFoot:
-    """Torques of foot and foot plate about the ankle in a direction of the foot."""
+    """Torques [N m] of foot and foot plate about the ankle for a direction of the foot."""
     mass_moment = leg.foot_mass * leg.foot_mass_centre
     return CarriedFoot(
         torque_of_body_on_foot(leg, mass_moment, foot_inertia_about_ankle(leg), now, foot),
@@ -96,7 +101,7 @@ def carried_foot(leg: LegParameters, share: DeviceShare, now: GaitNow, foot: Dir
 def torque_of_body_on_foot(
     leg: LegParameters, mass_moment: float, inertia: float, now: GaitNow, foot: Direction
 ) -> float:
-    """Torque [N m] of shank, knee and weight about the ankle, on a body on the foot: see ``torque_of_shank``."""
+    """Torque [N m] about the ankle due to shank, knee and weight on a body fixed to the foot: ``torque_of_shank``."""
     return torque_of_shank(
         FootLoad(mass_moment=mass_moment, inertia=inertia, shank_length=leg.shank_length, gravity=leg.gravity),
         now.sine_shank,
@@ -111,12 +116,21 @@ def torque_of_body_on_foot(
 
 
 class WalkState(NamedTuple):
-    """State of the walk: ground contact, gait and foot direction now, assistance, and totals since the start.
+    """State of a walk: ground contact, gait, foot direction, assistance, and totals since the start.
 
-    ``contact`` as in ``model.contact``; ``offset`` [rad] of the ankle to what the ground prescribes;
-    ``external_torque`` T_ex [N m]; forces that the sensors show [N]; ``toes_first`` 1 in a stride that began with the
-    toes; ``clearance`` lowest of the toes in this swing against the healthy gait [m]. Totals: strikes, strikes with the
-    toes first, sum of clearances [m], positive and net work of T_ex while the foot rolls over the toes [J].
+    Attributes:
+        contact: ground contact, as in ``model.contact``
+        offset: difference between the ankle angle and the angle prescribed by the ground [rad]
+        now: present gait
+        foot: present direction of the foot
+        external_torque: T_ex [N m]
+        heel_force, toe_force: forces shown by the sensors [N]
+        toes_first: 1 in a stride that started with a toe landing, else 0
+        clearance: lowest toe clearance of the present swing relative to the healthy gait [m]
+        strides: number of foot strikes
+        toe_landings: number of foot strikes with the toes first
+        clearances: sum of the clearances of all strides [m]
+        positive_push_off_work, net_push_off_work: work of T_ex while the foot rolls over the toes [J]
     """
 
     contact: float
@@ -136,7 +150,7 @@ class WalkState(NamedTuple):
 
 
 class WalkStep(NamedTuple):
-    """First stage: the free foot, where the ground would lead the ankle, and the fading difference."""
+    """First stage: free motion of the foot, ankle motion prescribed by the ground, and decaying difference [rad]."""
 
     free: FreeStep
     led: ground.Ankle
@@ -144,9 +158,9 @@ class WalkStep(NamedTuple):
 
 
 class WalkEnd(NamedTuple):
-    """Second stage: torque of the leg with the foot plate [N m], direction of the foot, and how the vane moved.
+    """Second stage: torque of the leg including the foot plate [N m], direction of the foot, and motion of the vane.
 
-    ``motion.departs`` is 1 only where the foot is free.
+    ``motion.departs`` is 1 only if the foot is free.
     """
 
     torque: float
@@ -171,7 +185,7 @@ def begin_walk(
     *,
     parts: ActuatorFunctions,
 ) -> WalkStep:
-    """Predicted step [s] of the foot, free and on the ground; ``carried`` is its load at the start of the step."""
+    """Predicted step [s] of the foot, free and on the ground; ``carried`` are the torques of the foot at the start."""
     torque = torque_with_carried(leg, walk.contact, walk.now, timing.ground_angle, state.angle, carried)
     free = begin_free(plant, state, held, torque, step, parts=parts)
     # The difference fades implicitly, so that a step longer than the fading time does not overshoot.
@@ -186,7 +200,7 @@ def begin_walk(
 
 
 def next_angle(plant: PlantParameters, leg: LegParameters, walk: WalkState, begun: WalkStep) -> float:
-    """Angle of the ankle [rad] to which the volumes run in a step."""
+    """Ankle angle [rad] at which the chamber volumes end in a step."""
     is_free = ground.is_free(walk.contact, leg.keeps_gait)
     return clamp_angle(plant, begun.free.free_angle) if is_free else begun.led.angle
 
@@ -205,9 +219,9 @@ def external_torque(
     *,
     parts: ActuatorFunctions,
 ) -> float:
-    """T_ex [N m]: what a free foot needs, equation (11), or what equation (1) leaves of the actuator on the ground.
+    """T_ex [N m]: for a free foot by equation (11), on the ground the actuator torque that equation (1) leaves.
 
-    ``torque`` [N m] of the leg with the foot plate, ``plate`` the plate's part of it.
+    ``torque`` [N m] is the torque of the leg including the foot plate, ``plate`` [N m] the part of the foot plate.
     """
     speed = state.angular_velocity
     passive_damping = leg.ankle_damping * speed
@@ -237,9 +251,9 @@ def reach_end(
     *,
     parts: ActuatorFunctions,
 ) -> tuple[WalkEnd, CarriedFoot]:
-    """End of a step [s] without an event inside it; arguments as in ``end_walk``.
+    """End of a step [s] without an event; arguments as in ``end_walk``.
 
-    ``ahead`` is of the chambers where the gas took the vane to be then.
+    ``ahead`` are the chambers at the angle assumed for the gas.
     """
     free = ground.is_free(walk.contact, leg.keeps_gait)
     predicted = clamp_angle(plant, begun.free.free_angle)
@@ -268,7 +282,7 @@ def depart_in_walk(
     *,
     parts: ActuatorFunctions,
 ) -> tuple[WalkEnd, HeldChambers]:
-    """End and chambers of a step [s] inside which an event leads the foot elsewhere; else as they are."""
+    """End and chambers of a step [s] with a stop, reversal or start of motion; otherwise both are unchanged."""
     angle, rate = depart_free(plant, state, ahead, begun.free, ended.motion, step, parts=parts)
     departs, slid = ended.motion.departs > 0.5, ended.motion
     there = held_chambers(plant, angle, parts=parts)
@@ -303,9 +317,9 @@ def end_walk(
     *,
     parts: ActuatorFunctions,
 ) -> tuple[PlantState, WalkState]:
-    """State at the end of the step [s], from ``state`` with the new gas and the angle of the begin.
+    """State at the end of the step [s], from ``state`` with the new gas and the angle at the start.
 
-    ``now``, ``held`` and ``carried`` are gait, chambers and the foot's torques at the end.
+    ``now``, ``held`` and ``carried`` are the gait, the chambers and the torques of the foot at the end.
     """
     free = ground.is_free(walk.contact, leg.keeps_gait)
     after = with_motion(state, ended.motion.angle, ended.motion.angular_velocity)
@@ -342,9 +356,9 @@ def advance_walk(
     turned: float,
     step: float,
 ) -> WalkState:
-    """Walk after a step: what the sensors show, and totals over the strides.
+    """State of the walk after a step: sensor forces, and totals over the strides.
 
-    ``height`` of the toes [m] against the healthy gait at the same instant, ``turned`` [rad] in this step.
+    ``height`` is the toe height relative to the healthy gait [m], ``turned`` the ankle rotation in this step [rad].
     """
     strikes = landed.strikes > 0.5
     # A foot that points down at the strike meets the ground with its toes.

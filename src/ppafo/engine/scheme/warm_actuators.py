@@ -1,6 +1,6 @@
 """Gas with an energy balance in chambers of any actuator.
 
-A chamber's volume follows angle and pressure, and the energy balance is the one of ``thermal_gas``.
+The chamber volume depends on angle and pressure; the energy balance is the one in ``thermal_gas``.
 """
 
 from ppafo.engine.scheme import thermal_gas
@@ -16,7 +16,7 @@ from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, Th
 def widening(
     now: Chambers, here: Chambers, ahead: Chambers, pressure_1: float, pressure_2: float, step: float
 ) -> WarmChambers:
-    """Both chambers as they are ``now``, which widen from ``here`` to ``ahead`` in a step [s] at pressures [Pa]."""
+    """Both chambers with the volumes of ``now``, growing from ``here`` to ``ahead`` in a step [s]; pressures [Pa]."""
     duration = max(step, SHORTEST)
     return WarmChambers(
         volume_1=now.volume_1,
@@ -31,7 +31,7 @@ def widening(
 def chambers_at_begin(
     plant: PlantParameters, state: PlantState, next_angle: float, step: float, *, parts: ActuatorFunctions
 ) -> ThermalBegin:
-    """Both chambers at the begin of a step [s] whose angle runs to ``next_angle`` [rad]."""
+    """Both chambers at the start of a step [s] that ends at ``next_angle`` [rad]."""
     pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
     # Volumes at both angles at one pressure: their difference is what the angle alone does.
     here = parts.chambers(plant, state.angle, pressure_1, pressure_2)
@@ -53,7 +53,7 @@ def chambers_at_end(
     *,
     parts: ActuatorFunctions,
 ) -> WarmChambers:
-    """Both chambers at ``next_angle`` [rad] with the contents to which the first stage of a step [s] leads."""
+    """Both chambers at ``next_angle`` [rad] with the contents after the first stage of a step [s]."""
     pressure_1, pressure_2 = parts.pressures(plant, next_angle, end.mass_1, end.mass_2)
     here = parts.chambers(plant, state.angle, pressure_1, pressure_2)
     ahead = parts.chambers(plant, next_angle, pressure_1, pressure_2)
@@ -69,7 +69,7 @@ def after_motion(
     *,
     parts: ActuatorFunctions,
 ) -> PlantState:
-    """State whose gas did its work up to the angle [rad] that the joint reached, where the stages assumed another."""
+    """State after isentropic correction of the gas from the assumed angle [rad] to the angle reached [rad]."""
     ratio = thermal.heat_capacity_ratio
     pressure_1, pressure_2 = parts.pressures(plant, assumed_angle, state.mass_1, state.mass_2)
     assumed = parts.chambers(plant, assumed_angle, pressure_1, pressure_2)
@@ -94,7 +94,7 @@ def after_motion(
 def with_work(
     plant: PlantParameters, masses: ThermalState, before: PlantState, after: PlantState, *, parts: ActuatorFunctions
 ) -> ThermalState:
-    """True masses and totals with the work of the gas between two states, on shaft and walls."""
+    """True masses and totals after adding the work of the gas between two states, on shaft and walls."""
     before_1, before_2 = parts.pressures(plant, before.angle, before.mass_1, before.mass_2)
     after_1, after_2 = parts.pressures(plant, after.angle, after.mass_1, after.mass_2)
     first = parts.chambers(plant, before.angle, before_1, before_2)
@@ -106,7 +106,7 @@ def with_work(
 
 
 def warm_functions(actuator: ActuatorModel) -> WarmFunctions:
-    """Return the functions of chambers with an energy balance that an actuator has."""
+    """Return the functions of an actuator for chambers with an energy balance."""
     if actuator == VANE:
         return WarmFunctions(
             chambers_at_begin=thermal_gas.chambers_at_begin,

@@ -1,10 +1,11 @@
-"""The way of one device through a step, in plain functions: read ``phases`` downwards, then ``loop``, its caller.
+"""Phases of one integration step as plain functions: ``phases`` in the order of execution, called by ``loop``.
 
-A function takes ``parts``, what the device is made of, which never changes in a run; ``lane``, the numbers of one run
-by group (``lane.plant``, ``lane.state``); and ``now``, the step of all runs. What a phase sets on its lane the later
-ones find there; a group that the program has no rows for (``Program.step_rows``) lives inside one phase.
+A function takes ``parts``, the components of the device, which never change in a run; ``lane``, the numbers of one run
+by group (``lane.plant``, ``lane.state``); and ``now``, the present step of all runs. Groups set by one phase are
+available to later phases; a group without rows in the program (``Program.step_rows``) exists only inside one phase.
 
-A debugger goes through all of this. What is compiled is made of the same functions (``engine.generator``): what asks
-``parts`` alone is decided while they are composed, and a group becomes an argument or a result. Choices between numbers
-stay choices, not branches, and no phase divides whole numbers: ``Now`` has what that would be for.
+A debugger can step through all of this code. Compiled code is generated from the same functions (``engine.generator``):
+decisions that depend on ``parts`` alone are made at generation, and groups become arguments and return values. Numeric
+choices must be conditional expressions, not branches, and phases must not divide integers: ``Now`` provides the
+required indices.
 """

@@ -1,4 +1,4 @@
-"""Gas with an energy balance in a step."""
+"""Gas with an energy balance in an integration step."""
 
 from ppafo.engine.groups import Groups, given, handed, kept
 from ppafo.engine.program import Program
@@ -13,7 +13,7 @@ START = thermal_gas.masses_at_start
 
 
 def groups(parts: Program) -> Groups:
-    """Groups of a lane: heat capacity and walls, true masses, the first stage, and what a step adds to the gas."""
+    """Groups for gas with an energy balance: heat capacity and walls, true masses, first stage, changes in a step."""
     return {
         "thermal": given(ThermalParameters),
         "masses": kept(ThermalState),
@@ -23,7 +23,7 @@ def groups(parts: Program) -> Groups:
 
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
-    """Set the first stage of the step: flows and pressures at its begin, and the pressures to which they lead."""
+    """Set the first stage of the step: flows and pressures at the start, and pressures after the stage."""
     lane.thermal_gas = thermal_gas.begin_thermal_gas(
         lane.plant,
         lane.thermal,
@@ -37,49 +37,49 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
 
 
 def chambers(parts: Program, lane: Lane) -> ThermalGas:
-    """First stage of both chambers, with or without supply lines."""
+    """Return the first stage of both chambers, with or without supply lines."""
     return lane.thermal_gas if parts.feed is None else lane.fed_thermal_gas.chambers
 
 
 def ends(parts: Program, lane: Lane) -> tuple[float, float]:
-    """Pressures [Pa] to which the first stage leads."""
+    """Return the pressures [Pa] of both chambers after the first stage."""
     return thermal_gas.end_pressures(lane.plant, chambers(parts, lane))
 
 
 def first_flows(parts: Program, lane: Lane) -> tuple[float, float, float]:
-    """Flows of the first stage [kg/s]: from the supplies, and into both chambers."""
+    """Return the flows of the first stage [kg/s]: from the supplies, and into both chambers."""
     begun = chambers(parts, lane)
     return begun.first.supplied, begun.first.mass_1, begun.first.mass_2
 
 
 def change(parts: Program, lane: Lane, length: float) -> None:
-    """Set the second stage, and the change of mass and energy by both."""
+    """Set the second stage, and the changes of mass and energy from both stages."""
     begun = chambers(parts, lane)
     lane.thermal_second = thermal_gas.second_thermal_stage(lane.thermal, begun, lane.passing)
     lane.thermal_change = thermal_gas.thermal_change(lane.plant, lane.thermal, begun, lane.thermal_second, length)
 
 
 def error(parts: Program, lane: Lane, ahead: float, length: float) -> float:
-    """Error of the chamber pressures in a part of a step, over what is allowed [-]."""
+    """Return the error of the chamber pressures in a part of a step, divided by the allowed error [-]."""
     return thermal_gas.thermal_error(lane.plant, chambers(parts, lane), lane.thermal_second, length)
 
 
 def shift_error(parts: Program, lane: Lane, shift: float, ahead: float, length: float) -> float:
-    """Error that a moving valve makes in a part of a step, over what is allowed [-]."""
+    """Return the error due to a moving valve in a part of a step, divided by the allowed error [-]."""
     return thermal_gas.thermal_opening_error(lane.plant, chambers(parts, lane), shift, length)
 
 
 def add(parts: Program, lane: Lane) -> None:
-    """Set state and true masses with the gas of the step."""
+    """Set the state and the true masses after adding the gas of the step."""
     lane.fed, lane.warmed = thermal_gas.with_thermal_gas(lane.state, lane.masses, lane.thermal_change)
 
 
 def move(parts: Program, lane: Lane, state: PlantState, assumed: float, reached: float) -> PlantState:
-    """The gas does its work up to where the joint came [rad], not to where the stages assumed it."""
+    """Return the state with the work of the gas up to the angle reached [rad] instead of the assumed angle [rad]."""
     return parts.warm_functions.after_motion(lane.plant, lane.thermal, state, assumed, reached)
 
 
 def work(parts: Program, lane: Lane) -> None:
-    """Count what the gas did on shaft and walls; a locked joint whose chambers are rigid takes no work."""
+    """Add the work of the gas on shaft and walls; a locked joint with rigid chambers does no work."""
     if not parts.is_locked or parts.actuator.gives:
         lane.warmed = parts.warm_functions.with_work(lane.plant, lane.warmed, lane.state, lane.after)

@@ -1,4 +1,4 @@
-"""A plant that may fail in a walk, or whose line has a shut-off valve, in a step and at a sample of the controller."""
+"""Plant faults and shut-off valve of a walking device, in an integration step and at a sample of the controller."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ from ppafo.model.valves.kind import VENT
 
 
 def groups(parts: Program) -> Groups:
-    """Groups of a lane: faults and shut-off valve, and whether that has shut."""
+    """Groups for faults and shut-off valve: parameters, and the state of the shut-off valve."""
     port = parts.valve.port
     if port not in plant_faults.FAILED_PORTS:
         known = " or ".join(row.__name__ for row in plant_faults.FAILED_PORTS)
@@ -25,24 +25,24 @@ def groups(parts: Program) -> Groups:
 
 
 def failed_plant(parts: Program, lane: Lane, time: float) -> PlantParameters:
-    """The plant with the leak that faults give it at a time [s]."""
+    """Return the plant with the additional leakage due to faults at a time [s]."""
     return plant_faults.failed_plant(lane.plant, lane.plant_faults, time)
 
 
 def failed_ports(
     parts: Program, lane: Lane, source: PlantParameters, port_1: Any, port_2: Any, time: float
 ) -> tuple[Any, Any]:
-    """The ports of both chambers as faults leave them at a time [s], by the class of port that the valve declares."""
+    """Return the ports of both chambers under the faults active at a time [s], for the port class of the valve."""
     return plant_faults.FAILED_PORTS[parts.valve.port](
         source, lane.plant_faults, lane.shut_off, lane.unpowered, port_1, port_2, time
     )
 
 
 def decide(parts: Program, lane: Lane, now: Now, ordered: float, after: Any) -> None:
-    """Take a decision of the controller, the command ``ordered`` and the state ``after`` it.
+    """Apply the ``ordered`` command and the new controller state ``after``, subject to faults.
 
-    The controller may miss a sample or have no power, and a valve may take its command late. Without power the
-    controller is in its initial state.
+    The controller may miss a sample or lose power, and a valve may respond late to a command. Without power, the
+    controller returns to its initial state.
     """
     time, period = now.step * lane.timing.step, lane.timing.period
     brown_out = plant_faults.is_in_brown_out(lane.plant_faults, time)

@@ -1,4 +1,4 @@
-"""A foot on a prescribed shank in a step, without ground: the torque that it adds to an unconstrained vane."""
+"""Foot on a prescribed shank, without ground contact, in an integration step: torque on an unconstrained vane."""
 
 from ppafo.engine.program import Program
 from ppafo.engine.scheme.motion import SAME_INSTANT
@@ -9,7 +9,7 @@ from ppafo.signals.meter import FootSample
 
 
 def shank(parts: Program, lane: Lane, time: float) -> ShankNow:
-    """The shank at a time [s]; the knee of one that no gait leads rests."""
+    """Return the shank motion at a time [s]; without a gait, the knee is at rest."""
     assert parts.shank is not None, "a foot has a shank"
     if parts.is_on_gait:
         now: ShankNow = parts.shank.value(lane.shank, time)
@@ -19,7 +19,7 @@ def shank(parts: Program, lane: Lane, time: float) -> ShankNow:
 
 
 def until_jump(parts: Program, lane: Lane, time: float) -> float:
-    """Time [s] from one [s] until the acceleration of the shank jumps; a jump that is due has happened."""
+    """Time [s] from ``time`` [s] to the next jump of the shank acceleration; a jump due now has already happened."""
     assert parts.shank is not None, "a foot has a shank"
     assert parts.shank.until_jump is not None, "the shank jumps"
     behind: float = parts.shank.until_jump(lane.shank, time + SAME_INSTANT)
@@ -27,7 +27,7 @@ def until_jump(parts: Program, lane: Lane, time: float) -> float:
 
 
 def torque(parts: Program, lane: Lane, time: float, angle: float) -> float:
-    """Torque on the vane [N m] at a time [s] and an angle [rad], positive in plantarflexion."""
+    """Return the torque on the vane [N m] at a time [s] and an angle [rad], positive in plantarflexion."""
     if parts.shank_rests:
         # A shank that rests needs one sine instead of two in each part of a step.
         return torque_on_resting_foot(lane.load, lane.shank.level, angle)
@@ -35,6 +35,6 @@ def torque(parts: Program, lane: Lane, time: float, angle: float) -> float:
 
 
 def sample(parts: Program, lane: Lane, time: float) -> FootSample:
-    """The foot beside the one that was measured, at a time [s] of a gait."""
+    """Return the foot motion relative to the measured foot at a time [s] of a gait."""
     angle, measured_angle, toe_difference = foot_in_gait(lane.shank, time, lane.state.angle)
     return FootSample(angle, measured_angle, toe_difference)

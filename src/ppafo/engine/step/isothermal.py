@@ -1,4 +1,4 @@
-"""Gas that keeps its temperature in a step: of a vane at rest or in motion, and of other actuators."""
+"""Isothermal gas in an integration step, for a vane at rest or in motion and for other actuators."""
 
 from ppafo.engine.groups import Groups, handed
 from ppafo.engine.program import Program
@@ -15,7 +15,7 @@ START = None
 
 
 def groups(parts: Program) -> Groups:
-    """Groups of a lane: the first stage, and what a step adds to the gas."""
+    """Groups for isothermal gas: first stage, and changes in a step."""
     stage = {"still_gas": handed(StillGas)} if parts.keeps_volumes else {"moving_gas": handed(MovingGas)}
     return {
         **(stage if parts.feed is None else {}),
@@ -24,7 +24,7 @@ def groups(parts: Program) -> Groups:
 
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
-    """Set the first stage of the step, of chambers that stand still or move, which run to ``next_angle`` [rad]."""
+    """Set the first stage of the step for fixed volumes, or for volumes that change up to ``next_angle`` [rad]."""
     if parts.keeps_volumes:
         lane.still_gas = pneumatics.begin_still_gas(lane.state, lane.held, lane.flowing, length)
     elif parts.has_vane:
@@ -41,31 +41,31 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
 
 
 def moving(parts: Program, lane: Lane) -> MovingGas:
-    """The first stage of chambers that move; lines, and a gas that is not ideal, have more around it."""
+    """Return the first stage with moving volumes, without the additional data for supply lines or real gas."""
     if parts.has_true_masses:
         return lane.real_gas.moving
     return lane.moving_gas if parts.feed is None else lane.fed_gas.chambers
 
 
 def still(parts: Program, lane: Lane) -> StillGas:
-    """The part of the first stage that still and moving gas share."""
+    """Return the part of the first stage that fixed and moving volumes have in common."""
     return lane.still_gas if parts.keeps_volumes else moving(parts, lane).still
 
 
 def ends(parts: Program, lane: Lane) -> tuple[float, float]:
-    """Pressures [Pa] to which the first stage leads."""
+    """Return the pressures [Pa] of both chambers after the first stage."""
     begun = still(parts, lane)
     return begun.end_1, begun.end_2
 
 
 def first_flows(parts: Program, lane: Lane) -> tuple[float, float, float]:
-    """Flows of the first stage [kg/s]: from the supplies, and into both chambers."""
+    """Return the flows of the first stage [kg/s]: from the supplies, and into both chambers."""
     begun = still(parts, lane)
     return begun.first.supplied, begun.first.mass_1, begun.first.mass_2
 
 
 def change(parts: Program, lane: Lane, length: float) -> None:
-    """Set the second stage, and the change of mass by both."""
+    """Set the second stage, and the mass changes from both stages."""
     if parts.keeps_volumes:
         lane.second = pneumatics.second_still_stage(lane.still_gas, lane.passing)
         lane.change = pneumatics.still_change(lane.plant, lane.still_gas, lane.second, length)
@@ -75,24 +75,24 @@ def change(parts: Program, lane: Lane, length: float) -> None:
 
 
 def error(parts: Program, lane: Lane, ahead: float, length: float) -> float:
-    """Error of the pressures over what is allowed [-]; ``ahead`` is the angle [rad] to which the volumes run."""
+    """Return the pressure error divided by the allowed error [-]; the volumes end at the angle ``ahead`` [rad]."""
     return pneumatics.gas_error(lane.plant, still(parts, lane), lane.second, ahead, length, parts=parts.functions)
 
 
 def shift_error(parts: Program, lane: Lane, shift: float, ahead: float, length: float) -> float:
-    """Error that a moving valve makes in a part of a step, over what is allowed [-]."""
+    """Return the error due to a moving valve in a part of a step, divided by the allowed error [-]."""
     return pneumatics.opening_error(lane.plant, still(parts, lane), shift, ahead, length, parts=parts.functions)
 
 
 def add(parts: Program, lane: Lane) -> None:
-    """Set the state after the step to the state before it with the gas of the step."""
+    """Set the state after the step by adding the gas of the step to the state before the step."""
     lane.fed = with_gas(lane.state, lane.change)
 
 
 def move(parts: Program, lane: Lane, state: PlantState, assumed: float, reached: float) -> PlantState:
-    """Return the state as it is: motion changes no energy of a gas that keeps its temperature."""
+    """Return the state unchanged, because motion does not change the energy of isothermal gas."""
     return state
 
 
 def work(parts: Program, lane: Lane) -> None:
-    """Count nothing: the work of a gas that keeps its temperature is not followed."""
+    """Do nothing: the work of isothermal gas is not recorded."""

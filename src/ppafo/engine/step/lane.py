@@ -1,4 +1,4 @@
-"""The numbers of one run by group, as the functions of the step see them, and the step that all runs are at."""
+"""Numbers of one run by group, as seen by the functions of a step, and the present step of all runs."""
 
 from functools import reduce
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -32,51 +32,51 @@ if TYPE_CHECKING:  # a lane is of these, and makes none of them
 
 
 SAME_MOMENT = 1.0e-9
-"""Fractions of a step that are taken to be one instant."""
+"""Difference of two instants, as a fraction of a step [-], below which both count as simultaneous."""
 MAXIMUM_PARTS = 100_000
-"""Most parts of one step, minutes without progress: a run that needs more has failed."""
+"""Largest number of parts of one step (minutes without progress); a run that needs more has failed."""
 
 
 class LaneTiming(NamedTuple):
-    """The grid of a run in time."""
+    """Time grid of a run."""
 
     step: float
     """Longest step [s]."""
     period: float
     """Time [s] between two samples of the controller."""
     command_lag: float
-    """Share of a step [-] by which commands are late beyond whole steps."""
+    """Delay of commands beyond whole steps, as a fraction of a step [-]."""
     signal_lag: float
-    """Share of a step [-] by which signals are late beyond whole steps."""
+    """Delay of signals beyond whole steps, as a fraction of a step [-]."""
     tolerance: float
-    """Error that a step may have, over the one that a run is allowed by default [-]."""
+    """Allowed error of a step divided by the default allowed error [-]."""
 
 
 class LaneResult(NamedTuple):
-    """The command in force, and whether and why the run has failed."""
+    """Present command, and time and cause of a failure of the run."""
 
     command: float
-    """Command in force [-]."""
+    """Present command [-]."""
     failure_time: float
-    """First time [s] at which the run left what is possible; huge where it did not."""
+    """First time [s] at which the state became physically impossible; a huge number if the run has not failed."""
     too_many_parts: float
-    """1 where it failed because a step was cut into more than ``MAXIMUM_PARTS`` parts, else 0."""
+    """1 if the run failed because a step needed more than ``MAXIMUM_PARTS`` parts, else 0."""
 
 
 class LaneStart(NamedTuple):
-    """Step of the block at which the run of a lane began, a whole number [-]."""
+    """Step of the block at which the run started, an integer [-]."""
 
     step: float
 
 
 class NoParameters(NamedTuple):
-    """Stands where a program has no such component."""
+    """Placeholder for the parameters of a component that the program does not have."""
 
 
 class Now(NamedTuple):
-    """The step of all lanes: its number, the controller's sample, and the share of it that is to be done.
+    """Present step of all runs: step number, controller sample, and end of the present interval.
 
-    The rest are places in rings of what comes late, which the loop works out once for all lanes; 0 where nothing does.
+    The other fields are indices into ring buffers of delayed values, computed once for all runs; 0 without delays.
     """
 
     step: int
@@ -84,26 +84,27 @@ class Now(NamedTuple):
     sample: int
     """Number of the controller's last sample."""
     goal: float
-    """Share of the step [-] up to which it is to be done: less than 1 where a sample lies inside it."""
+    """End of the present interval as a fraction of the step [-]; less than 1 if a sample lies inside the step."""
     early_command: int
-    """Place of the command that the valve has before one arrives in this step."""
+    """Ring-buffer index of the command that acts at the start of this step."""
     late_command: int
-    """Place of the command that the valve has after it."""
+    """Ring-buffer index of the command that arrives in this step."""
     late_signal: int
-    """Place of the signals that sensors show now."""
+    """Ring-buffer index of the delayed signals shown by the sensors now."""
     next_signal: int
-    """Place of the signals that sensors take at the end of the step."""
+    """Ring-buffer index for the signals at the end of the step."""
     reading: int
-    """Place of the readings of a walk that are taken at this sample."""
+    """Ring-buffer index for the readings of a walk at this sample."""
     readings: int
-    """Length of their ring."""
+    """Length of the ring buffer of readings."""
 
 
 class Lane:
-    """The numbers of one run by group: ``lane.state``, or ``lane["state"]`` where the name depends on the parts.
+    """Numbers of one run by group: ``lane.state``, or ``lane["state"]`` if the name depends on the parts.
 
-    Which groups there are is for ``Program`` to say. Groups of effects and meters have the names of these. Where a
-    group is ``Any``, the component that it belongs to has its class. Units stand with the classes.
+    ``Program`` determines the available groups. Groups of effects and meters have the names of the effects and meters.
+    For a group of type ``Any``, the component that owns the group defines its class. Units are documented in the
+    classes.
     """
 
     # What a run is made of, and does not change: parameters.
@@ -188,7 +189,7 @@ class Lane:
     sample: "Sample"  # what meters and traces are shown
 
     def __getitem__(self, name: str) -> Any:
-        """A group, or a number of one by its path such as ``state.angle``."""
+        """Return a group, or a number of a group by its path such as ``state.angle``."""
         return reduce(getattr, name.split("."), self)
 
     def __setitem__(self, name: str, value: Any) -> None:

@@ -1,4 +1,4 @@
-"""Lines behind regulators in a step: what feeds the valve, with a state that the stages solve together with the gas."""
+"""Supply lines behind regulators in an integration step, solved together with the gas of the chambers."""
 
 from ppafo.engine.groups import Groups, given, handed, kept
 from ppafo.engine.program import Program
@@ -10,7 +10,7 @@ from ppafo.model.regulator import LineState, SupplyLines
 
 
 def groups(parts: Program) -> Groups:
-    """Groups of a lane: supply lines with their regulators, first stage with the gas, lines at the end of a part."""
+    """Groups for supply lines: lines with regulators, first stage with the gas, and lines at the end of a part."""
     return {
         "lines": given(SupplyLines),
         "line_state": kept(LineState),
@@ -20,22 +20,22 @@ def groups(parts: Program) -> Groups:
 
 
 def after_first(parts: Program, lane: Lane) -> LineState:
-    """Pressures of both lines [Pa] after the first stage."""
+    """Return the state of both lines after the first stage."""
     return lane.fed_thermal_gas.lines.after if parts.is_thermal else lane.fed_gas.lines.after
 
 
 def source(parts: Program, lane: Lane) -> PlantParameters:
-    """The plant at the pressures of its lines."""
+    """Return the plant with the present line pressures as supply pressures."""
     return supply_lines.plant_at_line_pressures(lane.plant, lane.lines, lane.line_state)
 
 
 def source_ahead(parts: Program, lane: Lane) -> PlantParameters:
-    """The plant at the pressures of its lines after the first stage."""
+    """Return the plant with the line pressures after the first stage as supply pressures."""
     return supply_lines.plant_at_line_pressures(lane.plant, lane.lines, after_first(parts, lane))
 
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
-    """Set the first stage of the step, in which chambers and lines are solved together."""
+    """Set the first stage of the step, with chambers and lines solved together."""
     if parts.is_thermal:
         lane.fed_thermal_gas = supply_lines.begin_fed_thermal_gas(
             lane.plant,
@@ -63,7 +63,7 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
 
 
 def ended(parts: Program, lane: Lane, length: float) -> LineState:
-    """Pressures of both lines [Pa] at the end of the step."""
+    """Return the state of both lines at the end of the step."""
     from_2 = lane.passing.in_2.from_source
     if parts.is_thermal:
         return supply_lines.end_thermal_lines(
@@ -80,7 +80,7 @@ def ended(parts: Program, lane: Lane, length: float) -> LineState:
 
 
 def end(parts: Program, lane: Lane, length: float) -> None:
-    """Keep the lines of the end; those of a part that may be refused become the state only once it is taken."""
+    """Set the lines at the end of the step; a part that may be refused changes the state only when accepted."""
     if parts.is_parted:
         lane.next_lines = ended(parts, lane, length)
     else:
@@ -88,5 +88,5 @@ def end(parts: Program, lane: Lane, length: float) -> None:
 
 
 def error(parts: Program, lane: Lane) -> float:
-    """Error of both line pressures over what is allowed [-]."""
+    """Return the error of both line pressures divided by the allowed error [-]."""
     return supply_lines.line_error(lane.plant, lane.lines, after_first(parts, lane), lane.next_lines)

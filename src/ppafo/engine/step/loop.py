@@ -1,4 +1,4 @@
-"""The loop over steps: many devices at once, of which none sees another."""
+"""Time-stepping loop for many independent runs at once."""
 
 from collections.abc import Iterator
 from typing import Any, Protocol
@@ -9,7 +9,7 @@ from ppafo.engine.step.lane import MAXIMUM_PARTS, SAME_MOMENT, Lane, Now
 
 
 class Lanes(Protocol):
-    """The runs of a block, and their arrays beside the lanes: what was recorded, and rings of what comes late."""
+    """Runs of a block, with the arrays of records and of delayed values."""
 
     records: Any
     signal_history: Any
@@ -17,22 +17,22 @@ class Lanes(Protocol):
     trace: Any
 
     def __iter__(self) -> Iterator[Lane]:
-        """Each run."""
+        """Iterate over the runs."""
 
     def record(self, index: int) -> None:
-        """Keep the state of all runs as a sample."""
+        """Store the state of all runs as a recorded sample."""
 
     def set_aside(self) -> None:
-        """Keep what lanes that wait get again: their state, and what the step was handed."""
+        """Save the data of waiting runs: their state, and the values passed from the previous step."""
 
     def put_back(self) -> None:
-        """Give it to those that had nothing left of their step."""
+        """Restore the saved data of runs whose step was already complete."""
 
     def traces(self, index: int, trace_every: int) -> bool:
-        """Tell whether a sample is traced."""
+        """Return whether a sample is traced."""
 
     def slot(self, index: int, trace_every: int) -> int:
-        """Index of a sample in the trace, a ring that keeps the last samples."""
+        """Return the index of a sample in the trace, a ring buffer of the last samples."""
 
 
 def advance(
@@ -49,7 +49,7 @@ def advance(
     signal_delay: int,
     command_delay: int,
 ) -> None:
-    """Take all runs of a block some steps further, with the samples that are due."""
+    """Advance all runs of a block by some steps, including the samples that are due."""
     if parts.hands_chambers_on:
         for lane in lanes:
             phases.hold_chambers(parts, lane)
@@ -94,7 +94,7 @@ def advance(
 
 
 def begin_step(parts: Program, lanes: Lanes, now: Now, steps_per_sample: int) -> None:
-    """Sense and decide, where a sample of the controller is due, and keep what comes late."""
+    """Read sensors and compute commands if a controller sample is due, and store delayed values."""
     if parts.late_signals and now.step == 0:
         for slot in range(lanes.signal_history.shape[1]):
             for lane in lanes:
@@ -123,7 +123,7 @@ def take_sample(
     last_record: int,
     trace_every: int,
 ) -> None:
-    """A sample is recorded; or metered and traced, where nothing is."""
+    """Record a sample; or, in programs without records, update meters and traces."""
     if not parts.takes_samples:
         lanes.record(index)
     if parts.follows_reference and index == 0:
@@ -142,7 +142,7 @@ def take_sample(
 
 
 def look_at_reference(parts: Program, lanes: Lanes, interval: float, last_record: int) -> None:
-    """The whole reference before the first sample: its last value, its largest, and where it holds."""
+    """Evaluate the whole reference before the first sample: final value, largest value, and start of the final hold."""
     for lane in lanes:
         meters.begin_course(parts, lane, interval, last_record)
     # A monotone one is largest at one of its ends, and where its hold starts shows on the way.
@@ -159,9 +159,9 @@ def look_at_reference(parts: Program, lanes: Lanes, interval: float, last_record
 
 
 def do_parts(parts: Program, lanes: Lanes, now: Now) -> None:
-    """A step in parts, as many as it needs.
+    """Do a step in as many parts as needed.
 
-    A block of lanes has as many as the lane with the most of them.
+    All runs of a block take as many parts as the run with the most parts.
     """
     for part in range(MAXIMUM_PARTS):
         for lane in lanes:
@@ -180,10 +180,10 @@ def do_parts(parts: Program, lanes: Lanes, now: Now) -> None:
 
 
 def do_step(parts: Program, lanes: Lanes, now: Now) -> None:
-    """The phases of a step or part.
+    """Do the phases of a step or part.
 
-    Each for all lanes: loops this short let the processor work on several at once. It looks some hundred instructions
-    ahead, and one lane's division or root waits for the one before.
+    Each phase is a short loop over all runs, so that the processor works on several runs at once. The processor looks
+    some hundred instructions ahead, and a division or square root waits for the previous one of the same run.
     """
     if parts.leg is not None:
         lead_walk(parts, lanes, now)
@@ -214,7 +214,7 @@ def do_step(parts: Program, lanes: Lanes, now: Now) -> None:
 
 
 def lead_walk(parts: Program, lanes: Lanes, now: Now) -> None:
-    """The gait at the end of the step, and where the foot would be."""
+    """Set the gait at the end of the step, and the predicted motion of the foot."""
     assert parts.leg is not None, "a leg walks"
     if parts.takes_task_sequence:
         for lane in lanes:

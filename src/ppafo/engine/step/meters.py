@@ -1,4 +1,4 @@
-"""Samples for meters and traces: the channels of a recording, where nothing is recorded."""
+"""Samples for meters and traces, with the channels of a recording, in programs that record nothing."""
 
 from ppafo.engine.program import Program
 from ppafo.engine.step.lane import Lane
@@ -22,11 +22,11 @@ from ppafo.signals.meter import (
 
 NO_FOOT = FootSample(**dict.fromkeys(FootSample._fields, 0.0))
 NO_STRIDE = StrideSample(**dict.fromkeys(StrideSample._fields, 0.0))
-"""Stride of a sample without a foot on the shank of a gait, or without a walk."""
+"""Stride data of a sample without a walk, or of a foot on a shank without a gait."""
 
 
 def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
-    """Set the sample ``number``, at a ``moment`` counted in steps."""
+    """Set the sample ``number`` at time ``moment`` [steps]."""
     pressure_1, pressure_2 = present_pressures(parts, lane)
     torque = parts.actuator.torque(lane.plant, lane.state.angle, pressure_1, pressure_2)
     time = moment * lane.timing.step
@@ -51,7 +51,7 @@ def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval
 
 
 def temperature(thermal: ThermalParameters, content: float, mass: float) -> float:
-    """Temperature of the gas in a chamber [K], of its energy content and its true mass [kg]."""
+    """Temperature of the gas in a chamber [K], from its energy content [kg] and its true mass [kg]."""
     return thermal.temperature * (content / mass)
 
 
@@ -63,7 +63,7 @@ def second_temperature(parts: Program, lane: Lane) -> float:
 
 
 def gas_of(parts: Program, lane: Lane) -> GasSample:
-    """Gas in the chambers and totals of it [kg]; true masses where the gas is not ideal or has an energy balance."""
+    """Gas masses in the chambers and totals [kg]; true masses for real gas and for gas with an energy balance."""
     return GasSample(
         supplied_mass=lane.state.supplied_mass,
         vented_mass=lane.state.vented_mass,
@@ -88,14 +88,14 @@ def energy_of(parts: Program, lane: Lane) -> EnergySample:
 
 
 def wanted_at(parts: Program, lane: Lane, time: float) -> float:
-    """The reference at a time [s], in a walk the torque [N m] that the controller requests; 0 where there is none."""
+    """Reference at a time [s]; in a walk, the torque requested by the controller [N m]; 0 without a reference."""
     if parts.leg is not None:
         return float(lane.controller_state.request.torque) if parts.requests_torque else 0.0
     return reference_at(parts, lane, time) if parts.has_reference else 0.0
 
 
 def stride_of(parts: Program, lane: Lane, number: int, interval: float) -> StrideSample:
-    """Stride of a walk at a sample; zeros without a walk."""
+    """Stride data of a walk at a sample; zeros without a walk."""
     if parts.leg is None:
         return NO_STRIDE
     return StrideSample(
@@ -115,7 +115,7 @@ def stride_of(parts: Program, lane: Lane, number: int, interval: float) -> Strid
 
 
 def origin_of(parts: Program, lane: Lane) -> float:
-    """Origin of the reference's size: zero torque, or the initial value of another controlled quantity."""
+    """Origin for the magnitude of the reference: zero for torque, else the initial value of the controlled quantity."""
     if parts.controlled == TORQUE:
         return 0.0
     pressure_1, pressure_2 = present_pressures(parts, lane)
@@ -124,7 +124,7 @@ def origin_of(parts: Program, lane: Lane) -> float:
 
 
 def begin_course(parts: Program, lane: Lane, interval: float, last: int) -> None:
-    """The last value of the reference, how far its ends are from its origin, and no hold yet."""
+    """Set the last value of the reference and the larger distance of its ends from the origin, without a hold."""
     value, origin = reference_at(parts, lane, last * interval * lane.timing.step), origin_of(parts, lane)
     largest = max(abs(reference_at(parts, lane, 0 * interval * lane.timing.step) - origin), abs(value - origin))
     lane.course = ReferenceSummary(
@@ -133,14 +133,14 @@ def begin_course(parts: Program, lane: Lane, interval: float, last: int) -> None
 
 
 def raise_largest(parts: Program, lane: Lane, interval: float, index: int) -> None:
-    """Raise how far the reference has been from its origin so far by the sample ``index``."""
+    """Update the largest distance of the reference from its origin with the sample ``index``."""
     value = reference_at(parts, lane, index * interval * lane.timing.step)
     largest = max(lane.course.largest, abs(value - origin_of(parts, lane)))
     lane.course = lane.course._replace(largest=largest, tolerance=SAME_LEVEL * largest)
 
 
 def look_for_hold(parts: Program, lane: Lane, interval: float, index: int) -> None:
-    """Search for the start of the hold, backwards from the end."""
+    """Search backwards from the end for the start of the final hold."""
     value = reference_at(parts, lane, index * interval * lane.timing.step)
     is_last_away = lane.course.hold_start == 0.0 and is_away(value, lane.course.last, lane.course.tolerance)
     hold_start = index + 1.0 if is_last_away else lane.course.hold_start
@@ -151,7 +151,7 @@ def look_for_hold(parts: Program, lane: Lane, interval: float, index: int) -> No
 
 
 def follow_course(parts: Program, lane: Lane) -> None:
-    """Follow a monotone reference, which shows on the way where it rests."""
+    """Update the summary of a monotone reference, whose hold is found while the run proceeds."""
     if parts.follows_reference and parts.reference.is_monotone:
         lane.course = advance_course(lane.course, lane.sample)
 
@@ -165,7 +165,7 @@ def start(parts: Program, lane: Lane, moment: float, number: int, interval: floa
 
 
 def update(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
-    """Take one more sample in every meter; those of motion wait where a locked vane never moves."""
+    """Update every meter with one more sample; meters of motion are skipped for a locked vane."""
     make_sample(parts, lane, moment, number, interval)
     follow_course(parts, lane)
     for group, kind in parts.moving_meters.items():
@@ -173,7 +173,7 @@ def update(parts: Program, lane: Lane, moment: float, number: int, interval: flo
 
 
 def trace(parts: Program, lane: Lane, moment: float, number: int, interval: float, slot: int) -> None:
-    """Write the channels that are traced of the present sample to their ``slot``."""
+    """Write the traced channels of the present sample to ``slot``."""
     make_sample(parts, lane, moment, number, interval)
     for row, path in parts.traced_paths.items():
         lane.trace[slot, row] = lane[path]

@@ -1,4 +1,4 @@
-"""Gas that is not ideal in a step: its stages, and their errors, are those of an ideal one, on true masses."""
+"""Real gas in an integration step: stages and error estimates as for ideal gas, applied to true masses."""
 
 from ppafo.engine.groups import Groups, handed, kept
 from ppafo.engine.program import Program
@@ -18,7 +18,7 @@ error, shift_error = isothermal.error, isothermal.shift_error
 
 
 def groups(parts: Program) -> Groups:
-    """Groups of a lane: true masses, the first stage, and what a step adds to the gas."""
+    """Groups for real gas: true masses, first stage, and changes in a step."""
     return {
         "masses": kept(TrueMasses),
         "real_gas": handed(RealGas),
@@ -27,27 +27,27 @@ def groups(parts: Program) -> Groups:
 
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
-    """Set the first stage of the step: flows and pressures at its begin, and the pressures to which they lead."""
+    """Set the first stage of the step: flows and pressures at the start, and pressures after the stage."""
     lane.real_gas = real_gas.begin_real_gas(
         lane.plant, lane.state, lane.masses, next_angle, lane.flowing, length, parts=parts.functions
     )
 
 
 def change(parts: Program, lane: Lane, length: float) -> None:
-    """Set the second stage, and the change of gas content and true mass by both."""
+    """Set the second stage, and the changes of gas content and true mass from both stages."""
     lane.second = pneumatics.second_moving_stage(lane.real_gas.moving, lane.passing)
     lane.real_change = real_gas.real_change(lane.plant, lane.state, lane.masses, lane.real_gas, lane.second, length)
 
 
 def add(parts: Program, lane: Lane) -> None:
-    """Set state and true masses with the gas of the step."""
+    """Set the state and the true masses after adding the gas of the step."""
     lane.fed, lane.warmed = real_gas.with_real_gas(lane.state, lane.masses, lane.real_change)
 
 
 def move(parts: Program, lane: Lane, state: PlantState, assumed: float, reached: float) -> PlantState:
-    """The gas contents at the angle [rad] that the vane reached."""
+    """Return the state with the gas contents at the angle [rad] reached by the vane."""
     return real_gas.at_angle(lane.plant, state, lane.warmed, reached, parts=parts.functions)
 
 
 def work(parts: Program, lane: Lane) -> None:
-    """Count nothing: the work of a gas that keeps its temperature is not followed."""
+    """Do nothing: the work of isothermal gas is not recorded."""

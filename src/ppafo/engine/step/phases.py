@@ -1,9 +1,9 @@
-"""The way of one device through a step, from the valve to the state that is stored: read it downwards.
+"""Phases of a step of one device in the order of execution, from the valve to the stored state.
 
-A step is whole where nothing changes abruptly inside it and its error is known to be small: the gas of a locked vane
-behind a valve that follows at once. Otherwise each lane goes through it in parts of its own. A part ends where a coil
-switches, a late command arrives, the vane meets a stop, a sample is due, or its error would become too large. Lanes
-that are through wait, and no lane sees another.
+A step is done whole if nothing changes abruptly inside it and its error is known to be small, as for the gas of a
+locked vane with a valve without dynamics. Otherwise each run divides the step into its own parts. A part ends where a
+coil switches, a late command arrives, the vane meets a stop, a sample is due, or the error would become too large. Runs
+that have completed the step wait for the others, and all runs are independent.
 """
 
 from typing import Any
@@ -24,23 +24,23 @@ IMPOSSIBLE_MASS = 1.0e3
 
 
 def time_of(parts: Program, lane: Lane, now: Now) -> float:
-    """Time [s] from the start of the run, at the begin of a step or part."""
+    """Time [s] since the start of the run, at the start of a step or part."""
     time = (now.step - lane.start.step if parts.starts_apart else now.step) * lane.timing.step
     return time + lane.before if parts.is_parted else time
 
 
 def length_of(parts: Program, lane: Lane) -> float:
-    """Length [s] of the step, or of the part of it."""
+    """Length [s] of the step or of the present part."""
     return lane.length if parts.is_parted else lane.timing.step
 
 
 def until_command(parts: Program, lane: Lane) -> float:
-    """Time [s] from now at which a late command arrives inside this step."""
+    """Time [s] until a late command arrives inside this step."""
     return lane.timing.command_lag * lane.timing.step - lane.before - motion.SAME_INSTANT
 
 
 def command_of(parts: Program, lane: Lane, now: Now) -> float:
-    """The command that the valve has in a step or part."""
+    """Command at the valve [-] in a step or part."""
     if parts.late_commands:
         # The dead time in whole steps and a rest: the command of one step or the next acts, by the time within it.
         early = lane.command_history[now.early_command]
@@ -55,17 +55,17 @@ def command_of(parts: Program, lane: Lane, now: Now) -> float:
 
 
 def hold_chambers(parts: Program, lane: Lane) -> None:
-    """Chamber factors (pressure per mass) before the first step; constant for a locked vane."""
+    """Set the ratios of pressure to mass of both chambers before the first step; constant for a locked vane."""
     lane.held = pneumatics.held_chambers(lane.plant, lane.state.angle, parts=parts.functions)
 
 
 def begin_step(parts: Program, lane: Lane) -> None:
-    """Set how much of the step is done to nothing."""
+    """Set the completed part of the step to zero."""
     lane.before = 0.0
 
 
 def measure_part(parts: Program, lane: Lane, now: Now) -> None:
-    """The length of a part; where the vane is unconstrained, until it meets a stop."""
+    """Set the length of the next part; the part of an unconstrained vane ends at a stop at the latest."""
     remaining = max(now.goal * lane.timing.step - lane.before, 0.0)
     until = remaining
     time = time_of(parts, lane, now)
@@ -100,7 +100,7 @@ def measure_part(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def open_valve(parts: Program, lane: Lane, now: Now) -> None:
-    """The valve, and the flows with which the step begins."""
+    """Set the valve state and the flows at the start of the step."""
     command = command_of(parts, lane, now)
     time, length = time_of(parts, lane, now), length_of(parts, lane)
     if parts.is_parted:
@@ -117,7 +117,7 @@ def open_valve(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def ports_behind(parts: Program, lane: Lane, now: Now, source: PlantParameters) -> tuple[Any, Any]:
-    """The ports of both chambers behind a source, as the valve and faults leave them."""
+    """Return the ports of both chambers for a supply, with the present valve state and faults."""
     port_1, port_2 = parts.valve.connect(source, lane.shown)
     if parts.faults is not None:
         time = time_of(parts, lane, now)
@@ -126,7 +126,7 @@ def ports_behind(parts: Program, lane: Lane, now: Now, source: PlantParameters) 
 
 
 def plant_now(parts: Program, lane: Lane, now: Now) -> PlantParameters:
-    """The plant, with the leak that a fault gives it."""
+    """Return the plant with the leakage due to faults."""
     plant: PlantParameters = lane.plant
     if parts.faults is not None:
         plant = parts.faults.failed_plant(parts, lane, time_of(parts, lane, now))
@@ -134,7 +134,7 @@ def plant_now(parts: Program, lane: Lane, now: Now) -> PlantParameters:
 
 
 def present_pressures(parts: Program, lane: Lane) -> tuple[float, float]:
-    """Both pressures [Pa absolute] of the state."""
+    """Return both absolute pressures [Pa] of the present state."""
     if parts.hands_chambers_on:
         return parts.functions.held_pressures(lane.plant, lane.held, lane.state)
     return parts.actuator.pressures(lane.plant, lane.state.angle, lane.state.mass_1, lane.state.mass_2)
@@ -143,7 +143,7 @@ def present_pressures(parts: Program, lane: Lane) -> tuple[float, float]:
 def with_leak(
     parts: Program, lane: Lane, leaky: PlantParameters, pressure_1: float, pressure_2: float
 ) -> PlantParameters:
-    """The plant with the leak that it has at the pressures of a stage, where that is not always the same."""
+    """Return the plant with the leakage at the pressures of a stage, if the leakage varies."""
     if "leakage_path" in parts.ports_with_laws:
         leaky = pneumatics.plant_with_leak_at(leaky, pressure_1, pressure_2)
     if parts.valve.joint is not None:
@@ -153,7 +153,7 @@ def with_leak(
 
 
 def begin_gas(parts: Program, lane: Lane, now: Now) -> None:
-    """The first stage of the gas, with volumes that run to where the vane would be at the end."""
+    """Set the first stage of the gas, with volumes that end at the predicted angle of the vane."""
     length = length_of(parts, lane)
     if parts.angle is not None and not parts.is_locked:
         angle, rate, _ = parts.angle.value(lane.path, time_of(parts, lane, now) + length)
@@ -168,7 +168,7 @@ def begin_gas(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def angle_ahead(parts: Program, lane: Lane) -> float:
-    """Angle of the joint [rad] to which the volumes run in the step."""
+    """Return the joint angle [rad] at which the chamber volumes end in the step."""
     if parts.leg is not None:
         angle: float = parts.leg.assumed_angle(parts, lane)
         return angle
@@ -178,7 +178,7 @@ def angle_ahead(parts: Program, lane: Lane) -> float:
 
 
 def pass_gas(parts: Program, lane: Lane, now: Now) -> None:
-    """The flows of the second stage, at the pressures to which the first one leads."""
+    """Set the flows of the second stage, at the pressures after the first stage."""
     if parts.stated_at_ports:
         stated.predict(parts, lane, command_of(parts, lane, now), length_of(parts, lane))
     source = lane.plant if parts.feed is None else parts.feed.source_ahead(parts, lane)
@@ -192,7 +192,7 @@ def pass_gas(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def feed_gas(parts: Program, lane: Lane) -> None:
-    """The second stage: the gas of the step, what feeds the chambers, and in parts that may be refused its error."""
+    """Set the second stage: gas of the step, supply lines and, for adaptive steps, the error."""
     length = length_of(parts, lane)
     parts.gas.change(parts, lane, length)
     if parts.feed is not None:
@@ -213,7 +213,7 @@ def feed_gas(parts: Program, lane: Lane) -> None:
 
 
 def torque_of_leg(parts: Program, lane: Lane, time: float, angle: float) -> float:
-    """Torque of a leg on the vane [N m] at a time [s] and an angle [rad]."""
+    """Return the torque of a leg on the vane [N m] at a time [s] and an angle [rad]."""
     if parts.foot is None:
         return 0.0
     torque: float = parts.foot.torque(parts, lane, time, angle)
@@ -221,7 +221,7 @@ def torque_of_leg(parts: Program, lane: Lane, time: float, angle: float) -> floa
 
 
 def slide(parts: Program, lane: Lane, now: Now) -> None:
-    """End of the part if the vane slides on or stays at rest."""
+    """Set the end of the part for a vane that slides on or stays at rest."""
     length = length_of(parts, lane)
     parts.gas.add(parts, lane)
     end = time_of(parts, lane, now) + length
@@ -232,7 +232,7 @@ def slide(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def depart(parts: Program, lane: Lane) -> None:
-    """End of the part if the vane reverses or starts to move: rare."""
+    """Set the end of the part for a vane that reverses or starts to move, which is rare."""
     parts.gas.add(parts, lane)
     length = length_of(parts, lane)
     lane.moved = motion.depart_part(
@@ -244,7 +244,7 @@ def depart(parts: Program, lane: Lane) -> None:
 
 
 def finish(parts: Program, lane: Lane, now: Now) -> None:
-    """The state at the end of a step or part, unless the part is refused; and the first time at which a run failed."""
+    """Set the state at the end of a step or part, unless the part is refused, and the first time of a failure."""
     time, length = time_of(parts, lane, now), length_of(parts, lane)
     if parts.angle is not None:
         feed_gas(parts, lane)
@@ -284,7 +284,7 @@ def finish(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def end_motion(parts: Program, lane: Lane) -> None:
-    """Set the state at the end of the step, with the gas at the angle that was reached."""
+    """Set the state at the end of the step, with the gas at the angle reached."""
     if parts.leg is not None:
         # The chambers that the next step finds are those where this one ends.
         parts.leg.end(parts, lane, length_of(parts, lane))
@@ -300,7 +300,7 @@ def end_motion(parts: Program, lane: Lane) -> None:
 
 
 def error_of(parts: Program, lane: Lane, now: Now) -> float:
-    """The largest error of a part over what is allowed [-]: of motion, gas, and states of effects."""
+    """Return the largest error of a part divided by the allowed error [-]: of motion, gas, and effect states."""
     moved = lane.moved.error if parts.angle is None else 0.0
     if parts.shank_jumps:
         # From knot to knot the acceleration runs one way, and the errors of parts add up.
@@ -312,7 +312,7 @@ def error_of(parts: Program, lane: Lane, now: Now) -> float:
 
 
 def rests(parts: Program, lane: Lane) -> bool:
-    """True where a joint that is led stands still in a step, and its chambers are slow enough for a whole one."""
+    """Return whether a prescribed joint is at rest in a step and its chambers fill slowly enough for a whole step."""
     room = lane.plant.atmospheric_pressure
     still = parts.actuator.chambers(lane.plant, lane.state.angle, room, room)
     # A stricter tolerance counts as a longer step, as where a run is planned.
@@ -323,7 +323,7 @@ def rests(parts: Program, lane: Lane) -> bool:
 
 
 def has_gas(parts: Program, lane: Lane) -> bool:
-    """True where all masses at the end of the step are above 0."""
+    """Return whether all masses at the end of the step are positive."""
     found = lane.after.mass_1 > 0.0 and lane.after.mass_2 > 0.0
     if parts.has_true_masses:
         found = found and lane.warmed.mass_1 > 0.0 and lane.warmed.mass_2 > 0.0
@@ -333,7 +333,7 @@ def has_gas(parts: Program, lane: Lane) -> bool:
 
 
 def is_possible(parts: Program, lane: Lane) -> bool:
-    """True where the state at the end of the step is one that a device can have."""
+    """Return whether the state at the end of the step is physically possible."""
     least = min(lane.after.mass_1, lane.after.mass_2)
     most = max(lane.after.mass_1, lane.after.mass_2)
     if parts.has_true_masses:
@@ -344,7 +344,7 @@ def is_possible(parts: Program, lane: Lane) -> bool:
 
 
 def keep_state(parts: Program, lane: Lane, waits: bool) -> None:
-    """The state after the step becomes the state, unless the run waits."""
+    """Store the state after the step as the present state, unless the run waits."""
     lane.state = lane.state if waits else lane.after
     if parts.has_true_masses:
         lane.masses = lane.masses if waits else lane.warmed
@@ -359,9 +359,9 @@ def keep_state(parts: Program, lane: Lane, waits: bool) -> None:
 
 
 def sense_end(parts: Program, lane: Lane, now: Now, length: float, taken: bool) -> None:
-    """Delayed sensor readings at the end of a step or part, with the states of the effects.
+    """Store delayed sensor readings at the end of a step or part, with the effect states.
 
-    A signal that is late by a fraction of a step is looked at by that much before its end.
+    A signal delayed by a fraction of a step is sampled earlier than the end of the step by that fraction.
     """
     angle = lane.after.angle
     pressure_1, pressure_2 = parts.actuator.pressures(lane.plant, angle, lane.after.mass_1, lane.after.mass_2)
@@ -375,7 +375,7 @@ def sense_end(parts: Program, lane: Lane, now: Now, length: float, taken: bool) 
 
 
 def give_up(parts: Program, lane: Lane, now: Now) -> None:
-    """A run whose step is not done after so many parts failed where it is, and hurries on."""
+    """Mark a run as failed if its step is not complete after the largest number of parts."""
     time = time_of(parts, lane, now)
     gives_up = lane.remaining > 0.0 and lane.result.failure_time > time
     lane.result = lane.result._replace(

@@ -16,7 +16,7 @@ from ppafo.model.sensors import (
 
 
 def control(parts: Program, lane: Lane, now: Now) -> None:
-    """Sense and decide."""
+    """Read the sensors and compute the command."""
     assert parts.controller is not None, "a controller decides"
     sense(parts, lane, now)
     wanted = reference_at(parts, lane, now.step * lane.timing.step)
@@ -31,13 +31,13 @@ def control(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def reference_at(parts: Program, lane: Lane, time: float) -> float:
-    """The reference at a time [s]."""
+    """Return the reference at a time [s]."""
     value, _, _ = parts.reference.value(lane.reference, time)
     return float(value)
 
 
 def sense(parts: Program, lane: Lane, now: Now) -> None:
-    """Set what the sensors show."""
+    """Set the sensor readings."""
     if parts.late_readings:
         lane.seen = late_gait(parts, lane, now)
     elif parts.leg is not None and not parts.ideal_sensors:
@@ -53,7 +53,7 @@ def sense(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def vane(parts: Program, lane: Lane, now: Now) -> Measurement:
-    """Sensor readings of an actuator."""
+    """Return the sensor readings of an actuator."""
     if parts.late_signals:
         angle = lane.signal_history[0, now.late_signal]
         pressure_1, pressure_2 = lane.signal_history[1, now.late_signal], lane.signal_history[2, now.late_signal]
@@ -66,7 +66,7 @@ def vane(parts: Program, lane: Lane, now: Now) -> Measurement:
 
 
 def present_signals(parts: Program, lane: Lane) -> tuple[float, float, float]:
-    """Angle [rad] and pressures [Pa] as the sensors show them now."""
+    """Return angle [rad] and absolute pressures [Pa] as shown by sensors without delay."""
     pressure_1, pressure_2 = present_pressures(parts, lane)
     if "shown_signals" in parts.ports_with_laws:
         return shown_signals(lane.state.angle, pressure_1, pressure_2)
@@ -74,7 +74,7 @@ def present_signals(parts: Program, lane: Lane) -> tuple[float, float, float]:
 
 
 def fill_signals(parts: Program, lane: Lane, slot: int) -> None:
-    """Late signals have their values at the start until the first have come."""
+    """Fill the ring buffer of delayed signals with the initial values."""
     angle, pressure_1, pressure_2 = present_signals(parts, lane)
     lane.signal_history[0, slot] = angle
     lane.signal_history[1, slot] = pressure_1
@@ -82,7 +82,7 @@ def fill_signals(parts: Program, lane: Lane, slot: int) -> None:
 
 
 def remember_command(parts: Program, lane: Lane, slot: int) -> None:
-    """Keep the command of a step, where the valve gets it late."""
+    """Store the command of a step, for a valve with a dead time."""
     lane.command_history[slot] = lane.result.command
 
 
@@ -90,7 +90,7 @@ def remember_command(parts: Program, lane: Lane, slot: int) -> None:
 
 
 def gait(parts: Program, lane: Lane) -> GaitMeasurement:
-    """Readings of ideal sensors in a walk."""
+    """Return the readings of ideal sensors in a walk."""
     pressure_1, pressure_2 = present_pressures(parts, lane)
     return GaitMeasurement(
         angle=lane.state.angle,
@@ -103,7 +103,7 @@ def gait(parts: Program, lane: Lane) -> GaitMeasurement:
 
 
 def measure_walk(parts: Program, lane: Lane, now: Now) -> None:
-    """Set what the sensors of a walk show, and what they remember."""
+    """Set the sensor readings of a walk, and the sensor state."""
     pressure_1, pressure_2 = present_pressures(parts, lane)
     lane.seen, lane.gait_seen = measure_gait(
         lane.sensors,
@@ -122,7 +122,7 @@ def measure_walk(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def remember_readings(parts: Program, lane: Lane, now: Now) -> None:
-    """Keep the readings of a walk before any is looked up: a sensor without a delay shows its present one."""
+    """Store the present readings of a walk before delayed readings are looked up."""
     measure_walk(parts, lane, now)
     lane.signal_history[0, now.reading] = lane.seen.heel_force
     lane.signal_history[1, now.reading] = lane.seen.toe_force
@@ -132,7 +132,7 @@ def remember_readings(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def late_gait(parts: Program, lane: Lane, now: Now) -> GaitMeasurement:
-    """The readings of a walk, each sensor's as late as its fault says."""
+    """Return the readings of a walk, each sensor with the delay of its fault."""
     sensors = lane.gait_sensors
     return late_measurement(
         lane.signal_history[0, place_of_late(parts, lane, now, sensors.heel_fault)],
@@ -146,6 +146,6 @@ def late_gait(parts: Program, lane: Lane, now: Now) -> GaitMeasurement:
 
 
 def place_of_late(parts: Program, lane: Lane, now: Now, fault: Fault) -> int:
-    """Index in the ring of the delayed reading that arrives now."""
+    """Return the ring-buffer index of the delayed reading that arrives now."""
     place = now.reading - samples_late(fault, now.step * lane.timing.step, now.sample)
     return place + now.readings if place < 0 else place

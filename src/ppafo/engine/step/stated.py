@@ -1,4 +1,4 @@
-"""States of effects in a step: ahead for the second stage, at the end, and how far off they are."""
+"""States of effects in an integration step: predictor for the second stage, update, and error estimate."""
 
 from ppafo.engine.program import Program
 from ppafo.engine.scheme.pneumatics import SHORTEST
@@ -7,13 +7,13 @@ from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.plant import PlantState
 
 LARGEST = 1.0e300
-"""A state beyond this, or one that is no number, is a failure."""
+"""Magnitude of a state beyond which, as for NaN, the run has failed."""
 
 
 def moment(
     parts: Program, lane: Lane, state: PlantState, supplied: float, vented: float, command: float
 ) -> PlantSnapshot:
-    """State of the plant that effects depend on, with mean flows [kg/s]."""
+    """Return the state of the plant for effects, with mean flows [kg/s]."""
     pressure_1, pressure_2 = parts.actuator.pressures(lane.plant, state.angle, state.mass_1, state.mass_2)
     return PlantSnapshot(
         angle=state.angle,
@@ -27,18 +27,18 @@ def moment(
 
 
 def begun_moment(parts: Program, lane: Lane, command: float) -> PlantSnapshot:
-    """State of the plant that effects depend on, at the start of a step, with the flows of its first stage."""
+    """Return the state of the plant for effects at the start of a step, with the flows of the first stage."""
     supplied, mass_1, mass_2 = parts.gas.first_flows(parts, lane)
     return moment(parts, lane, lane.state, supplied, supplied - mass_1 - mass_2, command)
 
 
 def straight_on(value: float, rate: float, length: float) -> float:
-    """A number after ``length`` [s] at its rate."""
+    """Return the linear extrapolation of a value over ``length`` [s] at its rate."""
     return value + length * rate
 
 
 def predict(parts: Program, lane: Lane, command: float, length: float) -> None:
-    """States as they will be at the end of the first stage; the order would fall to one without."""
+    """Set the effect states predicted for the end of the first stage; without them, the method is of first order."""
     begun = begun_moment(parts, lane, command)
     for name, kind in parts.stated_at_ports.items():
         state = lane[f"{name}_state"]
@@ -50,13 +50,13 @@ def predict(parts: Program, lane: Lane, command: float, length: float) -> None:
 
 
 def restore(parts: Program, lane: Lane) -> None:
-    """Set the states of effects back to those at the begin of the step."""
+    """Restore the effect states at the start of the step."""
     for name in parts.stated_at_ports:
         lane[f"{name}_state"] = lane[f"{name}_state_kept"]
 
 
 def advance(parts: Program, lane: Lane, command: float, length: float) -> None:
-    """Set the states of effects at the end of a step, or of a part of it."""
+    """Set the effect states at the end of a step or part."""
     # Means over the step: a part without length must not divide by 0.
     span = max(length, SHORTEST)
     supplied = (lane.after.supplied_mass - lane.state.supplied_mass) / span
@@ -68,7 +68,7 @@ def advance(parts: Program, lane: Lane, command: float, length: float) -> None:
 
 
 def error(parts: Program, lane: Lane, command: float, length: float) -> float:
-    """The largest error over what is allowed [-]: what exact steps and straight extrapolations differ by."""
+    """Return the largest difference between exact step and linear extrapolation, divided by the allowed error [-]."""
     begun, worst = begun_moment(parts, lane, command), 0.0
     for name, kind in parts.stated_with_errors.items():
         state, after = lane[f"{name}_state"], lane[f"{name}_state_after"]
@@ -80,7 +80,7 @@ def error(parts: Program, lane: Lane, command: float, length: float) -> float:
 
 
 def are_bounded(parts: Program, lane: Lane) -> bool:
-    """True where all states at the end of a step are numbers."""
+    """Return whether all effect states at the end of a step are finite."""
     bounded = True
     for name, kind in parts.stated.items():
         for field in kind.fields:

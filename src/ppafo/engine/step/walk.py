@@ -1,4 +1,4 @@
-"""A leg that walks with the device, in a step: the gait leads its shank, the foot is free or on the ground."""
+"""Walking leg with the device in an integration step: prescribed shank, foot free or on the ground."""
 
 from ppafo.engine.groups import Groups, given, handed, kept
 from ppafo.engine.program import Program
@@ -25,7 +25,7 @@ from ppafo.model.sensors import GaitSeen, GaitSensors
 
 
 def groups(parts: Program) -> Groups:
-    """Groups of a lane: the leg that walks and what leads it, where it stands, and what phases hand on."""
+    """Groups for a walking leg: leg and gait, state of the walk, and values passed between phases."""
     if parts.takes_task_sequence:
         led = {"next_gait": handed(GaitNow), "marks": handed(Marks)}
     else:
@@ -51,17 +51,17 @@ def groups(parts: Program) -> Groups:
 
 
 def carry(parts: Program, lane: Lane) -> None:
-    """Load of the foot before the first step."""
+    """Set the torques of the foot before the first step."""
     lane.carried = walking.carried_foot(lane.leg, lane.share, lane.walk.now, lane.walk.foot)
 
 
 def find_place(parts: Program, lane: Lane, now: Now) -> None:
-    """Gait phase at the end of the step, for repeated equal strides."""
+    """Set the gait phase at the end of the step, for repeated equal strides."""
     lane.place = place_at(lane.gait_timing, time_of(parts, lane, now) + length_of(parts, lane))
 
 
 def find_measured(parts: Program, lane: Lane) -> None:
-    """Set the gait as it was measured, at the place in the stride where the step ends."""
+    """Set the measured gait at the phase where the step ends."""
     lane.measured = measured_at(lane.gait, lane.gait_timing, lane.leg, lane.place)
 
 
@@ -71,13 +71,13 @@ def find_gait(parts: Program, lane: Lane) -> None:
 
 
 def find_gait_of_task(parts: Program, lane: Lane, now: Now) -> None:
-    """The gait at the end of the step in a task sequence, with the marks of a stride."""
+    """Set the gait at the end of the step in a task sequence, with the stride events."""
     end = time_of(parts, lane, now) + length_of(parts, lane)
     lane.next_gait, lane.marks = gait_in_task_sequence(lane.gait, lane.task_sequence, lane.gait_timing, lane.leg, end)
 
 
 def begin(parts: Program, lane: Lane) -> None:
-    """Predicted step of the foot, free and on the ground."""
+    """Set the predicted step of the foot, free and on the ground."""
     lane.walk_begun = walking.begin_walk(
         lane.plant,
         lane.leg,
@@ -93,12 +93,12 @@ def begin(parts: Program, lane: Lane) -> None:
 
 
 def assumed_angle(parts: Program, lane: Lane) -> float:
-    """Angle of the joint [rad] to which the volumes run in a step of a walk."""
+    """Return the joint angle [rad] at which the chamber volumes end in a step of a walk."""
     return walking.next_angle(lane.plant, lane.leg, lane.walk, lane.walk_begun)
 
 
 def hold_ahead(parts: Program, lane: Lane) -> None:
-    """Set the chambers at the angle to which the volumes run."""
+    """Set the chambers at the angle where the volumes end."""
     lane.ahead = held_chambers(lane.plant, assumed_angle(parts, lane), parts=parts.functions)
 
 
@@ -106,7 +106,7 @@ def hold_ahead(parts: Program, lane: Lane) -> None:
 
 
 def reach(parts: Program, lane: Lane) -> None:
-    """End of the step without an event."""
+    """Set the end of the step without an event."""
     parts.gas.add(parts, lane)
     lane.ended, lane.carried = walking.reach_end(
         lane.plant,
@@ -124,7 +124,7 @@ def reach(parts: Program, lane: Lane) -> None:
 
 
 def depart(parts: Program, lane: Lane) -> None:
-    """End of a step in which the foot reverses or starts to move: rare."""
+    """Set the end of a step in which the foot reverses or starts to move, which is rare."""
     parts.gas.add(parts, lane)
     lane.ended, lane.ahead = walking.depart_in_walk(
         lane.plant,
@@ -138,7 +138,7 @@ def depart(parts: Program, lane: Lane) -> None:
 
 
 def end(parts: Program, lane: Lane, length: float) -> None:
-    """Set state and leg at the end of the step."""
+    """Set the states of plant and leg at the end of the step."""
     lane.held = lane.ahead
     lane.after, lane.walk_after = walking.end_walk(
         lane.plant,

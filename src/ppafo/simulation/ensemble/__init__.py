@@ -1,4 +1,4 @@
-"""Many variants of one scenario, with metrics computed inside the lanes and no trajectory stored."""
+"""Ensemble: many variants of one scenario, with metrics computed during the runs and no trajectory stored."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,22 +22,21 @@ from ppafo.simulation.simulate import REMEDY
 from ppafo.wording import nearest_name
 
 COMPLETED, DIVERGED, REFUSED = 0, 1, 2
-"""End of a run of an ensemble; refused: a combination of values that no run can have."""
+"""End of a run of an ensemble; REFUSED for an impossible combination of values."""
 
 _ROUNDING = 1.0e-9
-"""Fraction by which rounding may put the end of a run before the last time of its traces."""
+"""Relative tolerance for the end of a run that rounding puts before the last time of its traces."""
 
 
 @dataclass(frozen=True, slots=True)
 class EnsembleResult:
     """Results of the runs of an ensemble, in the order of the columns.
 
-    ``status`` (runs,) is COMPLETED, DIVERGED or REFUSED; ``failure_time`` (runs,) [s] is nan where a run did not
-    diverge; ``reasons`` has one line for each run, by its index, that diverged or was refused. ``metrics`` maps a name
-    to values (runs,) in SI units, nan where a run failed or has no such metric. ``times`` (times,) [s] and ``traces``,
-    channel to values (times, runs), are there for the channels that were requested; nan where a run failed. ``errors``
-    has the estimated error of each metric from the steps (runs,), where it was requested: inf where the run with finer
-    steps failed.
+    ``status`` (runs,) is COMPLETED, DIVERGED or REFUSED. ``failure_time`` (runs,) [s] is nan for runs that did not
+    diverge. ``reasons`` maps the index of each run that diverged or was refused to a line that says why. ``metrics``
+    maps a name to values (runs,) in SI units, nan for failed runs and runs without this metric. ``times`` (times,) [s]
+    and ``traces``, channel to values (times, runs), are for the requested channels; nan for failed runs. ``errors``
+    maps a metric to its estimated time-stepping error (runs,), if requested: inf if the run with finer steps failed.
     """
 
     status: NDArray[np.int8]
@@ -59,20 +58,20 @@ def run_ensemble(
     gauge: Collection[str] = (),
     errors: bool = False,
 ) -> EnsembleResult:
-    """Run ``base`` once for each row of values; each run gives exactly what it gives alone.
+    """Run ``base`` once for each row of values; each run gives exactly the same result as alone.
 
     ``columns`` maps dotted paths, as in overrides (``supply.pressure``, ``valve.area``, ``reference.level``), to values
-    in SI units, shape (runs,), pressures absolute but for the paths in ``gauge``, which count from the
-    atmosphere of their run. ``meters`` names metrics of ``ppafo.metrics``; ``bands`` names
-    channels whose traces are kept every ``every`` [s] (the output interval unless given) to the end of the longest run.
-    ScenarioError for unknown paths, metrics and channels, or for columns of different lengths; a run whose values are
-    out of range is REFUSED and the others go on. Memory grows with the number of runs: give chunks of some ten
-    thousand. ``errors`` runs all once more with a sixteenth of the error, which takes four times as long again.
+    in SI units, shape (runs,). Pressures are absolute, except for the paths in ``gauge``, which are relative to the
+    atmosphere of each run. ``meters`` names metrics of ``ppafo.metrics``. ``bands`` names channels whose traces are
+    kept every ``every`` [s] (default: the output interval) up to the end of the longest run. Raises ScenarioError for
+    unknown paths, metrics and channels, and for columns of different lengths; a run whose values are out of range is
+    REFUSED and the others continue. Memory grows with the number of runs: use chunks of some ten thousand runs.
+    ``errors`` repeats all runs with a sixteenth of the allowed error, which takes four times as long again.
 
-    Where a Python object controls ``base``, the runs are made one after the other: some 30 ms each.
+    If a Python object controls ``base``, the runs are made one after the other: some 30 ms each.
 
-    What follows a number that varies moves with it, as it does in a file: a gauge pressure with the atmosphere, a
-    pressure at the start with the supply which it names, the second regulator with the first.
+    Numbers that follow a varied number change with it, as in a file: a gauge pressure with the atmosphere, an initial
+    pressure with the supply that it names, the second regulator with the first.
     """
     metrics: dict[str, MetricKind] = {}
     for name in meters:

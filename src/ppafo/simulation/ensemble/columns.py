@@ -1,4 +1,4 @@
-"""Columns of numbers in the place of those of a scenario, checked once: nobody asks again which number a path names."""
+"""Columns of numbers that replace numbers of a scenario, checked once for all runs."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -32,9 +32,9 @@ _TEXTS = (
 
 @dataclass(frozen=True, slots=True)
 class ScenarioColumns:
-    """A scenario and what varies in it, followers included: values (runs,) in SI by path, with their declarations.
+    """Scenario with columns of varied numbers: ``values`` (runs,) in SI and their declarations, by path.
 
-    ``given`` are the paths that are no followers.
+    ``values`` include the numbers that follow varied ones; ``given`` are the paths varied by the caller.
     """
 
     base: Scenario
@@ -49,9 +49,10 @@ class ScenarioColumns:
 
 
 def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[str] = ()) -> ScenarioColumns:
-    """Return the columns with the chosen valve as ``valve``; ScenarioError for what no single run is to blame for.
+    """Return the validated columns, with the selected valve as ``valve``.
 
-    Those of the paths in ``gauge`` count from the atmosphere of their run.
+    Raises ScenarioError for errors that concern all runs. Paths in ``gauge`` hold gauge pressures relative to the
+    atmosphere of each run.
     """
     if base.controller.is_outside and base.controller.custom is None:
         raise ScenarioError(f"{base.name}: has no controller; give one with controlled_by")
@@ -91,13 +92,13 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
 
 
 def absolute(base: Scenario, columns: Mapping[str, Floats], gauge: Collection[str]) -> dict[str, Floats]:
-    """Return the columns with absolute pressures in place of those that count from the atmosphere of their run."""
+    """Return the columns with gauge pressures converted to absolute ones by the atmosphere of each run."""
     atmosphere = columns.get(ATMOSPHERE_PATH, base.device.supply.atmospheric_pressure)
     return {path: column + atmosphere if path in gauge else column for path, column in columns.items()}
 
 
 def _why_not(base: Scenario, given: str, path: str, declared: Mapping[str, Quantity]) -> str:
-    """Return why a path of an ensemble names no number that could vary."""
+    """Return the reason why a path of an ensemble names no number that can vary."""
     if path in _TEXTS:
         return f"'{given}' is a text and cannot vary; run an ensemble for each value"
     if base.controller.is_outside and path.startswith("controller."):

@@ -1,4 +1,4 @@
-"""Planning of an ensemble: runs with one program and one clock from columns; contradictory runs are refused."""
+"""Planning of an ensemble: batches of columns with one program and one clock; contradictory runs are refused."""
 
 import operator
 from collections.abc import Callable, Iterator
@@ -30,9 +30,10 @@ _WHOLE = ("sensors.seed", "wearer.person")
 
 @dataclass(slots=True)
 class ValidRuns:
-    """The runs that are left: their places in the ensemble, their columns and clocks; and why others are not.
+    """Runs not refused so far: ``members``, their indices in the ensemble, with their columns and clocks.
 
-    Without a ``clock``, which is set before anything asks for the scenario, it is the scenario's.
+    ``reasons`` maps the index of each refused run to a line that says why. ``clock`` is None for the scenario's own
+    clock; it is set before the first use of ``scenario``.
     """
 
     columns: ScenarioColumns
@@ -43,7 +44,7 @@ class ValidRuns:
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario that represents the runs that are left, made once for all rules that ask for it."""
+        """Scenario with columns for the remaining runs, built once for all rules."""
         if self._scenario is None:
             # What the clock came to stands in the place of the times that were given.
             numbers = {path: column for path, column in self.columns.values.items() if path not in TIMES}
@@ -57,7 +58,7 @@ class ValidRuns:
         return self._scenario
 
     def at(self, places: Members) -> "ValidRuns":
-        """The screen of some of these runs, which writes its reasons to the same place."""
+        """Return the subset of runs at ``places``, which shares ``reasons``."""
         clock = self.clock
         if clock is not None:
             times = clock.duration, clock.step, clock.output_interval, clock.period
@@ -67,7 +68,7 @@ class ValidRuns:
         return ValidRuns(replace(self.columns, values=values), self.members[places], self.reasons, clock)
 
     def refuse(self, is_bad: Any, line: Callable[[int], str]) -> None:
-        """Drop runs, by a mask over those left or one truth value for all; ``line(place)`` says why."""
+        """Drop runs by a mask over the remaining ones, or all by one truth value; ``line(place)`` gives the reason."""
         bad = np.broadcast_to(np.asarray(is_bad, dtype=bool), self.members.shape)
         if not bad.any():
             return
@@ -78,7 +79,7 @@ class ValidRuns:
 
 
 def screen_columns(columns: ScenarioColumns) -> ValidRuns:
-    """The runs whose values are in range and fit together."""
+    """Runs whose values are in range and consistent."""
     screen = ValidRuns(columns, np.arange(columns.runs), {})
     for path in columns.values:
         # A default that follows others goes where they lead it, as it does in a single run.
@@ -117,14 +118,14 @@ def _out_of_range(columns: ScenarioColumns, path: str) -> Problem:
 
 @dataclass(frozen=True, slots=True)
 class EnsemblePlan:
-    """Batches with the places of their runs in the ensemble, and a line for each run that cannot be."""
+    """Batches with the indices of their runs in the ensemble, and a line for each refused run."""
 
     batches: tuple[tuple[Members, Batch], ...]
     reasons: dict[int, str]
 
 
 def plan_ensemble(columns: ScenarioColumns, change: Callable[[Run], Run] | None = None) -> EnsemblePlan:
-    """Batches of all runs that can be; each has the rows, bit for bit, that ``plan_run`` gives it alone and changed."""
+    """Batches of all valid runs; rows are bit for bit as from ``plan_run`` for one run, with ``change`` applied."""
     screen = screen_columns(columns)
     batches: list[tuple[Members, Batch]] = []
     for places in _of_one_program(screen.scenario, screen.members.size) if screen.members.size else ():
@@ -141,7 +142,7 @@ def plan_ensemble(columns: ScenarioColumns, change: Callable[[Run], Run] | None 
 
 
 def _of_one_program(scenario: Scenario, runs: int) -> list[Members]:
-    """Places of the runs, those together that have the same effects and zeros in the same settings."""
+    """Indices of the runs, grouped by program: the same effects, and zeros in the same settings."""
     own = scenario.motion.motion_kind.switches(scenario)
     settings: tuple[Any, ...] = (*scenario.device.valve.settings.values(), *own)
     varied_settings = [setting > 0.0 for setting in settings if isinstance(setting, np.ndarray)]
@@ -156,7 +157,7 @@ def _of_one_program(scenario: Scenario, runs: int) -> list[Members]:
 
 
 def _contradictory_numbers(scenario: Scenario) -> Iterator[Problem]:
-    """Yield the numbers of a scenario of many runs that do not go together; the later ones suppose the earlier."""
+    """Yield the problems of contradictory numbers of a scenario of many runs; later checks rely on earlier ones."""
     device, supply = scenario.device, scenario.device.supply
     for path, relation, other, holds in consistency(device):
         yield np.logical_not(holds), partial(_inconsistent_line, scenario, path, relation, other)
@@ -179,7 +180,7 @@ def _contradictory_numbers(scenario: Scenario) -> Iterator[Problem]:
 
 
 def _inconsistent_line(scenario: Scenario, path: str, relation: str, other: str, run: int) -> str:
-    """Sentence on two numbers of a device that contradict each other in a run."""
+    """Message about two contradictory numbers of a device in a run."""
     unit, room = declared_numbers(scenario)[path].unit, at(scenario.device.supply.atmospheric_pressure, run)
     number, limit = (
         shown_text(at(value, run), unit, ".9g", room) for value in operator.attrgetter(path, other)(scenario.device)
@@ -188,7 +189,7 @@ def _inconsistent_line(scenario: Scenario, path: str, relation: str, other: str,
 
 
 def _misshapen(scenario: Scenario) -> tuple[Problem, ...]:
-    """An actuator whose numbers do not fit together beyond what their limits say."""
+    """Problems of an actuator whose numbers are each in range but inconsistent."""
     actuator = scenario.device.actuator
     if ACTUATORS[actuator.kind].problem is None and actuator.table is None:
         return ()

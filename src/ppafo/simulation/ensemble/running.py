@@ -1,4 +1,4 @@
-"""Runs the batches of an ensemble and reads their meters."""
+"""Execution of the batches of an ensemble, with metrics read from meters."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,9 +25,11 @@ _SAME = 1.0e-6
 
 @dataclass(frozen=True, slots=True)
 class OutputRequest:
-    """Outputs requested of every run: metrics by name, channels to trace, and the times at which to keep them [s].
+    """Outputs requested for every run.
 
-    ``custom`` is the Python object that controls every run, one after the other; None where the lanes do.
+    ``metrics`` are by name, ``bands`` the channels to trace, ``every`` the interval and ``times`` the times of the
+    traces [s]. ``custom`` is the Python object that controls the runs one after the other, None for a compiled
+    controller.
     """
 
     metrics: Mapping[str, MetricKind]
@@ -39,7 +41,7 @@ class OutputRequest:
 
 @final
 class MeteredRuns:
-    """Results of all runs so far: arrays that batches write their columns into, nan where nothing was written."""
+    """Results of all runs so far: arrays that batches fill by column; nan for runs not yet made."""
 
     def __init__(self, runs: int, request: OutputRequest) -> None:
         self.request = request
@@ -50,7 +52,7 @@ class MeteredRuns:
         self.traces = {name: np.full((request.times.size, runs), np.nan) for name in request.bands}
 
     def run_all(self, batches: Sequence[tuple[Members, Batch]], threads: int | None) -> None:
-        """Run batches one after the other, whose runs have these places in the ensemble."""
+        """Run batches one after the other; each comes with the indices of its runs in the ensemble."""
         tasks = [_meter_batch(batch, members, self.request) for members, batch in batches]
         # Several programs are compiled side by side before the first batch runs.
         load_programs((task.batch.program, Effort.FULL) for task in tasks)
@@ -58,7 +60,7 @@ class MeteredRuns:
             self._run(task, threads)
 
     def _run(self, task: "_MeteredBatch", threads: int | None) -> None:
-        """Run a batch and write what its runs come to at their places in the ensemble."""
+        """Run a batch and store the results of its runs at their indices in the ensemble."""
         batch, members = task.batch, task.members
         states = np.empty_like(batch.states)
         read_from_traces = {name: np.full(members.size, np.nan) for name, kind in task.metrics.items() if kind.traced}
@@ -86,7 +88,7 @@ class MeteredRuns:
             self.metrics[name][members] = np.where(self.is_completed[members], values, np.nan)
 
     def _judge(self, task: "_MeteredBatch", states: Floats) -> None:
-        """Set which runs were completed, as for a single run: valid throughout, and finite at the end."""
+        """Set the completed runs, by the rule for a single run: valid throughout, and finite at the end."""
         members = task.members
         result = group_of("result", task.batch.program.state_rows(), states)
         failed = result.failure_time
@@ -105,9 +107,10 @@ class MeteredRuns:
 
 @dataclass(frozen=True, slots=True)
 class _MeteredBatch:
-    """A batch with its meters, its runs' places in the ensemble, its metrics, and the interval of its samples.
+    """Batch with meters: indices of its runs in the ensemble, metrics, sample interval [s], number of samples.
 
-    The first ``physical`` rows of its states are no meters.
+    The first ``physical`` rows of its states belong to the physical model, the others to meters. ``band_stride`` is the
+    number of recorded rows per time of a trace.
     """
 
     batch: Batch
@@ -119,7 +122,7 @@ class _MeteredBatch:
     band_stride: int
 
     def readings(self, states: Floats, runs: slice, record: Floats | None) -> Readings:
-        """The readings of some runs from their last states and, if there are, their traces."""
+        """Readings of some runs from their final states and, if recorded, their traces."""
         program = self.batch.program
         groups = program.state_rows()
         traces = {} if record is None else {name: record[:, row] for row, name in enumerate(program.traced)}
@@ -133,12 +136,12 @@ class _MeteredBatch:
 
 
 def lacking(scenario: Scenario, kind: MetricKind) -> str:
-    """Why no run of a scenario has what a metric needs, an empty text where it has."""
+    """Reason why no run of a scenario can have a metric; "" if runs have it."""
     return scenario.motion.motion_kind.lacks(scenario, kind)
 
 
 def offered(scenario: Scenario) -> dict[str, MetricKind]:
-    """The metrics that runs of a scenario have, for messages: metrics of walks are not for a vane, nor the reverse."""
+    """Metrics that runs of a scenario have, for messages: a vane alone has no metrics of walks, and vice versa."""
     missing: frozenset[str] = frozenset() if scenario.gas_model is not None else WITH_ENERGY_BALANCE
     missing |= OF_SECOND_CHAMBER if scenario.device.actuator.has_one_chamber else frozenset()
     return {
@@ -171,12 +174,12 @@ def _meter_batch(plain: Batch, members: Members, request: OutputRequest) -> _Met
 
 
 def intervals(batch: Batch) -> Floats:
-    """Time between two samples [s] of each run of a batch that is not metered yet."""
+    """Time between two samples [s] of each run of a batch without meters."""
     timing = group_of("timing", batch.program.parameter_rows(), batch.parameters)
     return np.asarray(timing.step * batch.clock.record_every)
 
 
 def _read(task: _MeteredBatch, name: str, readings: Readings) -> Floats:
-    """The values of a metric; runs that failed may have any."""
+    """Values of a metric; arbitrary for failed runs."""
     with np.errstate(all="ignore"):
         return np.asarray(task.metrics[name].read(readings))

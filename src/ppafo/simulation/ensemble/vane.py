@@ -1,4 +1,4 @@
-"""Ensembles of a vane alone: clocks of runs, contradictory numbers, and metrics that it lacks."""
+"""Ensembles of a vane alone: clocks of runs, contradictory numbers, and metrics that do not apply."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -21,7 +21,7 @@ from ppafo.units.shown import shown_text
 
 
 def contradictory_numbers(scenario: Scenario) -> tuple[Problem, ...]:
-    """Numbers of a vane that do not go together: it or its reference beyond a limit, a delay too long."""
+    """Problems of a vane: vane or reference beyond a limit, delay too long."""
     delay, step, device = scenario.sensors.delay, scenario.run.step, scenario.device
     motion, followed = vane_motion(scenario), CONTROLLED[scenario.controlled]
     profile = ProfileChoice("constant", {"level": motion.angle}) if motion.profile is None else motion.profile
@@ -51,14 +51,14 @@ def contradictory_numbers(scenario: Scenario) -> tuple[Problem, ...]:
 
 
 def _is_beyond(limits: Limits, profile: ProfileChoice) -> NDArray[np.bool_]:
-    """Tell in which runs (runs,) a profile leaves its limits at any time."""
+    """Tell for each run (runs,) whether a profile leaves its limits at any time."""
     lowest, highest = profile_bounds(profile)
     lower, upper = limits.allowed
     return np.atleast_1d(np.logical_or(lowest < lower, highest > upper))
 
 
 def _beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, section: str) -> Problem:
-    """A profile of a section that leaves its limits."""
+    """Problem of a section's profile that leaves its limits."""
     outside = _is_beyond(limits, profile)
     # The bounds hold for all time; a run that may leave them is checked at its own times.
     problems: dict[int, str] = {}
@@ -71,9 +71,9 @@ def _beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, section:
 
 
 def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[RunTimes, tuple[Problem, ...]]:
-    """Return the clock with columns of times [s] by path, and what does not fit together.
+    """Return the clock for columns of times [s] by path, and the problems of contradictory times.
 
-    Times are read as those of a file are, once for each combination of them.
+    Times are read as in a file, once for each combination.
     """
     # Once for each combination: times are read as the texts of a file are, and an ensemble has few of them.
     texts = time_texts(base)
@@ -92,7 +92,7 @@ def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[RunTimes, tuple[Pro
 
 
 def lacks(scenario: Scenario, kind: MetricKind) -> str:
-    """Return why no run of a vane has what a metric needs, an empty text where it has."""
+    """Return the reason why no run of a vane can have a metric; "" if runs have it."""
     if WALK in kind.needs:
         return "it needs a walk"
     leg = vane_motion(scenario).leg

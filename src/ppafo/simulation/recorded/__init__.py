@@ -1,1 +1,1 @@
-"""Runs that follow a recording: its clock, its inputs step by step, where it starts, and what is refused of it."""
+"""Runs that follow a recording: clock, inputs at each step, initial state, and checks of the recording."""

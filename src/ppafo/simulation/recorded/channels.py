@@ -1,4 +1,4 @@
-"""Channels of a recording that a run takes as inputs, and recordings that are refused because these are not known."""
+"""Channels of a recording that a run takes as inputs, and checks that these inputs are known."""
 
 import numpy as np
 
@@ -7,24 +7,24 @@ from ppafo.signals import Recording
 from ppafo.signals.faults import longest_gap
 
 COMMAND, SUPPLY, EXTERNAL_TORQUE = "command", "supply_pressure", "external_torque"
-"""Valve command [-], supply pressure [Pa absolute], torque on the vane from outside [N m]."""
+"""Valve command [-], supply pressure [Pa absolute], external torque on the vane [N m]."""
 DORSIFLEXION_SUPPLY = "dorsiflexion_pressure"
-"""Supply pressure of chamber 2 [Pa absolute], where each chamber has a regulator of its own."""
+"""Supply pressure of chamber 2 [Pa absolute], if each chamber has its own regulator."""
 ANGLE = "angle"
-"""An angle that is an input: the vane follows it, in straight lines from sample to sample."""
+"""Angle as an input: the vane follows it, linearly interpolated between samples."""
 PRESSURES = ("pressure_1", "pressure_2", SUPPLY, DORSIFLEXION_SUPPLY)
 """Channels of absolute pressures."""
 
 LONGEST_GAP = 0.05
-"""Seconds without a sample in which so much can happen that the inputs are not known any more, if it is a gap."""
+"""Longest gap without samples [s] for which the inputs count as known."""
 _COMMAND_TOLERANCE = 1.0e-6
-"""Command [-] beyond full opening that is taken as rounding in a file."""
+"""Command [-] beyond full opening that counts as rounding in a file."""
 _SMALLEST_ABSOLUTE = 0.3
-"""Fraction of the atmosphere; an absolute pressure below it is almost surely a gauge pressure under the wrong name."""
+"""Fraction of atmospheric pressure [-] below which a pressure is almost surely a mislabelled gauge pressure."""
 
 
 def check_gaps(recording: Recording, file: str) -> None:
-    """Raise DataError, which begins with ``file``, for a recording with a gap in which its inputs are not known."""
+    """Raise DataError, prefixed with ``file``, for a recording with a gap too long for its inputs to be known."""
     gap = longest_gap(recording.time)
     if gap is not None and gap.duration > LONGEST_GAP:
         raise DataError(
@@ -34,7 +34,7 @@ def check_gaps(recording: Recording, file: str) -> None:
 
 
 def check_command(recording: Recording, file: str) -> None:
-    """Raise DataError, which begins with ``file``, for a command outside -1 to 1."""
+    """Raise DataError, prefixed with ``file``, for a command outside -1 to 1."""
     command = recording[COMMAND]
     worst = int(np.argmax(np.abs(command)))
     if abs(command[worst]) > 1.0 + _COMMAND_TOLERANCE:
@@ -45,9 +45,9 @@ def check_command(recording: Recording, file: str) -> None:
 
 
 def check_absolute(recording: Recording, atmosphere: float, file: str) -> None:
-    """Raise DataError, which begins with ``file``, for pressures that cannot be absolute; ``atmosphere`` [Pa absolute].
+    """Raise DataError, prefixed with ``file``, for pressures that must be gauge pressures.
 
-    They lie so far below the atmosphere that they must be gauge pressures.
+    They are far below ``atmosphere`` [Pa absolute].
     """
     for name in (name for name in PRESSURES if name in recording):
         lowest = int(np.argmin(recording[name]))

@@ -1,26 +1,26 @@
-"""The clock of a recording: whether its samples are regular, and on which grid a run follows them."""
+"""Clock of a recording: test for regular sampling, and time grid of a run that follows the recording."""
 
 import numpy as np
 
 from ppafo.signals.recording import Floats
 
 LONGEST_STEP = 1.0e-3
-"""Seconds over which a recorded pressure or torque is averaged, and the longest step of a replay."""
+"""Averaging time of a recorded pressure or torque, and longest step of a replay [s]."""
 SHORTEST_SAMPLE = 1.0e-4
-"""Seconds; irregular samples are placed on a grid no finer than this."""
+"""Smallest interval of the grid to which irregular samples are assigned [s]."""
 _IRREGULARITY = 0.02
-"""Fraction of a sample by which a time may be off a regular grid; clocks write rounded times."""
+"""Largest deviation of a time from a regular grid, as a fraction of the interval; clocks write rounded times."""
 
 
 def regular_interval(time: Floats) -> float | None:
-    """Return the time between samples [s] where they are regular, else None; ``time`` [s] has two samples or more."""
+    """Return the sample interval [s] of regular samples, else None; ``time`` [s] has at least two samples."""
     interval = float(time[-1] - time[0]) / (time.size - 1)
     offsets = time - time[0] - interval * np.arange(time.size)
     return interval if float(np.abs(offsets).max()) < _IRREGULARITY * interval else None
 
 
 def sample_period(time: Floats) -> float:
-    """Return the time between samples [s], or of the grid on which irregular samples are placed."""
+    """Return the sample interval [s], or the interval of the grid to which irregular samples are assigned."""
     shortest = min(max(float(np.diff(time).min()), SHORTEST_SAMPLE), LONGEST_STEP)
     return regular_interval(time) or shortest
 

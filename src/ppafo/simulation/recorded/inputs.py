@@ -1,4 +1,4 @@
-"""Inputs of a run from a recording: command, supply pressures, external torque and angle, step by step."""
+"""Inputs of a run from a recording, at each step: command, supply pressures, external torque and angle."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from ppafo.simulation.recorded.channels import ANGLE, COMMAND, DORSIFLEXION_SUPP
 from ppafo.simulation.recorded.clock import LONGEST_STEP
 
 _BEYOND_STOPS = 0.05
-"""Fraction of the range by which a measured angle may exceed a stop; up to there it is set to the stop."""
+"""Largest excess of a measured angle over a stop, as a fraction of the range; it is then limited to the stop."""
 _SUPPLY_PATH, _DORSIFLEXION_PATH = "plant.supply_pressure", "plant.dorsiflexion_pressure"
 
 
@@ -33,12 +33,12 @@ class RecordedInputs:
 
 
 def supply_paths(device: Device) -> tuple[str, ...]:
-    """Return the parameters that follow a recorded supply: both regulators, unless they have two pressures."""
+    """Return the parameters set by a recorded supply pressure: both regulators, unless their pressures differ."""
     return (_SUPPLY_PATH, _DORSIFLEXION_PATH) if device.supply.has_one_pressure else (_SUPPLY_PATH,)
 
 
 def with_highest_supply(device: Device, recording: Recording, followed: Collection[str]) -> Device:
-    """Return the device with the highest supply of the channels followed, for which the steps must be fine enough."""
+    """Return the device with the highest recorded supply pressure, for which the steps must be fine enough."""
     supply = device.supply
     recorded = {name: float(recording[name].max()) for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in followed}
     highest = max(supply.pressure, recorded.get(SUPPLY, 0.0))
@@ -48,9 +48,10 @@ def with_highest_supply(device: Device, recording: Recording, followed: Collecti
 
 
 def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
-    """Return what a run follows at each of its steps; ``device`` says which regulators follow the supply.
+    """Return the inputs of a run at each step; ``device`` determines which regulators follow the supply.
 
-    A run that follows the angle is one of ``with_prescribed_angle``. DataError for angles far beyond the stops.
+    A run that follows the angle must come from ``with_prescribed_angle``. Raises DataError for angles far beyond the
+    stops.
     """
     command = _values_at_steps(inputs, COMMAND, run) if inputs.has(COMMAND) else None
     # The parameters that follow a recording [SI], for every step.
@@ -67,10 +68,10 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
 
 
 def _values_at_steps(inputs: RecordedInputs, name: str, run: Run) -> Floats:
-    """Return an input [SI] at each step (steps,), as its recording declares it.
+    """Return an input [SI] at each step (steps,), interpolated as its recording declares.
 
-    A change of a held one falls on the nearest step. One on a line is a mean over a step or, so that there are fewer
-    changes, a millisecond; a command over a step, as a valve answers within less.
+    A step change of a zero-order-hold channel moves to the nearest step. A linear channel is averaged over a step or,
+    for fewer changes, over a millisecond; a command is averaged over a step, because a valve responds within less.
     """
     if inputs.recording.is_held(name):
         middle = run.step * np.arange(run.step_count, dtype=np.float64) + 0.5 * run.step
@@ -82,7 +83,7 @@ def _values_at_steps(inputs: RecordedInputs, name: str, run: Run) -> Floats:
 
 
 def _angle_path_at_steps(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:
-    """Return the straight piece of the angle that holds at each step: where it starts [s], level [rad], rate [rad/s].
+    """Return the straight segment of the angle in effect at each step: start time [s], level [rad], rate [rad/s].
 
     After the last sample the vane stands still.
     """
@@ -96,16 +97,13 @@ def _angle_path_at_steps(inputs: RecordedInputs, device: Device, run: Run) -> di
 
 
 def with_prescribed_angle(run: Run, angle: float) -> Run:
-    """Return the run with the vane on a recorded angle, which is ``angle`` [rad] at the start."""
+    """Return the run with its vane moved along a recorded angle, which is ``angle`` [rad] at the start."""
     program = replace(run.program, angle=RECORDED_ANGLE)
     return replace(run, program=program, path=AngleSegment(0.0, angle, 0.0), needs_parts=True)
 
 
 def between_stops(angles: Floats, device: Device, file: str) -> Floats:
-    """Return angles [rad] as they are or, slightly beyond a stop, as the stop; DataError for those far beyond.
-
-    Its message begins with ``file``.
-    """
+    """Return angles [rad], limited to the stops; DataError, prefixed with ``file``, for angles far beyond a stop."""
     lowest, highest = device.actuator.angle_min, device.actuator.angle_max
     margin = _BEYOND_STOPS * (highest - lowest)
     worst = angles[int(np.argmax(np.maximum(lowest - angles, angles - highest)))]

@@ -1,4 +1,4 @@
-"""The scenario of a replay: a device on the clock of a recording, with no controller, and motions of its vane."""
+"""Scenario of a replay: a device on the clock of a recording, without a controller, and motions of its vane."""
 
 from dataclasses import replace
 
@@ -29,10 +29,10 @@ def replay_scenario(
     file: str,
     motion: FreeMotion | PrescribedMotion | None = None,
 ) -> Scenario:
-    """Return a run of ``duration`` [s] on the clock of a recording, whose command the caller sets step by step.
+    """Return a scenario of ``duration`` [s] on the clock of a recording; the caller sets its command step by step.
 
-    The vane moves freely from where it starts unless another motion is given. ``file`` is what the scenario says that
-    it is from.
+    The vane moves freely from its initial state unless another motion is given. ``file`` is the origin stated in the
+    scenario.
     """
     period = sample_period(recording.time)
     return Scenario(
@@ -51,20 +51,20 @@ def replay_scenario(
 
 
 def replay_control(recording: Recording) -> Control:
-    """Return the control of a run whose command comes from a recording: no controller, the period of the samples."""
+    """Return the control of a run with a recorded command: no controller, sample period of the recording."""
     return Control(PYTHON_CONTROLLER, {}, sample_period(recording.time))
 
 
 def locked_vane(angle: float) -> PrescribedMotion:
-    """Return the motion of a vane that is held at an angle [rad]: both chambers are fixed volumes."""
+    """Return the motion of a vane locked at an angle [rad]: both chambers have fixed volumes."""
     return PrescribedMotion(ProfileChoice("constant", {"level": angle}), "locked")
 
 
 def with_fixed_volume(device: Device, volume: float) -> tuple[Device, dict[str, float]]:
-    """Return the device with a fixed volume [m^3] in the place of chamber 1, and what a replay of it starts from [SI].
+    """Return the device with a fixed volume [m^3] in place of chamber 1, and the initial values of its replay [SI].
 
-    Whatever the actuator, nothing leaks. The start by channel, beside the pressure in the volume: the vane at the lower
-    stop, chamber 2 at the atmosphere.
+    There is no leak, for any actuator. The initial values, by channel, are the vane at the lower stop and chamber 2 at
+    atmospheric pressure; the pressure in the volume is given by the caller.
     """
     leak = device.actuator.leak
     shut = replace(leak, area=0.0) if isinstance(leak, Orifice) else replace(leak, sonic_conductance=0.0)

@@ -1,4 +1,4 @@
-"""Initial state of a replay: angle and pressures of the samples before the first command, averaged over the noise."""
+"""Initial state of a replay: angle and pressures, averaged over the samples before the first command."""
 
 import math
 from collections.abc import Mapping
@@ -14,17 +14,17 @@ from ppafo.simulation.recorded.channels import ANGLE, COMMAND
 from ppafo.simulation.recorded.inputs import between_stops
 
 REST_WINDOW = 0.05
-"""Seconds before the first command over which the start is averaged; short, so that no leak shows in it."""
+"""Time before the first command over which the start is averaged [s]; so short that a leak has no effect."""
 _FEWEST_ON_LINE = 8
-"""Samples below which no slope is told from noise: the first or last of them is taken."""
+"""Fewest samples for a significant slope; with fewer samples the first or the last one is used."""
 _SEEN_SLOPE = 4.0
-"""Standard errors from which something moves: white noise at rest is that far off once in 16,000 times."""
+"""Standard errors from which a slope is significant: white noise at rest exceeds them once in 16,000 times."""
 _ROUNDING = 1.0e-9
-"""Fraction of the largest value below which a slope is rounding of the least squares."""
+"""Slope, as a fraction of the largest value, below which it is rounding of the least squares."""
 _DEVIATION_OF_MEDIAN = 1.4826
-"""Standard deviation over the median size of normal noise: 1 over the 0.75 quantile of the standard normal."""
+"""Standard deviation of normal noise divided by its median absolute value: 1 / (0.75 quantile of a standard normal)."""
 _LEAST_RANK = 1.0e-6
-"""Singular value over the largest from which powers of time count as independent of each other."""
+"""Smallest singular value divided by the largest for which powers of time count as independent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class ReplayStart:
 
 
 def samples_at_rest(recording: Recording) -> int:
-    """Return the samples before the first command, at most 50 ms of them; 1 where the valve is open from the start."""
+    """Return the number of samples before the first command, at most 50 ms; 1 if the valve is open at the start."""
     command, time = recording[COMMAND], recording.time
     if command[0] != 0.0:
         return 1
@@ -49,9 +49,9 @@ def samples_at_rest(recording: Recording) -> int:
 def start_of(
     recording: Recording, device: Device, known: Mapping[str, float], file: str, remedies: Mapping[str, str]
 ) -> ReplayStart:
-    """Return where the replay of a recording starts: ``known`` values [SI] go before what its samples at rest show.
+    """Return the initial state of a replay: ``known`` values [SI] take precedence over the averaged samples at rest.
 
-    DataError, which begins with ``file``, for a channel that is not there, with the remedy for it.
+    Raises DataError, prefixed with ``file``, for a missing channel, with the remedy for this channel.
     """
     count, values = samples_at_rest(recording), dict(known)
     for name in (ANGLE, "pressure_1", "pressure_2", "angular_velocity"):
@@ -64,10 +64,10 @@ def start_of(
 
 
 def value_at_rest(time: Floats, values: Floats, at_end: bool = False) -> float:
-    """Return the value [SI] with which a stretch at rest begins, or ends: the mean of its samples if they do not move.
+    """Return the value [SI] at the start, or at the end, of samples at rest: their mean if they show no drift.
 
-    A chamber that leaks does move while valve and vane rest. Where a straight line has a slope that is seen, the value
-    is the line's; where the samples are seen to bend, the same of the half that is nearer.
+    In a leaking chamber the pressure drifts even while valve and vane rest. With a significant slope, the value is
+    taken from the fitted line; with significant curvature, the same rule is applied to the half nearer to that end.
     """
     while values.size >= _FEWEST_ON_LINE:
         fraction = (time - (time[-1] if at_end else time[0])) / (time[-1] - time[0])
@@ -82,9 +82,9 @@ def value_at_rest(time: Floats, values: Floats, at_end: bool = False) -> float:
 
 
 def _is_seen(columns: Floats, values: Floats) -> bool:
-    """Return whether the coefficient of the first column is far from 0 for the noise from sample to sample.
+    """Return whether the coefficient of the first column is significant relative to the sample noise.
 
-    By the median of second differences, which neither a slope nor a jump changes.
+    The noise is estimated by the median of second differences, which neither a slope nor a step changes.
     """
     # Samples that lie together in time, but for one, tell no bend from a slope.
     if np.linalg.matrix_rank(columns, rtol=_LEAST_RANK) < columns.shape[1]:

@@ -1,8 +1,7 @@
-"""Usual errors of a bench, as limits on either side: the one table that every comparison with a recording reads.
+"""Usual errors of a test bench, as limits to either side: one table for every comparison with a recording.
 
-Limits of agreement, causes of a disagreement and tolerances of a fit take the same numbers, so that what one counts as
-an error of any bench no other calls a fault. A limit has the standard deviation limit / sqrt(3) (GUM, JCGM 100:2008,
-4.3.7).
+Limits of agreement, causes of a disagreement and tolerances of a fit use the same numbers, so that a usual error of a
+bench is never reported as a fault. A limit has the standard deviation limit / sqrt(3) (GUM, JCGM 100:2008, 4.3.7).
 """
 
 import math
@@ -13,7 +12,7 @@ from ppafo.simulation.recorded.channels import ANGLE
 
 
 class SensorErrors(NamedTuple):
-    """Limits of the errors of a sensor: zero [SI unit of its channel], gain less 1 [-], delay [s]."""
+    """Limits of the errors of a sensor: zero offset [SI unit of its channel], relative gain error [-], delay [s]."""
 
     zero: float
     gain: float
@@ -25,14 +24,14 @@ ANGLE_ERRORS = SensorErrors(zero=math.radians(0.5), gain=0.005, delay=1.0e-3)
 PRESSURE_ERRORS = SensorErrors(zero=0.3 * PASCALS_PER_PSI, gain=0.005, delay=1.0e-3)
 """Usual errors of a pressure sensor [Pa, -, s]."""
 SUPPLY_ERROR = PASCALS_PER_PSI
-"""Usual error of a supply pressure that was set and not recorded [Pa]."""
+"""Usual error of a supply pressure that was set but not recorded [Pa]."""
 
 
 def usual_errors(channel: str) -> SensorErrors:
-    """Return the usual errors of the sensor of a channel: the angle's, or those of a pressure."""
+    """Return the usual errors of a channel's sensor: angle sensor or pressure sensor."""
     return ANGLE_ERRORS if channel == ANGLE else PRESSURE_ERRORS
 
 
 def deviation_of_limit(limit: float) -> float:
-    """Return the standard deviation of a number known within a limit on either side, in the unit of the limit."""
+    """Return the standard deviation of a quantity known within +/- ``limit``, in the unit of the limit."""
     return limit / math.sqrt(3.0)

@@ -16,7 +16,11 @@ _FULLY_OPEN = 0.98
 
 
 class Case(NamedTuple):
-    """Run that does not follow: scenario, law (None for a Python controller), recording, settled part, failure."""
+    """Run that does not follow its reference.
+
+    ``law`` is the controller kind, None for a Python controller; ``settled`` the settled part of ``recording``;
+    ``failure`` the kind of failure.
+    """
 
     scenario: Scenario
     law: ControllerKind | None
@@ -26,23 +30,26 @@ class Case(NamedTuple):
 
     @property
     def oscillates(self) -> bool:
-        """True for a loop that swings or whose command reverses too often."""
+        """True if the loop oscillates or its command reverses too often."""
         return self.failure == "oscillates"
 
     @property
     def only_switches(self) -> bool:
-        """True for a law that opens the valve fully or not at all."""
+        """True for a controller that opens the valve fully or not at all."""
         return self.law is not None and self.law.only_switches
 
     @property
     def fully_open(self) -> float:
-        """Share of the settled part in which the valve is fully open [-]."""
+        """Fraction of the settled part in which the valve is fully open [-]."""
         command = np.abs(self.recording["command"][self.settled.samples])
         return float(np.mean((command >= _FULLY_OPEN) & (command <= 1.0 + SHUT)))
 
 
 class TrackingCause(NamedTuple):
-    """Cause in words with numbers, remedies to try, advice where none helps, and whether it is a lack of torque."""
+    """Cause of a tracking failure: sentence with numbers, remedies to try, and advice if none helps.
+
+    ``is_beyond_reach`` is true if the actuator lacks torque.
+    """
 
     text: str
     remedies: tuple[Remedy, ...] = ()

@@ -1,4 +1,4 @@
-"""Causes of a task that does not follow its reference, each with its numbers and remedies, the surest cause first."""
+"""Causes of a task that does not follow its reference, most certain first, each with numbers and remedies."""
 
 from collections.abc import Callable
 
@@ -32,17 +32,17 @@ from ppafo.simulation.tracking.remedies import (
 from ppafo.simulation.tracking.rule import LARGEST_SHARE
 
 _MOSTLY = 0.5
-"""Share of the settled part that is most of it [-]."""
+"""Fraction of the settled part that counts as most of it [-]."""
 _EDGE = 1.05
-"""Command over the dead band up to which it counts as within the band [-]."""
+"""Command divided by the dead band, up to which the command counts as within the band [-]."""
 _EXPLAINED = 0.6
-"""Share of the squared error that one lag explains, from which it is told [-]."""
+"""Smallest fraction of the squared error explained by a lag for which the lag is reported [-]."""
 _QUICKER = 1.3
-"""Rate at an angle over the rate the gains are made for, from which it causes oscillation [-]."""
+"""Loop rate at an angle, divided by the rate used for the gains, above which it causes oscillation [-]."""
 
 
 def _shut_valve(case: Case) -> TrackingCause | None:
-    """The command is 0, or stays within the dead band of the valve."""
+    """Cause: the command is 0, or stays within the dead band of the valve."""
     scenario, settled = case.scenario, case.settled
     command, band = np.abs(case.recording["command"][settled.samples]), dead_band(scenario)
     # A loop that rests at the edge of the band is a little beyond it now and then.
@@ -67,7 +67,7 @@ def _shut_valve(case: Case) -> TrackingCause | None:
 
 
 def oscillation(case: Case) -> TrackingCause | None:
-    """Valves, gains or small chambers that make a loop oscillate."""
+    """Cause: valves, gains or small chambers make the loop oscillate."""
     scenario, law = case.scenario, case.law
     if not (case.oscillates or case.only_switches):
         return None
@@ -98,7 +98,7 @@ def oscillation(case: Case) -> TrackingCause | None:
 
 
 def _steps_of_pair(case: Case, law: ControllerKind, quicker: float) -> TrackingCause:
-    """Change caused by a pair of on/off valves during its dead time, as a multiple of the wanted value."""
+    """Cause: change by a pair of on/off valves during its dead time, as a multiple of the wanted change."""
     scenario = case.scenario
     step, late = pair_step(scenario, law)
     step *= quicker
@@ -112,7 +112,7 @@ def _steps_of_pair(case: Case, law: ControllerKind, quicker: float) -> TrackingC
 
 
 def _static_friction(case: Case) -> TrackingCause | None:
-    """Static friction, with the dead band of the valve, holds a joint that rests beside its reference."""
+    """Cause: static friction, with the valve's dead band, holds the joint at rest off its reference."""
     scenario, settled = case.scenario, case.settled
     settings, holding = scenario.controller.settings, float(scenario.device.friction.static_torque)
     asked = torque_asked(scenario, case.law, settled.error)
@@ -143,7 +143,7 @@ def _static_friction(case: Case) -> TrackingCause | None:
 
 
 def _fully_open_valve(case: Case) -> TrackingCause | None:
-    """The valve is fully open for most of the settled part."""
+    """Cause: the valve is fully open for most of the settled part."""
     if case.fully_open <= _MOSTLY:
         return None
     text = f"its valve is fully open for {100.0 * case.fully_open:.0f} % of the time: it is too small for this task"
@@ -151,7 +151,7 @@ def _fully_open_valve(case: Case) -> TrackingCause | None:
 
 
 def _lag(case: Case) -> TrackingCause | None:
-    """The reference moves more quickly than the loop follows; by how much it is late, where that explains the error."""
+    """Cause: the reference moves faster than the loop follows; states the lag if it explains the error."""
     scenario, samples = case.scenario, case.settled.samples
     reference, value = (series[samples] for series in followed(case.recording))
     slope, error = np.gradient(reference, case.recording.time[samples]), reference - value
@@ -169,7 +169,7 @@ def _lag(case: Case) -> TrackingCause | None:
 
 
 def gains_of_another_device(case: Case) -> TrackingCause | None:
-    """A gain differs from the one the device asks for."""
+    """Cause: a gain differs from the default gain of the device."""
     right = gain_of_device(case.scenario, case.law)
     if right is None:
         return None
@@ -179,7 +179,7 @@ def gains_of_another_device(case: Case) -> TrackingCause | None:
 
 
 def _is_settling(case: Case) -> bool:
-    """True where the error still falls in the settled part, by three tenths from its first half to the second."""
+    """True if the mean error falls by at least 30 % from the first to the second half of the settled part."""
     reference, value = followed(case.recording)
     error = np.abs((value - reference)[case.settled.samples])
     half = error.size // 2
@@ -187,7 +187,7 @@ def _is_settling(case: Case) -> bool:
 
 
 def _not_settled(case: Case) -> TrackingCause:
-    """The run ends before the loop has settled, the law has no integral, or nothing above applies."""
+    """Cause: the run ends before the loop settles, the integral gain is 0, or no other cause applies."""
     settings = case.scenario.controller.settings
     stop = stop_of(case.scenario, case.recording["angle"][case.settled.samples])
     if stop and case.scenario.controlled == ANGLE:
@@ -215,4 +215,4 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _lag,
     _not_settled,
 )
-"""Causes of a task, the surest first; the last one always applies."""
+"""Causes of a task, most certain first; the last one always applies."""

@@ -1,4 +1,4 @@
-"""Causes beside the loop: a torque or a load beyond reach, and chambers that do not carry the load at the start."""
+"""Causes outside the loop: torque or load beyond reach, and initial pressures that do not carry the load."""
 
 import numpy as np
 
@@ -13,19 +13,19 @@ from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.remedies import change_text, level_text, remedy, stiffer_laws, torque_asked
 
 _ON_STOP = 1.0e-3
-"""Distance from a stop up to which a joint lies on it [rad]."""
+"""Distance from a stop up to which a joint rests on it [rad]."""
 _MOSTLY = 0.5
-"""Share of the settled part that is most of it [-]."""
+"""Fraction of the settled part that counts as most of it [-]."""
 ONE_WAY = 0.05
-"""Reach one way over the reach the other way, below which an actuator pushes one way only [-]."""
+"""Reach in one direction divided by the reach in the other, below which an actuator pushes one way only [-]."""
 _PULLED_BACK = 0.1
-"""Share of the reach of an actuator that pushes one way with which a load may pull its joint back [-]."""
+"""Load that may pull back the joint of a one-way actuator, as a fraction of the actuator's reach [-]."""
 _FLUNG = 0.5
-"""Way from the reference over the wanted change by which a joint is flung at the start [-]."""
+"""Initial deviation from the reference, divided by the wanted change, from which a joint counts as thrown off [-]."""
 
 
 def torque_beyond_reach(case: Case) -> TrackingCause | None:
-    """A torque is wanted that the supplies of the device do not give at that angle."""
+    """Cause: the wanted torque exceeds the actuator's torque from its supplies at that angle."""
     scenario, samples = case.scenario, case.settled.samples
     if scenario.controlled != TORQUE or case.oscillates:
         return None
@@ -50,7 +50,7 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
 
 
 def load_beyond_reach(case: Case) -> TrackingCause | None:
-    """Load on a free joint beyond the torque of the actuator at the wanted angle."""
+    """Cause: the load on a free joint exceeds the actuator's torque at the wanted angle."""
     scenario, motion, device = case.scenario, case.scenario.motion, case.scenario.device
     if scenario.controlled != ANGLE or not isinstance(motion, FreeMotion) or motion.leg is not None:
         return None
@@ -93,13 +93,13 @@ def load_beyond_reach(case: Case) -> TrackingCause | None:
 
 
 def stop_of(scenario: Scenario, angle: Floats) -> str:
-    """Stop on which a joint lies for most of some samples, "" where it lies on none."""
+    """Stop on which a joint rests for most of some samples; "" if on none."""
     ends = (("lower", scenario.device.actuator.angle_min), ("upper", scenario.device.actuator.angle_max))
     return next((word for word, stop in ends if np.mean(np.abs(angle - stop) <= _ON_STOP) > _MOSTLY), "")
 
 
 def flung_at_start(case: Case) -> TrackingCause | None:
-    """The pressures at the start do not carry the load, which flings the joint away before the loop holds it."""
+    """Cause: the initial pressures do not carry the load, which throws the joint off before the loop catches it."""
     scenario, motion, device, initial = case.scenario, case.scenario.motion, case.scenario.device, case.scenario.initial
     if case.oscillates or scenario.controlled != ANGLE or not isinstance(motion, FreeMotion) or motion.leg is not None:
         return None

@@ -1,4 +1,4 @@
-"""Tracking rule for runs of which only metrics are kept: the rule of a recording, as far as its meters tell it."""
+"""Tracking rule for runs with metrics only: the rule for recordings, as far as meters provide its numbers."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -28,23 +28,23 @@ from ppafo.simulation.tracking.rule import (
 )
 
 _ANGLES = 9
-"""Angles between the stops at which the torque of a joint that moves is looked for."""
+"""Number of angles between the stops at which the torque of a moving joint is evaluated."""
 _OF_WALK = ("torque_error", "requested_torque", "peak_torque")
-"""Metrics by which a walk is judged, beside the reversals of its command."""
+"""Metrics by which a walk is judged, in addition to the reversals of its command."""
 
 
 def needed_metrics(scenario: Scenario) -> tuple[str, ...]:
-    """Names of the metrics by which metered runs of a scenario are judged; none without a reference."""
+    """Names of the metrics by which runs of a scenario without recording are judged; none without a reference."""
     if scenario.controller.is_open_loop:
         return ()
     return (*(SETTLED_METRICS if scenario.follows_reference else _OF_WALK), REVERSALS)
 
 
 def tracking_excess(scenario: Scenario, metrics: Mapping[str, Floats], most_reversals: float, least: float) -> Floats:
-    """Largest number of metered runs over its limit (runs,): a run follows up to 1; nan where that is not known.
+    """Largest number of each run divided by its limit (runs,): up to 1 the run follows; nan if unknown.
 
-    Numbers of the scenario may be arrays (runs,); ``metrics`` are its ``needed_metrics`` as far as it offers them, and
-    ``most_reversals`` those of the command above which its loop oscillates; ``least`` is the ``smallest_change``.
+    Numbers of the scenario may be arrays (runs,). ``metrics`` are the available ``needed_metrics``; ``most_reversals``
+    is the number of command reversals above which the loop oscillates; ``least`` is the ``smallest_change``.
     """
     runs = next(iter(metrics.values())).size
     none = np.full(runs, np.nan)
@@ -75,10 +75,10 @@ def tracking_excess(scenario: Scenario, metrics: Mapping[str, Floats], most_reve
 
 
 def shortfall(scenario: Scenario) -> Floats:
-    """Torque [N m] that the supply lacks of the largest reference in each run (runs,); 0 where it lacks nothing.
+    """Largest reference minus the available torque [N m] in each run (runs,); 0 if the torque suffices.
 
-    With one chamber at its supply and the other vented the actuator gives the most, whatever the controller does. A
-    joint that moves counts at the angles where it gives most.
+    The available torque is with one chamber at its supply and the other vented, independent of the controller. For a
+    moving joint the angle with the largest torque counts.
     """
     if scenario.controlled != TORQUE:
         return np.zeros(1)
@@ -98,7 +98,7 @@ def shortfall(scenario: Scenario) -> Floats:
 
 
 def _settled_task(scenario: Scenario, numbers: Mapping[str, Floats], least: float) -> SettledPart:
-    """Settled part of metered tasks, from its numbers (runs,) by name."""
+    """Settled part of tasks without recording, from metrics (runs,) by name."""
     lowest, highest = profile_bounds(scenario.reference)
     begun: Any = 0.0 if scenario.controlled == TORQUE else numbers["begun"]
     asked = numbers["extent"]

@@ -1,4 +1,4 @@
-"""Step of a pair of on/off valves: the change during its dead time, which is known before a run."""
+"""Step of a pair of on/off valves: the change during its dead time, known before a run."""
 
 import logging
 from collections.abc import Iterable
@@ -17,25 +17,25 @@ from ppafo.units.shown import in_units
 logger = logging.getLogger("ppafo")
 
 _LARGEST_STEP = 0.25
-"""Step of a pair over the wanted change above which it is told before a run [-]."""
+"""Step of a pair divided by the wanted change, above which a warning is logged [-]."""
 
 
 def pair_step(scenario: Scenario, law: ControllerKind) -> tuple[float, float]:
-    """Step R theta of a pair [SI of what its loop controls], and its dead time theta [s]."""
+    """Step R theta of a pair [SI unit of the controlled quantity], and its dead time theta [s]."""
     terms = terms_of(scenario, law)
     rate, late = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
     return rate * late, late
 
 
 def tell_coarse_pairs(scenarios: Iterable[Scenario]) -> None:
-    """Log the warnings of pairs that are too coarse, before their runs; each once."""
+    """Log a warning for each scenario with a too coarse pair of valves, before the runs; equal warnings once."""
     for text in dict.fromkeys(map(coarse_pair, scenarios)):
         if text:
             logger.warning("ppafo: %s", text)
 
 
 def _wanted(scenario: Scenario) -> float:
-    """Largest change of a torque or a pressure that is wanted, in SI."""
+    """Largest wanted change of a torque or a pressure, in SI."""
     kind, start = CONTROLLED[scenario.controlled], 0.0
     if kind.name != TORQUE:
         start = float(kind.value(0.0, scenario.initial.pressure_1, scenario.initial.pressure_2, 0.0))
@@ -45,10 +45,10 @@ def _wanted(scenario: Scenario) -> float:
 
 @in_units(lambda scenario: scenario.device.shown)
 def coarse_pair(scenario: Scenario) -> str:
-    """Warning of a pair whose step exceeds a quarter of the wanted change of a torque or a pressure; "" without one.
+    """Warning for a pair whose step exceeds a quarter of the wanted change of torque or pressure; "" without one.
 
-    Of a walk the largest torque of its controller is wanted. Of an angle the step is the joint's as much as the pair's:
-    it is not looked at.
+    In a walk the wanted change is the largest torque of its controller. Angle loops are not checked, because their step
+    depends on the joint as much as on the pair.
     """
     law, kind = scenario.law, CONTROLLED[scenario.controlled]
     limit = 0.0 if scenario.follows_reference else torque_limit(scenario.controller.settings)

@@ -1,4 +1,4 @@
-"""Remedies of a loop that does not follow: changed numbers of its scenario, the likeliest first."""
+"""Remedies for a loop that does not follow its reference: changed numbers of the scenario, most promising first."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -22,9 +22,9 @@ FASTEST_FIRST = (
     angle_loop.INNER_GAIN,
     angle_loop.ANGLE_STIFFNESS,
 )
-"""Settings that set the speed of a loop; of a cascade the inner one first, on which the outer one relies."""
+"""Settings that determine the speed of a loop; in a cascade the inner loop first, on which the outer one relies."""
 SLOWER_ABOVE = frozenset((torque_loop.BOUNDARY,))
-"""Settings of which a larger value makes the loop slower."""
+"""Settings whose increase makes the loop slower."""
 _SAME_GAIN = 0.02
 """Relative difference up to which two gains count as the same [-]."""
 _SLOPES = ("derivative_gain", "damping")
@@ -39,19 +39,19 @@ _KEPT_OF_ORIFICE = (".critical_ratio", ".discharge_coefficient")
 
 @dataclass(frozen=True, slots=True)
 class Remedy:
-    """Numbers of a scenario [SI] by path with which the run might follow, the same as overrides, and in a sentence."""
+    """Remedy: numbers of a scenario [SI] by path that might make it follow, and the same numbers as overrides."""
 
     numbers: Mapping[str, float]
     overrides: tuple[str, ...]
 
     @property
     def text(self) -> str:
-        """Overrides in a sentence."""
+        """Overrides as part of a sentence."""
         return " and ".join(f"`{override.replace('=', ' = ', 1)}`" for override in self.overrides)
 
 
 def remedy(scenario: Scenario, numbers: Mapping[str, float]) -> Remedy:
-    """Remedy in the units of the device."""
+    """Remedy with its overrides in the units of the device."""
     declared = declared_numbers(scenario)
     overrides = (
         f"{path}={level_text(declared[path].unit, number)}"
@@ -62,19 +62,19 @@ def remedy(scenario: Scenario, numbers: Mapping[str, float]) -> Remedy:
 
 
 def level_text(unit: str, number: float) -> str:
-    """Value in the unit a person is shown, for a number in a unit in SI; pressures count from the atmosphere."""
+    """Value with its display unit, from a number in an SI unit; pressures as gauge pressures."""
     value, shown = metric_level(float(number), unit)
     return f"{value:.3g} {shown}".rstrip()
 
 
 def change_text(controlled: str, number: float) -> str:
-    """Difference of two values of what is controlled, in the unit a person is shown."""
+    """Difference of two values of the controlled quantity, with its display unit."""
     value, unit = metric_change(number, CONTROLLED[controlled].difference)
     return f"{value:.3g} {unit}"
 
 
 def speed_settings(scenario: Scenario, law: ControllerKind | None) -> dict[str, Quantity]:
-    """Settings of a law that set the speed of its loops, by the term they follow, the innermost loop first."""
+    """Settings that determine the speed of a controller's loops, by the term that they follow, innermost loop first."""
     if law is None:
         return {}
     items = {
@@ -87,7 +87,7 @@ def speed_settings(scenario: Scenario, law: ControllerKind | None) -> dict[str, 
 
 
 def gain_of_device(scenario: Scenario, law: ControllerKind | None) -> Remedy | None:
-    """Remedy that gives the first gain which is not the device's the device's value; None where all are."""
+    """Remedy that sets the first gain that differs from the device's default to that default; None if none differs."""
     if law is None:
         return None
     terms, settings = terms_of(scenario, law), scenario.controller.settings
@@ -101,7 +101,7 @@ def gain_of_device(scenario: Scenario, law: ControllerKind | None) -> Remedy | N
 
 
 def integral_of_device(scenario: Scenario, law: ControllerKind | None) -> list[Remedy]:
-    """Remedy that gives an integral gain of 0 the device's value; none for a law without one, or with another value."""
+    """Remedy that sets an integral gain of 0 to the device's default; empty without such a gain."""
     if law is None:
         return []
     terms, settings = terms_of(scenario, law), scenario.controller.settings
@@ -111,7 +111,7 @@ def integral_of_device(scenario: Scenario, law: ControllerKind | None) -> list[R
 
 
 def slower_loops(scenario: Scenario, law: ControllerKind, factors: Iterable[float]) -> tuple[Remedy, ...]:
-    """Remedies that make the innermost loop slower by each of some factors; none for a law without such a setting."""
+    """Remedies that slow down the innermost loop by each of some factors; empty if its speed cannot be set."""
     first = speed_settings(scenario, law)
     if not first:
         return ()
@@ -121,7 +121,7 @@ def slower_loops(scenario: Scenario, law: ControllerKind, factors: Iterable[floa
 
 
 def larger_gains(scenario: Scenario, law: ControllerKind | None, factors: Iterable[float]) -> list[Remedy]:
-    """Remedies that make the innermost loop faster by each of some factors."""
+    """Remedies that speed up the innermost loop by each of some factors."""
     first = list(speed_settings(scenario, law).values())[:1]
     return [
         remedy(scenario, {f"controller.{item.name}": float(scenario.controller.settings[item.name]) * factor})
@@ -131,7 +131,7 @@ def larger_gains(scenario: Scenario, law: ControllerKind | None, factors: Iterab
 
 
 def sized_valves(scenario: Scenario, factors: Iterable[float]) -> tuple[Remedy, ...]:
-    """Remedies with the orifice of the valve times each of some factors, in the form that it has."""
+    """Remedies that multiply the valve's orifice by each of some factors, in the form in which it is given."""
     orifice = scenario.device.valve.orifice
     if isinstance(orifice, SonicOrifice):
         size, kept = ("sonic_conductance", orifice.sonic_conductance), ("critical_ratio", orifice.critical_ratio)
@@ -144,12 +144,12 @@ def sized_valves(scenario: Scenario, factors: Iterable[float]) -> tuple[Remedy, 
 
 
 def smaller_pair(scenario: Scenario, step: float) -> tuple[Remedy, ...]:
-    """Smaller orifices of a pair that changes what is controlled by a multiple of the wanted change at each switch."""
+    """Remedies with smaller orifices, for a pair whose step is ``step`` times the wanted change."""
     return sized_valves(scenario, (share / step for share in (_STEP_OF_PAIR, 0.5 * _STEP_OF_PAIR) if share < step))
 
 
 def torque_asked(scenario: Scenario, law: ControllerKind | None, error: float) -> float | None:
-    """Torque [N m] that a law with a stiffness requests at an angle error [rad]; None for another law."""
+    """Torque [N m] requested at an angle error [rad] by a controller with a stiffness; None for another controller."""
     if scenario.controlled != ANGLE or law is None:
         return None
     if not any(angle_loop.ANGLE_STIFFNESS in quantity.follows for quantity in settings_of(scenario, law)):
@@ -161,10 +161,10 @@ def torque_asked(scenario: Scenario, law: ControllerKind | None, error: float) -
 def stiffer_laws(
     scenario: Scenario, holding: float, settled: SettledPart, others: Mapping[str, float] | None = None
 ) -> list[Remedy]:
-    """Larger angle stiffnesses against a torque [N m] that works against the law, alone and with their damping.
+    """Remedies with larger angle stiffness against an opposing torque [N m], without and with adapted damping.
 
-    ``others`` are numbers that change with them. Where the valve has a dead band, the last of them also come with a
-    torque gain that opens the valve beyond it.
+    ``others`` are numbers that change as well. For a valve with a dead band, the two stiffest remedies are also tried
+    with a torque gain that opens the valve beyond the band.
     """
     settings = scenario.controller.settings
     own, limit = float(settings["angle_stiffness"]), float(settings["error_limit"])
@@ -185,7 +185,7 @@ def stiffer_laws(
 
 
 def stiffened(scenario: Scenario, factors: Iterable[float]) -> list[Remedy]:
-    """Remedies with the angle stiffness times each of some factors and the damping that belongs to it; none without."""
+    """Remedies with the angle stiffness times each of some factors, and matching damping; none without stiffness."""
     settings = scenario.controller.settings
     names = [(name, power) for name, power in (("angle_stiffness", 1.0), ("angle_damping", 0.5)) if name in settings]
     return [
@@ -196,5 +196,5 @@ def stiffened(scenario: Scenario, factors: Iterable[float]) -> list[Remedy]:
 
 
 def dead_band(scenario: Scenario) -> float:
-    """Dead band of the valve [-], 0 for a valve without."""
+    """Dead band of the valve [-]; 0 for a valve without one."""
     return float(scenario.device.valve.settings.get("dead_band", 0.0))

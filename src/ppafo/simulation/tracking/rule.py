@@ -1,8 +1,8 @@
-"""Tracking rule: the numbers of the settled part of a run, the limits they are held to, and the kind of failure.
+"""Tracking rule: numbers of the settled part of a run, their limits, and the kind of failure.
 
-The settled part is the second half of the hold, or of the run where the reference never rests. Errors count as a share
-of the change that is wanted: the largest reference from where the run starts, from 0 for a torque. Of a walk the
-samples count in which its controller requests a torque, and errors are a share of the RMS of that request.
+The settled part is the second half of the hold, or of the run if the reference never rests. Errors are relative to the
+wanted change: the largest reference relative to the initial value, or to 0 for a torque. In a walk, only samples with a
+requested torque count, and errors are relative to the RMS of the request.
 """
 
 import math
@@ -65,15 +65,16 @@ Failure = Literal["does not move", "oscillates", "overshoots", "does not follow"
 
 
 class SettledPart(NamedTuple):
-    """Numbers of the settled part of a run, in SI of what is controlled.
+    """Numbers of the settled part of a run, in SI units of the controlled quantity.
 
-    ``samples`` selects it in the recording and ``duration`` [s] is how long it lasts. ``wanted`` is the change wanted,
-    of a walk the RMS of the request; ``error`` is the RMS error, ``missing`` its mean and ``swing`` its standard
-    deviation; ``turns`` counts reversals of the error, 0 below ``SUSTAINED``. ``moved`` is the range of the value over
-    the run, ``peak`` its largest change in the wanted direction, 0 where that says nothing. ``rests`` where reference
-    and joint stand still; ``ends_on_ramp`` where the run ends before a monotone reference rests. ``start`` [s] is when
-    it begins, 0 for a walk. ``worst`` is the largest error and ``span`` its range, and ``way`` of an angle the range of
-    start and reference, 0 for other quantities. ``reversals`` [1/s] are those of the command.
+    ``samples`` selects the settled part in the recording and ``duration`` [s] is its length. ``wanted`` is the wanted
+    change, in a walk the RMS of the request. ``error`` is the RMS error, ``missing`` the mean error and ``swing`` the
+    standard deviation of the error. ``turns`` is the number of reversals of the error, 0 below ``SUSTAINED``. ``moved``
+    is the range of the value over the run; ``peak`` the largest change in the wanted direction, 0 if meaningless.
+    ``rests`` is true if reference and joint stand still; ``ends_on_ramp`` if the run ends before a monotone reference
+    rests. ``start`` [s] is the start of the settled part, 0 for a walk. ``worst`` is the largest error and ``span`` the
+    range of the error. ``way`` is the range of initial value and reference for an angle, 0 for other quantities.
+    ``reversals`` [1/s] is the rate of command reversals.
     """
 
     samples: slice | NDArray[np.bool_]
@@ -95,14 +96,14 @@ class SettledPart(NamedTuple):
 
     @property
     def share(self) -> float:
-        """RMS error over the wanted change [-]."""
+        """RMS error divided by the wanted change [-]."""
         return self.error / self.wanted
 
 
 def most_reversals(scenario: Scenario, law: ControllerKind | None, duration: float, stride_time: float = 0.0) -> float:
-    """Reversals of the command in a time [s] above which a loop oscillates; infinite for a law that may switch.
+    """Command reversals in ``duration`` [s] above which a loop oscillates; inf for a controller that may switch.
 
-    ``stride_time`` [s] is the duration of a stride of a walk, 0 for a task.
+    ``stride_time`` [s] is the stride time of a walk, 0 for a task.
     """
     # A law that requests openings between shut and open should not reverse.
     if law is None or not scenario.motion.motion_kind.asks_gradually(law):
@@ -114,13 +115,13 @@ def most_reversals(scenario: Scenario, law: ControllerKind | None, duration: flo
 
 
 def is_noisy(scenario: Scenario) -> bool:
-    """True where noise of the sensors turns the command of a task, whose reversals count in the settled part alone."""
+    """True if sensor noise reverses the command of a task; reversals then count in the settled part only."""
     sensors = scenario.sensors
     return scenario.follows_reference and bool(sensors.angle_noise or sensors.pressure_noise)
 
 
 def _turns_of_reference(scenario: Scenario, duration: float) -> float:
-    """Reversals of the reference of a task in a time [s]; of a profile without numbers of one run 0."""
+    """Number of reversals of a task's reference in a time [s]; 0 for a profile whose numbers are arrays."""
     if not scenario.follows_reference or any(np.ndim(number) for number in scenario.reference.settings.values()):
         return 0.0
     lowest, highest = profile_bounds(scenario.reference)
@@ -130,9 +131,10 @@ def _turns_of_reference(scenario: Scenario, duration: float) -> float:
 
 
 def settled_walk(recording: Recording, limit: float) -> SettledPart | None:
-    """Settled part of a walk: the samples with a requested torque; None where none is requested.
+    """Settled part of a walk: the samples with a requested torque; None if none is requested.
 
-    A law that requests none but opens its valves up to a torque ``limit`` [N m] has a peak alone, 0 for no limit.
+    For a controller that requests no torque but opens its valves up to a torque ``limit`` [N m], only the peak is set;
+    a ``limit`` of 0 means none.
     """
     if controlled_in(recording) is None:
         peak = float(np.max(np.abs(recording["torque"])))
@@ -200,7 +202,7 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
 
 
 def _peak(scenario: Scenario, reference: Floats, value: Floats) -> float:
-    """Largest change of the value in the direction of the reference, once it has met that."""
+    """Largest change of the value in the direction of the reference, after the value first meets the reference."""
     start = 0.0 if scenario.controlled == TORQUE else float(value[0])
     ahead = reference - start
     sign = math.copysign(1.0, float(ahead[int(np.argmax(np.abs(ahead)))]))
@@ -210,7 +212,7 @@ def _peak(scenario: Scenario, reference: Floats, value: Floats) -> float:
 
 
 def smallest_change(scenario: Scenario) -> float:
-    """Smallest change that is judged, from the range of what is controlled [SI of it]."""
+    """Smallest wanted change that is judged, from the range of the controlled quantity [SI unit of that quantity]."""
     kind, device = CONTROLLED[scenario.controlled], scenario.device
     if kind.name == TORQUE:
         lowest, highest = torque_reach(device, 0.5 * (device.actuator.angle_min + device.actuator.angle_max))
@@ -223,17 +225,17 @@ def smallest_change(scenario: Scenario) -> float:
 
 
 def excess_of_walk(settled: SettledPart, turning: Floats | float, limit: float) -> Floats | float:
-    """Largest number of a walk over its limit: it follows up to 1.
+    """Largest number of a walk divided by its limit: up to 1 the walk follows.
 
-    ``turning`` is the number of command reversals over the largest one; the controller requests no more than ``limit``
-    [N m], 0 for none. The numbers of ``settled`` may be arrays (runs,).
+    ``turning`` is the number of command reversals divided by its limit; ``limit`` [N m] is the controller's torque
+    limit, 0 for none. The numbers of ``settled`` may be arrays (runs,).
     """
     peak = settled.peak / (LARGEST_PEAK_WALK * limit) if limit > 0.0 else 0.0
     return np.maximum(np.maximum(turning, peak), settled.share / LARGEST_SHARE_WALK)
 
 
 def failure_of_walk(settled: SettledPart, turning: float, limit: float) -> Failure | None:
-    """Kind of failure of a walk, with the arguments of ``excess_of_walk``; None where it follows."""
+    """Kind of failure of a walk, with the arguments of ``excess_of_walk``; None if the walk follows."""
     if excess_of_walk(settled, turning, limit) <= 1.0:
         return None
     if turning > 1.0:
@@ -242,7 +244,11 @@ def failure_of_walk(settled: SettledPart, turning: float, limit: float) -> Failu
 
 
 class TaskExcess(NamedTuple):
-    """Numbers of a task, each over its limit: left error, swings of the value, peak, and a value that does not move."""
+    """Numbers of a task, each divided by its limit.
+
+    ``off`` is the remaining error, ``swings`` the oscillation of the value, ``peak`` the overshoot, and ``still`` the
+    error of a value that does not move.
+    """
 
     off: Floats
     swings: Floats
@@ -251,9 +257,10 @@ class TaskExcess(NamedTuple):
 
 
 def excess_of_task(settled: SettledPart, only_switches: bool) -> TaskExcess:
-    """Numbers of a task over their limits, beside its command reversals: it follows where none is above 1.
+    """Numbers of a task divided by their limits, apart from command reversals: the task follows if none is above 1.
 
-    ``only_switches`` says that the law knows no gradual opening. The numbers of ``settled`` may be arrays (runs,).
+    ``only_switches`` is true for a controller without gradual openings. The numbers of ``settled`` may be arrays
+    (runs,).
     """
     rests, share, way = np.asarray(settled.rests), np.asarray(settled.share), np.asarray(settled.way)
     # Degrees count for an angle, however far it goes.
@@ -284,9 +291,10 @@ def excess_of_task(settled: SettledPart, only_switches: bool) -> TaskExcess:
 
 
 def failure_of_task(settled: SettledPart, turning: float, only_switches: bool) -> Failure | None:
-    """Kind of failure of a task, whose command reversals over the largest number are ``turning``; None if it follows.
+    """Kind of failure of a task; None if the task follows.
 
-    ``only_switches`` says that the law knows no gradual opening.
+    ``turning`` is the number of command reversals divided by its limit; ``only_switches`` is true for a controller
+    without gradual openings.
     """
     off, swings, peak, still = (float(number) for number in excess_of_task(settled, only_switches))
     if still > 1.0:
@@ -297,5 +305,5 @@ def failure_of_task(settled: SettledPart, turning: float, only_switches: bool) -
 
 
 def torque_limit(settings: Mapping[str, float]) -> float:
-    """Largest torque [N m] that the controller of a walk requests; 0 where it has no limit."""
+    """Largest torque [N m] that the controller of a walk requests; 0 for no limit."""
     return float(settings.get("largest_torque", 0.0))

@@ -1,4 +1,4 @@
-"""Verdict on a run: whether what is controlled follows its reference, what hinders it, and what was seen to help."""
+"""Verdict on a run: whether it follows its reference, the cause of a failure, and remedies that were tried."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -36,12 +36,13 @@ _FEWEST_SAMPLES = 8
 class Tracking:
     """Verdict on a run whose controlled quantity does not follow its reference.
 
-    ``error`` and ``wanted`` are the RMS error of the settled part and the change wanted, ``missing`` the mean error,
-    ``moved`` how far the value went, all in SI of what is ``controlled``. ``reversals`` are the command's ``per``
-    stride or second. ``cause`` says what hinders it, ``remedies`` what might help, the likeliest first, ``others`` what
-    else applies, less surely, ``tried`` what did help; ``span`` is the range of the error of an angle that swings where
-    neither it nor its command turns often, else 0; ``accepted`` is the reason that the scenario gives for a reference
-    beyond reach, "" without one. The settled part begins at ``since`` [s], 0 for a walk.
+    ``kind`` is the kind of failure. ``error`` is the RMS error of the settled part, ``wanted`` the wanted change,
+    ``missing`` the mean error and ``moved`` the range of the value, all in SI of the ``controlled`` quantity.
+    ``reversals`` is the number of command reversals per stride or second, as ``per`` says. ``cause`` is the cause, with
+    ``advice``; ``remedies`` are the remedies, most promising first; ``others`` are further, less certain causes;
+    ``tried`` is the result of tried remedies. ``accepted`` is the scenario's reason for a reference beyond reach, else
+    "". ``at_rest`` is true if reference and joint stand still. ``since`` [s] is the start of the settled part, 0 for a
+    walk. ``span`` is the range of the error of an angle that swings slowly, else 0.
     """
 
     kind: Failure
@@ -65,12 +66,12 @@ class Tracking:
 
     @property
     def rests(self) -> bool:
-        """True where nearly the same error is left for all of the settled part."""
+        """True if the error is nearly constant over the settled part."""
         return abs(self.missing) > 0.9 * self.error
 
     @property
     def is_useless(self) -> bool:
-        """False where the scenario itself says that its reference lies beyond reach."""
+        """False if the scenario declares its reference to be beyond reach."""
         return not self.accepted
 
     @property
@@ -109,13 +110,13 @@ class Tracking:
 
     @property
     def time_text(self) -> str:
-        """Settled part of the run, in words; its error is less than the error of the whole run in the metrics."""
+        """Words for the settled part of the run, whose error is smaller than the whole run's error in the metrics."""
         return _time_text(self.since)
 
 
 @in_units(lambda result: result.scenario.device.shown)
 def tracking_in(result: "RecordedResult") -> Tracking | None:
-    """Verdict on a result; None where it follows its reference, or has none."""
+    """Verdict on a result; None if the result follows its reference, or has none."""
     judged, scenario = _judged(result), result.scenario
     if judged is None or (failure := judged[0].failure) is None:
         return None
@@ -149,7 +150,7 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
 
 @in_units(lambda result: result.scenario.device.shown)
 def following_text(result: "RecordedResult") -> str:
-    """Sentence on a result that follows its reference, with its RMS error; "" where it does not, or is not judged."""
+    """Sentence on a result that follows its reference, with the RMS error; "" if not following or not judged."""
     judged, controlled = _judged(result), CONTROLLED[result.scenario.controlled]
     # On a ramp every loop is behind, and a walk whose law requests no torque has a peak alone.
     if judged is None or judged[0].failure is not None or controlled_in(result.recording) is None:
@@ -162,15 +163,15 @@ def following_text(result: "RecordedResult") -> str:
 
 
 def _time_text(since: float) -> str:
-    """Settled part of a run from a time [s] on, in words."""
+    """Words for the settled part of a run, which starts at a time [s]."""
     return f" from {since:.3g} s on" if since > 0.0 else ""
 
 
 def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None:
-    """Run with its kind of failure, if any; None where nothing is judged.
+    """Run with its kind of failure, if any; None if the run is not judged.
 
-    Then the command reversals over the most that are allowed [-], those in a second, and the duration of a stride [s],
-    0 for a task.
+    The further numbers are the command reversals divided by the limit [-], the reversals per second, and the stride
+    time [s], 0 for a task.
     """
     scenario, law, recording = result.scenario, result.scenario.law, result.recording
     is_task = scenario.follows_reference

@@ -1,4 +1,4 @@
-"""Causes of a walk whose torque does not follow what its controller requests, the surest cause first."""
+"""Causes of a walk whose torque does not follow its controller's request, most certain first."""
 
 from collections.abc import Callable
 
@@ -22,7 +22,7 @@ _ANGLESCAUSES_OF_WALK = 400
 
 
 def _request_beyond_reach(case: Case) -> TrackingCause | None:
-    """The controller of a walk often requests more torque than the actuator gives at the angle of that moment."""
+    """Cause: the controller of a walk often requests more torque than the actuator gives at the current angle."""
     scenario, samples = case.scenario, case.settled.samples
     if case.failure == "overshoots":
         return None
@@ -58,7 +58,7 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
 
 
 def _valve_of_walk(case: Case) -> TrackingCause | None:
-    """The valve of a walk is fully open often: too small for the speed of the joint."""
+    """Cause: the valve of a walk is often fully open, too small for the speed of the joint."""
     if case.oscillates or case.only_switches or case.fully_open <= _OFTEN:
         return None
     text = (
@@ -69,7 +69,7 @@ def _valve_of_walk(case: Case) -> TrackingCause | None:
 
 
 def _speed_of_gait(case: Case) -> TrackingCause:
-    """The gait turns the joint faster than the loop of a walk follows."""
+    """Cause: the gait moves the joint faster than the torque loop follows."""
     scenario = case.scenario
     volumes = {path: number_at(scenario, path) for path in ("actuator.dead_volume_1", "actuator.dead_volume_2")}
     remedies = [] if case.law is None else [*sized_valves(scenario, (0.5, 2.0))]
@@ -86,7 +86,7 @@ def _speed_of_gait(case: Case) -> TrackingCause:
 
 
 def _one_way_request(case: Case, lowest: float, asked: float) -> TrackingCause:
-    """The controller asks in dorsiflexion for what an actuator that pushes one way only does not give [N m]."""
+    """Cause: the controller requests dorsiflexion torque [N m] from an actuator that pushes one way only."""
     settings = case.scenario.controller.settings
     text = (
         f"its controller asks for {level_text('N m', asked)}, where the actuator gives {level_text('N m', lowest)} at "
@@ -98,12 +98,12 @@ def _one_way_request(case: Case, lowest: float, asked: float) -> TrackingCause:
 
 
 def _oscillation_of_walk(case: Case) -> TrackingCause | None:
-    """Gains that make a walk oscillate, or a pair whose step takes its torque beyond the limit."""
+    """Cause: gains that make a walk oscillate, or a pair of valves whose step exceeds the torque limit."""
     return oscillation(case) if case.oscillates or (case.failure == "overshoots" and case.only_switches) else None
 
 
 def _dead_band_of_walk(case: Case) -> TrackingCause | None:
-    """The command of a walk stays within the dead band of its valve often, over which its law does not jump."""
+    """Cause: the command of a walk often stays within the valve's dead band, without compensation by its controller."""
     scenario = case.scenario
     band = dead_band(scenario) - float(scenario.controller.settings.get("dead_band", 0.0))
     command = np.abs(case.recording["command"][case.settled.samples])
