@@ -1,4 +1,4 @@
-"""Consistency of parts of the recordings: Hausman's test of sensors, recordings and stated limits."""
+"""Consistency of parts of the recordings: Hausman's test of sensors, recordings, groups and stated limits."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -16,30 +16,30 @@ from ppafo.identification.whitened import root_of_inverse
 from ppafo.signals.recording import Floats
 
 SMOOTH = "noise"
-"""Number of a conflict whose channel leaves what is too smooth for noise: ``standard_errors`` times its innovation."""
+"""Value of ``Conflict.number`` if residuals are too smooth to be noise, ``standard_errors`` times their innovation."""
 
 STATED = "stated limit"
-"""Group of a conflict that is not among recordings: they want a tolerance beyond its limit."""
+"""Value of ``Conflict.group`` if the recordings contradict the stated limit of a tolerance."""
 
 _SMOOTHEST = 0.15
-"""Innovation [-] below which residuals are not noise: a sensor with a first-order lag of 90 samples.
+"""Relative innovation [-] below which residuals are not noise: a sensor with a first-order lag of 90 samples.
 
-Noise with a lag of 33 samples, 0.24, is estimated down to 0.19 in two recordings of 500.
+Noise with a lag of 33 samples, 0.24, is estimated down to 0.19 in two recordings of 500 samples.
 """
 
 _SIGNIFICANCE = 0.01
-"""Probability [-] below which a difference is no chance."""
+"""Probability [-] below which a difference is significant."""
 _PARTING = 0.05
-"""Fraction of the covariance of all by which a group's alone must be larger for its direction to be tested."""
+"""Least relative excess of a group's variance over the common variance [-] in a direction that is tested."""
 
 
 @dataclass(frozen=True, slots=True)
 class Conflict:
-    """A sensor, a recording, a channel of one, a group or a stated value that alone wants other numbers than all.
+    """Part of the data whose own estimates differ significantly from the common ones (Hausman's test).
 
-    It is Hausman's test. ``group`` is "pressure_1", "back", "pressure_1 of back", "rising branch" or ``STATED``.
-    ``number`` is the one that parts most, by so many ``standard_errors``; ``p`` is the chance, over all groups, that a
-    model that holds shows as much.
+    ``group`` is a sensor ("pressure_1"), a recording ("back"), a channel of a recording ("pressure_1 of back"), another
+    group ("rising branch"), or ``STATED``. ``number`` is the quantity that differs most, by ``standard_errors``
+    standard errors. ``p`` is the probability of such a difference in any group if the model is right.
     """
 
     group: str
@@ -49,7 +49,7 @@ class Conflict:
 
 
 def _groups(work: FitRuns) -> Iterator[tuple[str, list[slice]]]:
-    """Return sensors, recordings, channels of recordings and further groups, none of them twice nor the whole."""
+    """Yield sensors, recordings, channels of recordings and further groups with their rows, without duplicates."""
     labels = [
         (block.channel, block.recording, f"{block.channel} of {block.recording}", *block.groups)
         for block in work.blocks
@@ -65,16 +65,17 @@ def _groups(work: FitRuns) -> Iterator[tuple[str, list[slice]]]:
 
 
 def too_smooth(sensors: Mapping[str, Noise]) -> Conflict | None:
-    """Return the channel whose residuals are least like noise, None where all are like noise."""
+    """Return a conflict for the channel with the smoothest residuals if they are too smooth to be noise, else None."""
     channel, noise = min(sensors.items(), key=lambda item: item[1].innovation)
     return Conflict(channel, SMOOTH, 1.0 / noise.innovation, 0.0) if noise.innovation < _SMOOTHEST else None
 
 
 def conflict_of(work: FitRuns, rows: Floats, point: Floats, free: Flags, freedom: float) -> Conflict | None:
-    """Return the group of rows that wants other numbers most, None where no group does (Hausman's test).
+    """Return the group of rows whose own estimates differ most from the common ones; None if none is significant.
 
-    A group alone would go by d = -H_g^-1 (J_g' r_g + P (z - m)), whose covariance is H_g^-1 - C. With C = L L' and the
-    eigenvalues a of L' H_g L, both are diagonal: d'(H_g^-1 - C)^-1 d is the sum of q^2 / (a (1 - a)).
+    Hausman's test: the estimate of a group alone differs by d = -H_g^-1 (J_g' r_g + P (z - m)), with covariance H_g^-1
+    - C. With C = L L' and the eigenvalues a of L' H_g L, both are diagonal: d'(H_g^-1 - C)^-1 d is the sum of q^2 / (a
+    (1 - a)).
     """
     errors, slopes = rows[:, 0], rows[:, 1:][:, free]
     prior, shift = np.square(work.prior[free]), (point - work.mean)[free]
@@ -124,10 +125,10 @@ def conflict_of(work: FitRuns, rows: Floats, point: Floats, free: Flags, freedom
 
 
 def _of_family(names: NDArray[np.str_], moved: Floats, root: Floats) -> Conflict | None:
-    """Return the tolerance of a family that parts most where all of it are beyond their limits, one by one or together.
+    """Return the tolerance that exceeds its limit most in a family whose limits are exceeded significantly, else None.
 
-    ``moved`` are tolerances, ``root`` a root of their covariance, both over their standard deviations [-]. Where two
-    numbers are sought of them, two directions are free.
+    ``moved`` are the estimated tolerances and ``root`` is a square root of their covariance, both divided by the prior
+    standard deviations [-]. Directions that the unknowns of the fit absorb are not tested.
     """
     known, axes = np.linalg.eigh(np.eye(len(names)) - root @ root.T)
     tested = known > _PARTING

@@ -1,4 +1,4 @@
-"""An estimate: one value of a parameter set with interval, verdict and one sentence."""
+"""Estimate: value of a device parameter with confidence interval, verdict and an explanation in one sentence."""
 
 import math
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ from ppafo.errors import IdentificationError
 Verdict = Literal["identified", "holds for this model only", "not identifiable", "at its bound"]
 """Verdict of the recordings on a value.
 
-Only the first is given where the model explains the recordings; the second is written into a set as a fitted value that
-nobody should take for the device's own.
+A value is "identified" only if the model explains the recordings. A value that "holds for this model only" is written
+into a set with the origin ``fitted``, and is not to be taken as a property of the device.
 """
 
 _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
@@ -19,23 +19,23 @@ _USABLE: tuple[Verdict, ...] = ("identified", "holds for this model only")
 
 
 def interval_factor(confidence: float) -> float:
-    """Return the standard errors [-] on each side of an interval with this confidence, 1.96 for 95 %."""
+    """Return the half-width of a confidence interval in standard errors [-], 1.96 for a confidence of 95 %."""
     return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
 
 
 def half_width_for(confidence: float, half_width: float, stated: float) -> float:
-    """Return half the width of an interval for some confidence, from one ``stated`` for another."""
+    """Return the half-width of an interval at a confidence, given the half-width at the confidence ``stated``."""
     return half_width * interval_factor(confidence) / interval_factor(stated)
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A value in ``unit`` (SI text) with its interval ``low`` to ``high`` at the stated ``confidence``.
+    """Value in ``unit`` (SI text) with its confidence interval ``low`` to ``high`` at the stated ``confidence``.
 
-    ``path`` is a dotted path in a parameter set, such as ``actuator.torque_constant``; a quantity that no set holds
-    has a path of its own, which no set knows. An estimate that could not be made has NaN for value and interval.
-    ``explanation`` is one sentence: what widens the interval, what the value trades against, or where it holds.
-    ``recordings`` names each source with its hash: ``static.csv sha256:0123abcd...``.
+    ``path`` is a dotted path in a parameter set, such as ``actuator.torque_constant``; a quantity without an entry in
+    sets has a path of its own. An estimate that could not be made has NaN for value and interval. ``explanation`` is
+    one sentence: the sources of the uncertainty, the quantities that the value trades off against, or the limits of its
+    validity. ``recordings`` names each source with its hash: ``static.csv sha256:0123abcd...``.
     """
 
     path: str
@@ -61,20 +61,20 @@ class Estimate:
 
     @property
     def is_usable(self) -> bool:
-        """Tell whether the value may be used in a parameter set."""
+        """True if the value may be used in a parameter set."""
         return self.verdict in _USABLE
 
     @property
     def is_identified(self) -> bool:
-        """Tell whether the recordings fix the value and the model explains them."""
+        """True if the recordings determine the value and the model explains the recordings."""
         return self.verdict == "identified"
 
     @property
     def half_width(self) -> float:
-        """Half the width of the interval, in ``unit``."""
+        """Half-width of the confidence interval [``unit``]."""
         return (self.high - self.low) / 2.0
 
     @property
     def wider_half_width(self) -> float:
-        """The width [unit] of the wider side of the interval: one that was cut at zero is too narrow there."""
+        """Width [``unit``] of the wider side of the interval; a side cut off at zero is too narrow."""
         return max(self.high - self.value, self.value - self.low)

@@ -1,8 +1,8 @@
-"""The one estimator: bounded least squares with whitened residuals, and what the residuals say against the model.
+"""Estimator: bounded least squares with whitened residuals, confidence intervals, and tests of the model.
 
-Bench procedures and the trajectory fit are residuals of the same ``fit``; what nobody knows exactly is a number with a
-prior. Numbers are moved in units of their scale; residuals are in units of the noise of their channel, which is
-estimated from them. Each difference of the Jacobian is as long as changes the residuals by three units of noise in all.
+Bench procedures and the trajectory fit use the same ``fit``; uncertain quantities are variables with a prior. Variables
+are scaled; residuals are divided by the noise of their channel, which is estimated from the residuals. The step of each
+finite difference changes all residuals together by three units of noise.
 """
 
 import math
@@ -32,13 +32,15 @@ from ppafo.signals.recording import Floats
 class Fit:
     """Result of a fit in SI units, in the order of ``numbers``.
 
-    ``low`` and ``high`` are intervals at the confidence, ``noise`` standard deviations and ``correlation`` orders of
-    the autoregression by channel, ``residuals`` measured less model, ``outliers`` the rows
-    of them that were left out because each stands out by itself. ``unidentified`` are combinations, as weights of
-    numbers in units of their scale, that the recordings do not fix; ``shares`` has for each number the
-    tolerances that widen its interval, largest first, as fractions of the variance. ``jacobian`` is whitened [1/SI].
-    ``edge`` names the sought numbers that the recordings want where no run succeeds, each with 1 for above its value
-    and -1 for below; a search that ends there has not converged.
+    ``numbers``: variables of the fit. ``values``: estimates. ``covariance``: their covariance. ``low``, ``high``: ends
+    of the confidence intervals at ``confidence``. ``noise``: standard deviation by channel. ``correlation``: order of
+    the noise autoregression by channel. ``residuals``: measured - model. ``outliers``: rows of residuals left out as
+    isolated outliers. ``conflict``: part of the data that contradicts the rest, if any. ``unidentified``: combinations
+    that the recordings do not determine, as weights of scaled variables. ``shares``: for each variable, the tolerances
+    that contribute to its variance, with fractions [-], largest first. ``evaluations``: number of model runs.
+    ``sensors``: noise model by channel. ``jacobian``: whitened Jacobian [1/SI]. ``edge``: unknowns that the search
+    drives to values at which no run succeeds, with the direction, 1 upwards or -1 downwards; such a search has not
+    converged.
     """
 
     numbers: tuple[FitVariable, ...]
@@ -62,36 +64,36 @@ class Fit:
 
     @property
     def by_name(self) -> dict[str, float]:
-        """The numbers by name [SI]."""
+        """Estimated values by name [SI]."""
         return dict(zip((one.name for one in self.numbers), self.values.tolist(), strict=True))
 
 
 _LEFT_OUT = 0.01
-"""Largest fraction of the samples that are left out as outliers, or because an event such as an impact passes them."""
+"""Largest fraction of samples left out [-], for outliers and for samples affected by an event such as an impact."""
 
 _LEVERAGE = 0.1
-"""Share of a combination of numbers that one sample decides alone from which it is left out."""
+"""Leverage of a single sample [-] above which the sample is left out."""
 
 
 _PASSES = 4
-"""Passes of the search at most, each with the noise of the one before."""
+"""Largest number of passes of the search; each pass uses the noise estimated by the previous one."""
 _SETTLED = 0.03
-"""Change of the logarithm of the noise from pass to pass below which no further pass is made."""
+"""Change of the logarithm of the noise between passes [-] below which the search ends."""
 _EVALUATIONS, _FEW_EVALUATIONS = 40, 10
-"""Evaluations of a pass at most: of the first two, and of those after them, which only settle."""
+"""Largest number of evaluations in each of the first two passes, and in each later pass."""
 _ROUGH, _FINE = 1.0e-3, 1.0e-4
-"""Relative gain of squares that ends the robust pass, and those after it; the steps after whitening are finer."""
+"""Relative decrease of the squares [-] that ends the robust pass and the later passes; later steps are finer."""
 _LAST_STEPS = 12
 _SHARES = (1.0, 0.3, 0.1)
 _GAIN = 0.05
-"""Steps after whitening, the fractions of one that are tried, and the sum of squares [-] below which one is no gain."""
+"""Decrease of the sum of squares [-] below which a step after whitening counts as converged."""
 _CONVERGED = 0.5
-"""Gain of the last step [-] below which the numbers are where they would end, within a fraction of their errors."""
+"""Decrease of the squares in the last step [-] below which the search has converged within the standard errors."""
 
 _SHOWN = 0.01
-"""Share of the variance of a number from which what widens it is listed."""
+"""Least contribution to the variance [-] for which a tolerance is listed."""
 _OTHER_STARTS = 32
-"""Other places from which the search is tried."""
+"""Number of further start points tried."""
 
 
 @on_one_thread
@@ -104,15 +106,15 @@ def fit(
     memory: int = HIGHEST_ORDER,
     is_motion: bool = False,
 ) -> Fit:
-    """Return the numbers that explain recordings best, their covariance and whether the recordings agree on them.
+    """Return the variables that explain the recordings best, with covariance, intervals and consistency tests.
 
-    Squares are minimised within bounds, at first with a loss that is robust (soft L1); weights follow from what is left
-    in each channel. Then residuals are whitened by the noise of each channel and the numbers step on until none gains.
-    Another start is followed only where it explains more than where the first ended. ``memory`` is the highest order
-    of the autoregression, 0 for readings that were taken one by one. In recordings of motion (``is_motion``) sensors
-    may drift, and samples that an impact passes are left out; what a bench reads moves as slowly as its sensors
-    drift. IdentificationError where no run succeeds, and where samples are no more than the numbers that are sought,
-    and for bounds that leave a number no room about its start.
+    Weighted squares are minimised within bounds, at first with a robust loss (soft L1); the weights follow from the
+    residuals of each channel. Then residuals are whitened by the noise model of each channel, and Gauss-Newton steps
+    follow until none reduces the cost. Another start is used only if it explains the recordings better. ``memory`` is
+    the highest order of the noise autoregression, 0 for independent readings. In recordings of motion (``is_motion``)
+    sensors may drift, and samples affected by an impact are left out; for bench readings, drift cannot be separated
+    from slow signals. Raises IdentificationError if no run succeeds, if there are no more samples than unknowns, or if
+    the bounds of a variable do not enclose its start.
     """
     if not numbers or not blocks:
         raise IdentificationError(
@@ -144,7 +146,7 @@ def fit(
 
 
 def _search(work: FitRuns, start: Floats) -> Floats:
-    """Return about the least squares, weights and squares in turn until both stay."""
+    """Return the approximate least-squares point, alternating between estimation of weights and minimisation."""
     point = np.clip(start, work.low, work.high)
     left, work.outliers = work.one(point), work.outliers[:0]
     if not np.isfinite(left).all():
@@ -190,10 +192,10 @@ def _search(work: FitRuns, start: Floats) -> Floats:
 
 
 def _outliers(work: FitRuns, left: Floats) -> Indices:
-    """Return samples that no sensor made: residuals of the robust pass far off those around them, at most one in 100.
+    """Return the isolated outliers among the residuals of the robust pass, at most one sample in 100.
 
-    One near a break-away would else decide a friction by itself. More are noise with heavy tails: the largest are left
-    out.
+    A single outlier near a break-away could otherwise determine a friction. If more samples stand out, the noise has
+    heavy tails, and only the largest are left out.
     """
     found, sizes = list[Indices](), list[Floats]()
     for one in work.blocks:
@@ -207,11 +209,11 @@ def _outliers(work: FitRuns, left: Floats) -> Indices:
 
 
 def _settled(work: FitRuns, point: Floats) -> tuple[Floats, Floats, Linear, Floats, float]:
-    """Return where Gauss-Newton steps on whitened samples end, from the least squares at a scaled ``point``.
+    """Return the point at which Gauss-Newton steps on whitened samples end, starting from a scaled ``point``.
 
-    Scaled numbers, residuals of the samples, linearisation there, the last step tried, and its gain: by how much it
-    would lower the cost, at most 0 where it was not taken, and -inf where no run succeeds there. Samples that stand
-    alone are left out, and in a fit of motion once more those on which the rest hangs.
+    Returns the scaled variables, the residuals, the linearisation there, the last step tried, and its gain: the
+    decrease of the cost; at most 0 if the step was not taken, -inf if no run succeeds there. Outliers are left out and,
+    in a fit of motion, also samples of high leverage.
     """
     left = work.one(point)
     work.left_out, is_checked = work.outliers, False
@@ -243,9 +245,9 @@ def _settled(work: FitRuns, point: Floats) -> tuple[Floats, Floats, Linear, Floa
 
 
 def _edge(work: FitRuns, point: Floats, step: Floats) -> dict[str, int]:
-    """Return the sought numbers with which no run succeeds a short step from a point, each with the sign of the step.
+    """Return the unknowns for which no run succeeds after a short step from a point, with the sign of the step.
 
-    All of them where each alone may take it and only together they may not.
+    If every single step succeeds and only their combination fails, all unknowns are returned.
     """
     sought = np.flatnonzero((work.prior == 0.0) & (step != 0.0))
     moved = point[:, None] + _SHARES[-1] * np.diag(step)[:, sought]
@@ -255,7 +257,7 @@ def _edge(work: FitRuns, point: Floats, step: Floats) -> dict[str, int]:
 
 
 def _whitened(work: FitRuns, start: Floats, confidence: float) -> Fit:
-    """Return the fit after whitening, with its intervals and what speaks against it, from scaled least squares."""
+    """Return the whitened fit with intervals and consistency tests, starting from a scaled least-squares point."""
     point, left, linear, step, gain = _settled(work, start)
     rows = linear.rows
     known, whitened, errors = linear.sensors, rows[:, 1:], rows[:, 0]
@@ -298,7 +300,7 @@ def _whitened(work: FitRuns, start: Floats, confidence: float) -> Fit:
 
 
 def _likelihood(work: FitRuns, found: Fit) -> float:
-    """Return the logarithm of the likelihood [-] of whitened residuals and priors, but for a constant."""
+    """Return the log-likelihood [-] of whitened residuals and priors, up to a constant."""
     size = 0.0
     for one in work.blocks:
         noise, count = found.sensors[one.channel], one.rows.stop - one.rows.start
@@ -307,7 +309,7 @@ def _likelihood(work: FitRuns, found: Fit) -> float:
 
 
 def _other_starts(work: FitRuns, found: Fit) -> Iterator[Floats]:
-    """Return scaled starts for the numbers that are sought that explain more than a fit: at most two of a batch."""
+    """Yield at most two scaled start points that explain the recordings better than the fit does."""
     sought = ~(work.prior > 0.0)
     point = found.values / work.scale
     low, high = np.maximum(work.low, -1.0e3)[sought], np.minimum(work.high, 1.0e3)[sought]

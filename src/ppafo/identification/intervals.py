@@ -1,8 +1,8 @@
-"""Ends of the interval of a number, and combinations of numbers that the recordings leave undetermined.
+"""Confidence limits from profile likelihood, and combinations of variables that the recordings do not determine.
 
-At the estimate the law is a straight line, whose intervals are the covariance's. Where the law bends, such as along two
-numbers of which the product counts, other numbers may explain as much far beyond it: an end lies where the least
-squares with the number held there are larger by t^2, t being Student's factor (profile likelihood).
+For a linear law the covariance gives the limits. For a nonlinear law, such as one in which only a product of two
+variables counts, distant values may explain the recordings as well: a limit is the value at which the minimum of the
+squares over all other variables is larger by t^2, with Student's factor t (profile likelihood).
 """
 
 import math
@@ -16,31 +16,31 @@ from ppafo.identification.whitened import Linear, cost_of, squares_of, whitened_
 from ppafo.signals.recording import Floats
 
 _TRIES, _CORRECTIONS, _LINEARISATIONS = 6, 3, 4
-"""Points tried for an end; at each, steps of the other numbers on the Jacobian of the estimate, then on new ones."""
+"""Largest numbers of trial points per limit, of steps with the Jacobian of the estimate, of steps with a new one."""
 
 _SHARES = 0.5 ** np.arange(4.0)[:, None]
-"""Fractions of a step on a new Jacobian, of which the best is taken."""
+"""Fractions of a step with a new Jacobian [-], of which the best is taken."""
 
 _STILL = 0.3
-"""Fall of the squares [-] below which the others have settled."""
+"""Decrease of the squares [-] below which the other variables have converged."""
 
 _FURTHER = 1.3
-"""Factor at least by which an end that explains the recordings is moved away, so that one is found that does not."""
+"""Least factor by which a trial limit is moved outwards while the recordings are still explained [-]."""
 
 _NARROW = 0.1
-"""Width of the bracket of an end over its distance from the estimate, within which it lies on a straight line."""
+"""Width of the bracket of a limit, relative to its distance from the estimate [-], at which interpolation is linear."""
 
 _BENT = 1.1
-"""Factor by which the ends of profile and straight line must differ for the profile to be followed."""
+"""Least ratio of profile and linear limits [-] for which the profile is followed."""
 
 _UNKNOWN = 0.5
-"""Standard error of a combination over the scales of its numbers from which it is not identifiable."""
+"""Standard error of a combination of scaled variables [-] above which it is not identifiable."""
 
 
 def interval_ends(work: FitRuns, point: Floats, linear: Linear, times: float) -> tuple[Floats, Floats]:
-    """Return the lower and upper ends of all numbers, scaled: ``times`` the standard errors, or more where laws bend.
+    """Return scaled lower and upper confidence limits: ``times`` standard errors, or wider for nonlinear laws.
 
-    Only intervals of sought numbers change, and only outwards. An end that the samples do not fix is the bound.
+    Only intervals of unknowns without a prior are widened. A limit that the samples do not determine is the bound.
     """
     covariance = linear.root @ linear.root.T
     wide = times * np.sqrt(np.diag(covariance))
@@ -69,9 +69,10 @@ def _end(
     straight: tuple[float, Floats],
     times: float,
 ) -> float:
-    """Return one end of the interval of a number, between the one of the straight line and its bound.
+    """Return one confidence limit of a variable, between the limit of the linear law and the bound.
 
-    ``least`` are the squares at the estimate, ``straight`` those at the end of the straight line and where they are.
+    ``least`` is the sum of squares at the estimate; ``straight`` is the sum of squares near the linear limit, and the
+    point at which it is reached.
     """
     inner, near = point, 0.0
     outer: Floats | None = None
@@ -101,9 +102,10 @@ def _end(
 
 
 def _least_beside(work: FitRuns, points: Floats, held: list[int], linear: Linear) -> tuple[Floats, Floats]:
-    """Return the least squares with one number of each scaled point held where it is, and the points where they are.
+    """Return the minimum of the squares with one variable fixed, for each scaled point, and the points of the minima.
 
-    The other numbers take Gauss-Newton steps on the Jacobian of the estimate. Infinite where no run succeeds.
+    ``held`` is the index of the fixed variable of each point. The other variables take Gauss-Newton steps with the
+    Jacobian of the estimate. The minimum is infinite if no run succeeds.
     """
     covariance, slopes = linear.root @ linear.root.T, linear.rows[:, 1:]
     low, high, each = work.low[:, None], work.high[:, None], np.arange(len(held))
@@ -127,10 +129,10 @@ def _least_beside(work: FitRuns, points: Floats, held: list[int], linear: Linear
 
 
 def _least_along(work: FitRuns, point: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
-    """Return the least squares with a number of a scaled point held, and the point where they are.
+    """Return the minimum of the squares with one variable of a scaled point fixed, and the point of the minimum.
 
-    The other numbers take Gauss-Newton steps within their bounds, each on a Jacobian of its own: far from the estimate
-    its Jacobian leads out of a valley that bends. Infinite where no run succeeds.
+    The other variables take Gauss-Newton steps within their bounds, each with a new Jacobian, because far from the
+    estimate its Jacobian leads out of a curved valley. The minimum is infinite if no run succeeds.
     """
     errors = whitened_errors(work, work.at(point[:, None]), linear)
     squares = float(squares_of(work, errors, point[:, None])[0])
@@ -158,7 +160,7 @@ def _least_along(work: FitRuns, point: Floats, number: int, linear: Linear) -> t
 
 
 def unidentified(covariance: Floats, names: Sequence[str]) -> Iterator[dict[str, float]]:
-    """Return combinations of scaled numbers whose standard error is above half their scale, as weights."""
+    """Yield combinations of scaled variables whose standard error is above half their scale, as weights by name."""
     variances, vectors = np.linalg.eigh(covariance)
     for variance, vector in zip(variances[::-1].tolist(), vectors.T[::-1], strict=True):
         if math.sqrt(max(variance, 0.0)) > _UNKNOWN:

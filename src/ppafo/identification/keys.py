@@ -1,4 +1,4 @@
-"""Keys that several tables of a problem file share, and their texts as numbers in SI units."""
+"""Keys common to several tables of a problem file, and conversion of their texts to numbers."""
 
 import math
 from typing import Annotated
@@ -23,9 +23,9 @@ def quantity_in(
     high: float = math.inf,
     atmosphere: float = STANDARD_ATMOSPHERE,
 ) -> float | None:
-    """Return the number at a key of a table [unit], None where it was left out; ``said`` is what messages call it.
+    """Return the number at a key of a table [unit], None if the key is absent; ``said`` starts messages.
 
-    IdentificationError where its text does not fit the unit, or the number is not from ``low`` to ``high``.
+    Raises IdentificationError if the text does not fit the unit or the number is not from ``low`` to ``high``.
     """
     text = getattr(table, key)
     if text is None:
@@ -37,7 +37,7 @@ def quantity_in(
 
 
 def positive_in(table: StrictTable, key: str, unit: str, said: str) -> float | None:
-    """Return the number at a key as ``quantity_in`` does; IdentificationError also where it is not above 0."""
+    """Return the number at a key like ``quantity_in``. Raises IdentificationError also if it is not positive."""
     value = quantity_in(table, key, unit, said)
     if value is not None and value <= 0.0:
         raise IdentificationError(f"{said}: {key} = {getattr(table, key)!r} must be above zero")

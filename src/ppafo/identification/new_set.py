@@ -1,4 +1,4 @@
-"""The new parameter set: identified values in the place of the old ones, each with interval and origin."""
+"""New parameter set: identified values replace earlier ones, each with interval and origin."""
 
 import math
 from collections.abc import Iterable
@@ -27,10 +27,10 @@ _FORMS = ((_AREA_NAMES, _SONIC_NAMES), (_SONIC_NAMES, _AREA_NAMES))
 
 @dataclass(frozen=True, slots=True)
 class NewSet:
-    """A set with new values, and what is wrong with it as a device (an empty text if nothing).
+    """Parameter set with new values, and ``problem``, the error of a device built from it (empty if valid).
 
-    ``written`` are the paths of the identified ones. ``fitted`` are the paths of values that hold for this model
-    only: the set has them, with the origin ``fitted``, and they do not count as identified.
+    ``written`` are the paths of identified values. ``fitted`` are the paths of values that hold for this model only;
+    these have the origin ``fitted`` in the set and do not count as identified.
     """
 
     parameter_set: ParameterSet
@@ -40,7 +40,7 @@ class NewSet:
 
 
 def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], valve: str | None = None) -> NewSet:
-    """Return the set with every usable estimate that has a place in it; the later of two for one path counts."""
+    """Return the set with every usable estimate that it has an entry for; later estimates override earlier ones."""
     found: dict[str, bool] = {}
     for estimate in estimates:
         find_effects([estimate.path])
@@ -59,7 +59,7 @@ def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], v
 
 
 def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Quantity) -> ParameterSet:
-    """Return the set with one value replaced; it keeps the unit that the set had."""
+    """Return the set with one value replaced, in the unit of the earlier entry."""
     before = parameter_set.numbers.get(estimate.path)
     atmosphere = atmospheric_pressure(parameter_set)
     unit = quantity.unit if before is None else before.unit
@@ -94,18 +94,18 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
 
 
 _DIGITS = 3
-"""Digits of the half interval to which a value is written."""
+"""Significant digits of the half-width to which a value is rounded."""
 
 
 def _in_digits_of(value: float, half_width: float) -> float:
-    """Return a value with as many digits as three of its half interval, beyond which it says nothing."""
+    """Return a value rounded to the third significant digit of its half-width."""
     if not (math.isfinite(half_width) and half_width > 0.0):
         return value
     return round(value, _DIGITS - 1 - math.floor(math.log10(half_width)))
 
 
 def fitting_unit(unit: str, quantity: Quantity) -> str:
-    """Return the SI unit of a quantity, of the several that it may be declared in, that a unit can be turned into."""
+    """Return the SI unit, among the alternatives declared for a quantity, to which a unit can be converted."""
     for item in alternatives(quantity):
         try:
             from_si(1.0, unit, item)
@@ -116,14 +116,14 @@ def fitting_unit(unit: str, quantity: Quantity) -> str:
 
 
 def stated_half_width(entry: Entry, unit: str) -> float:
-    """Return half the 95 % interval that a set states of a number, in an SI unit that fits its own; 0 for none."""
+    """Return the half-width of the 95 % interval stated in a set, converted to ``unit``; 0 if none is stated."""
     if not entry.uncertainty:
         return 0.0
     return to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
 
 
 def in_set_unit(number: float, path: str, si_unit: str, parameter_set: ParameterSet) -> tuple[float, str]:
-    """Return a number of a path in the unit that the set has for it, and this unit; as it is where the set has none."""
+    """Return a number in the unit of its entry in the set, with this unit; unchanged [SI] if the set has no entry."""
     entry, quantity = parameter_set.numbers.get(path), parameter_set.declarations().get(path)
     if entry is None or quantity is None or entry.unit == si_unit:
         return number, si_unit

@@ -1,4 +1,4 @@
-"""Noise of sensors: how large it is and what makes it white, estimated from what a fit leaves (Burg, AIC)."""
+"""Noise models of sensors, estimated from residuals: size, and autoregression or drift (Burg, AIC)."""
 
 import math
 from collections.abc import Sequence
@@ -10,23 +10,23 @@ from scipy.signal import lfilter
 from ppafo.signals.recording import Floats
 
 HIGHEST_ORDER = 12
-"""Order of the autoregression of the noise at most."""
+"""Highest order of the noise autoregression."""
 SAMPLES_PER_COEFFICIENT = 100
-"""Samples for each coefficient of the autoregression at least; 100 white ones then get none in 7 of 10 fits."""
+"""Least number of samples per autoregression coefficient; 100 white samples then get order 0 in 7 of 10 fits."""
 _LARGEST_REFLECTION = 1.0 - 1.0e-9
-"""Largest reflection coefficient: residuals that follow a law exactly, such as a constant, leave no innovation."""
+"""Largest reflection coefficient [-]; residuals that follow a law exactly, such as a constant, leave no innovation."""
 
 _GAINS = tuple(2.0**-power for power in range(1, 9))
-"""Gains of a level that are tried; with less it would not move within some hundred samples."""
+"""Trial gains of a drifting level [-]; with a smaller gain the level would not move within some hundred samples."""
 
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Noise of a channel: standard deviation [SI], and what makes it white: an autoregression or a level that drifts.
+    """Noise model of a channel: white noise, an autoregression, or white noise plus a drifting level (random walk).
 
-    ``reflection`` are coefficients [-] of the autoregression (Burg). ``gain`` [-] is the part of each innovation by
-    which a level moves that drifts as a random walk beside white noise, 0 for none. ``innovation`` is the size of what
-    nothing foretells over the deviation [-].
+    ``deviation``: total standard deviation [SI]. ``reflection``: reflection coefficients of the autoregression (Burg)
+    [-]. ``gain``: fraction of each innovation added to the drifting level [-], 0 without drift. ``innovation``:
+    standard deviation of the unpredictable part (innovation), relative to the total [-].
     """
 
     deviation: float
@@ -36,11 +36,11 @@ class Noise:
 
 
 def burg(series: Sequence[Floats], highest: int = HIGHEST_ORDER) -> tuple[float, ...]:
-    """Return the reflection coefficients [-] of one autoregression of several series (Burg), as many as AIC wants.
+    """Return the reflection coefficients [-] of an autoregression of several series (Burg), with order from AIC.
 
-    Columns of a series (samples, columns) add up, as its residuals and their error do. There is at most one coefficient
-    for each 100 samples: with more, the misfit of a law that is wrong passes for noise in the few readings of a bench,
-    and nothing is flagged. So correlated noise of fewer samples is not seen, and its intervals are too narrow.
+    The columns of a series (samples, columns) are summed in power, such as residuals and their uncertainty. There is at
+    most one coefficient per 100 samples: with more, the misfit of a wrong law would pass for noise in the few readings
+    of a bench. Correlated noise in shorter series is therefore not detected, and intervals are too narrow there.
     """
     forward, backward = list(series), list(series)
     count = sum(len(one) for one in series)
@@ -61,10 +61,10 @@ def burg(series: Sequence[Floats], highest: int = HIGHEST_ORDER) -> tuple[float,
 
 
 def noise_of(series: Sequence[Floats], highest: int = HIGHEST_ORDER, may_drift: bool = True) -> Noise:
-    """Return the noise of several series [-] as AIC wants it: an autoregression, or a random walk beside white noise.
+    """Return the noise model of several series [-] chosen by AIC: an autoregression, or white noise plus a random walk.
 
-    That is a slow drift, where it ``may_drift``, for which an autoregression needs many coefficients. Columns add up,
-    as for ``burg``.
+    The random walk is tried only if sensors ``may_drift``; an autoregression would need many coefficients for slow
+    drift. Columns are summed in power, as in ``burg``.
     """
     count, size = sum(len(one) for one in series), sum(float(np.square(one).sum()) for one in series)
     # What is less than the floor is the engine's, and no noise.
@@ -86,12 +86,12 @@ def noise_of(series: Sequence[Floats], highest: int = HIGHEST_ORDER, may_drift: 
 
 
 def _without_level(values: Floats, gain: float) -> Floats:
-    """Return the innovations of white noise beside a random walk: the Kalman filter of a local level, settled."""
+    """Return the innovations of white noise plus a random walk: steady-state Kalman filter of a local-level model."""
     return np.asarray(lfilter([1.0, -1.0], [1.0, gain - 1.0], values, axis=0))
 
 
 def whiten(values: Floats, noise: Noise) -> Floats:
-    """Return columns (samples, columns) [SI] of one recording as innovations [-] of the noise of their channel."""
+    """Return columns (samples, columns) [SI] of one recording as innovations [-] of the channel's noise model."""
     forward = values / noise.deviation
     if noise.gain > 0.0:
         return _without_level(forward, noise.gain) / noise.innovation

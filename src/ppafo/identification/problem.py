@@ -1,8 +1,8 @@
-"""The problem file of ``ppafo identify``: which recordings, how their columns read, and which procedures to apply.
+"""Problem file of ``ppafo identify``: recordings, column maps, and procedures to apply.
 
-Each procedure is a table of the file, which knows the settings of its procedure from a parameter set. The recommended
-order matters where one leans on another: torque and friction are measured first because they need nothing else, the
-flow of the open valve before its map, and the leak last, since its chambers must be known to hold.
+Each procedure is a table of the file, completed with values from a parameter set. The recommended order matters where
+one procedure uses results of another: torque and friction come first because they need no others, the flow of the open
+valve comes before the valve map, and the leak comes last, because its chambers must be known to be closed.
 """
 
 import math
@@ -46,7 +46,7 @@ _Valve = Annotated[Text | None, Field(description="name of a valve of the set; d
 UNKNOWN = "unknown"
 _COLDEST, _HOTTEST = 150.0, 600.0
 _THERMOMETER = 1.0
-"""Limit [K] of a temperature that the problem states."""
+"""Limit [K] of the error of a temperature stated in the problem."""
 
 _FILE = TomlKind(
     "identification problem", "identification", resources.files("ppafo.identification"), IdentificationError
@@ -55,7 +55,7 @@ _FILE = TomlKind(
 
 @dataclass(frozen=True, slots=True)
 class ProcedureContext:
-    """Context of a procedure: parameter set, chosen valve, bench, and label of its section in messages."""
+    """Context of a procedure: parameter set, chosen valve, label of the section in messages, bench tolerances."""
 
     parameter_set: ParameterSet
     valve: str
@@ -63,16 +63,16 @@ class ProcedureContext:
     tolerances: Tolerances = DEFAULTS
 
     def number(self, path: str) -> float:
-        """Return the value at a path [SI]; IdentificationError where the set lacks it."""
+        """Return the value at a path [SI]. Raises IdentificationError if the set has none."""
         value = number_in_si(with_followers(self.parameter_set), path)
         if value is None:
             raise IdentificationError(f"{self.place}: needs {path}, which {self.parameter_set.file} does not have")
         return value
 
     def gas(self, problem: "OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem") -> GasAt:
-        """Return the gas of the bench; species and temperature are the set's where none is named.
+        """Return the gas of the bench; species and temperature default to the values of the set.
 
-        IdentificationError for an unknown species.
+        Raises IdentificationError for an unknown species.
         """
         temperature, species = quantity_in(problem, "temperature", "K", self.place, _COLDEST, _HOTTEST), problem.gas
         if temperature is None:
@@ -92,12 +92,12 @@ class ProcedureContext:
         return GasAt(known_gas.molar_mass, known_gas.heat_capacity_ratio, temperature, deviation)
 
     def deviation(self, path: str, value: float, unit: str) -> float:
-        """Return the standard deviation of a number that the set has or leaves to the problem, at a value [unit]."""
+        """Return the standard deviation of a number, given its value [unit], from the bench, the set, or defaults."""
         entry = with_followers(self.parameter_set).numbers.get(path)
         return self.tolerances.deviation_of(path, value, 0.0 if entry is None else stated_half_width(entry, unit))
 
     def valve_path(self, name: str | None) -> str:
-        """Return the path of a valve in the set, ``valves.main``."""
+        """Return the path of a valve in the set, such as ``valves.main``; None is the chosen valve."""
         return f"valves.{chosen_valve(self.parameter_set, name or self.valve)}"
 
 
@@ -110,12 +110,12 @@ class StaticTorqueProblem(StrictTable):
     confidence: Confidence = 0.95
 
     def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
-        """Return what the procedure makes of recordings."""
+        """Return the result of the procedure for recordings."""
         return static_torque(sources, self.confidence, setting.tolerances)
 
 
 _MOST_OF_STOPS = 10.0
-"""Way of a decay over the way between the stops of its set, beyond which its unit is another one."""
+"""Largest ratio of angle travelled in a decay to angle between the stops [-]; more means a wrong unit."""
 
 
 class FreeDecayProblem(StrictTable):
@@ -130,7 +130,7 @@ class FreeDecayProblem(StrictTable):
     inertia: Text | None = Field(None, description="such as '8.4 g m^2', or 'unknown'; default: the set's")
 
     def inertia_of(self, setting: ProcedureContext) -> tuple[float | None, float]:
-        """Return the inertia and its standard deviation [kg m^2]: the set's where none is named, if it has one."""
+        """Return the inertia and its standard deviation [kg m^2], by default from the set; None if unknown."""
         path = "foot_plate.inertia"
         if self.inertia == UNKNOWN:
             return None, 0.0
@@ -141,7 +141,7 @@ class FreeDecayProblem(StrictTable):
         return inertia, 0.0 if inertia is None else setting.deviation(path, inertia, "kg m^2")
 
     def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
-        """Return what the procedure makes of recordings; IdentificationError for an angle that no such device turns."""
+        """Return the result of the procedure for recordings. Raises IdentificationError for an implausible angle."""
         low, high = (number_in_si(setting.parameter_set, f"actuator.angle_{end}") for end in ("min", "max"))
         for source in sources:
             angles = source.recording["angle"] if "angle" in source.recording else source.recording.time[:1]
@@ -178,7 +178,7 @@ class OpenValveFlowProblem(StrictTable):
     law: Annotated[Law, Field(description="law of the flow; it is written into the set in this form")] = "orifice"
 
     def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
-        """Return what the procedure makes of recordings."""
+        """Return the result of the procedure for recordings."""
         path = setting.valve_path(self.valve)
         area = number_in_si(setting.parameter_set, f"{path}.area")
         ratio = number_in_si(setting.parameter_set, f"{path}.critical_ratio")
@@ -187,7 +187,7 @@ class OpenValveFlowProblem(StrictTable):
 
 
 class VaneLeakProblem(StrictTable):
-    """Closed chambers losing pressure, or a steady flow: area, conductance or laminar coefficient of the leak."""
+    """Leak of closed chambers losing pressure, or in steady flow: area, conductance or laminar coefficient."""
 
     kind: Literal["vane-leak"]
     recordings: _Recordings
@@ -205,7 +205,7 @@ class VaneLeakProblem(StrictTable):
     volume_2: Text | None = Field(None, description="volume of chamber 2 with its line")
 
     def volumes_of(self, setting: ProcedureContext) -> tuple[float | None, float | None, float]:
-        """Return both volumes [m^3], as given, else from the angle, and the standard deviation of one over it [-].
+        """Return both volumes [m^3], given or computed from the angle, and relative standard deviation of a volume [-].
 
         Equations (4), (5): V1 = V_dead1 + v (theta - theta_min) and V2 = V_dead2 + v (theta_max - theta), with v the
         displacement per radian [m^3/rad].
@@ -232,7 +232,7 @@ class VaneLeakProblem(StrictTable):
         return first, second, deviation
 
     def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
-        """Return what the procedure makes of recordings."""
+        """Return the result of the procedure for recordings."""
         first, second, deviation = self.volumes_of(setting)
         start, end = times_of(self, setting.place)
         forms = ("discharge_coefficient", "critical_ratio")
@@ -254,7 +254,7 @@ class VaneLeakProblem(StrictTable):
 
 
 class ValveMapProblem(StrictTable):
-    """Command against flow: dead band, gain, saturation, hysteresis."""
+    """Flow over command: dead band, gain, saturation, hysteresis."""
 
     kind: Literal["valve-map"]
     recordings: _Recordings
@@ -265,18 +265,18 @@ class ValveMapProblem(StrictTable):
     valve: _Valve = None
 
     def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
-        """Return what the procedure makes of recordings."""
+        """Return the result of the procedure for recordings."""
         gas = setting.gas(self)
         return valve_map(sources, gas, setting.valve_path(self.valve), self.confidence, setting.tolerances)
 
 
 def times_of(problem: FreeDecayProblem | VaneLeakProblem, place: str) -> tuple[float | None, float | None]:
-    """Return first and last time [s] to use, None where the recording's own is; ``place`` is what messages call it."""
+    """Return first and last time [s] to use, None for the start or end of the recording; ``place`` starts messages."""
     return quantity_in(problem, "start", "s", place), quantity_in(problem, "end", "s", place)
 
 
 class DeviceProblem(StrictTable):
-    """The set to start from, its valve, and changes to it."""
+    """Initial parameter set, its valve, and changes to it."""
 
     set: Text = Field(description="name of a parameter set, or a path relative to this file")
     valve: _Valve = None
@@ -293,9 +293,9 @@ PROCEDURES = "static-torque", "free-decay", "open-valve-flow", "valve-map", "van
 def run_procedure(
     sources: tuple[RecordingSource, ...], problem: ProcedureProblem, setting: ProcedureContext
 ) -> BenchResult:
-    """Return what a procedure of a problem makes of its recordings.
+    """Return the result of a procedure for its recordings.
 
-    The line of an IdentificationError begins with the recording, else with the place of the procedure.
+    Raises IdentificationError, with the name of the recording or the label of the procedure first.
     """
     try:
         found = problem.run(sources, setting)
@@ -316,7 +316,7 @@ def run_procedure(
 
 
 def window_of(problem: ProcedureProblem, setting: ProcedureContext) -> tuple[float, float]:
-    """Return first and last time [s] that a procedure uses of its recordings."""
+    """Return the first and last time [s] of the recordings that a procedure uses; infinite if not limited."""
     # Steady readings have no window: each counts by itself.
     if not isinstance(problem, FreeDecayProblem | VaneLeakProblem):
         return -math.inf, math.inf
@@ -325,7 +325,7 @@ def window_of(problem: ProcedureProblem, setting: ProcedureContext) -> tuple[flo
 
 
 class ProblemFile(StrictTable):
-    """Layout of a problem file: the set, the recordings, the procedures and the fit."""
+    """Layout of a problem file: initial parameter set, recordings, procedures and trajectory fit."""
 
     schema_version: SchemaVersion
     name: str = Field(pattern=NAME, max_length=100, description="name of the new parameter set")
@@ -341,17 +341,17 @@ class ProblemFile(StrictTable):
 
 
 def load_problem(path: str | Path) -> ProblemFile:
-    """Return the problem in a TOML file; paths in it begin in its folder.
+    """Return the problem in a TOML file; its paths are relative to its folder.
 
-    IdentificationError for a file that is not usable.
+    Raises IdentificationError for an invalid file.
     """
     return parse_problem(_FILE.read(path), label(str(path)))
 
 
 def parse_problem(content: bytes, file: str) -> ProblemFile:
-    """Return the problem in the bytes of a TOML file; ``file`` is what messages call it.
+    """Return the problem in the bytes of a TOML file; ``file`` is its name in messages.
 
-    IdentificationError for one that is not usable.
+    Raises IdentificationError for an invalid file.
     """
     document = _FILE.parse(content, file)
     refuse_removed(document, file)

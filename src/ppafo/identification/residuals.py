@@ -1,4 +1,4 @@
-"""Unknowns and residuals of a fit: numbers with priors, rows of residuals, and runs at scaled points."""
+"""Variables and residuals of a fit: variables with priors, blocks of residual rows, and model runs at scaled points."""
 
 import math
 from collections.abc import Callable
@@ -14,15 +14,15 @@ from ppafo.signals.recording import Floats
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 Residuals = Callable[[Floats], Floats]
-"""Measured less model [SI] (rows, points) at points [SI] (numbers, points), as one batch; NaN where a run fails."""
+"""Function from points [SI] (numbers, points) to residuals measured - model [SI] (rows, points); NaN if a run fails."""
 
 
 @dataclass(frozen=True, slots=True)
 class FitVariable:
-    """A number that the fit moves: start, bounds and typical size ``scale``, SI units.
+    """Variable of a fit: start, bounds and typical magnitude ``scale``, in SI units.
 
-    ``deviation`` is the standard deviation of its prior about its start; infinite for a number that is sought, finite
-    for a tolerance. Tolerances of one ``family``, such as friction in each recording, are tested together.
+    ``deviation`` is the standard deviation of its prior about the start: infinite for an unknown, finite for a
+    tolerance. Tolerances of one ``family``, such as the friction in each recording, are tested together.
     """
 
     name: str
@@ -36,12 +36,11 @@ class FitVariable:
 
 @dataclass(frozen=True, slots=True)
 class ResidualBlock:
-    """Rows of the residuals that are one channel of one recording or a part of it, in the order of time.
+    """Rows of residuals that belong to one channel of one recording, or to a part of it, in order of time.
 
-    ``floor`` is the error of the engine, or of the resolution [SI], below which no residual says anything: one for all
-    rows, or each row's. ``shared`` is an error [SI] by row that all rows of the recording have at once, as one normal
-    deviate times it. ``groups`` are further groups, such as a branch, whose numbers are compared with the numbers of
-    all.
+    ``floor`` is the least noise [SI], from integration error or resolution, common or by row. ``shared`` is an error
+    [SI] by row that is fully correlated in the recording: a single standard normal deviate multiplies all its rows.
+    ``groups`` name further groups, such as a branch, whose own estimates are tested against the common ones.
     """
 
     recording: str
@@ -53,14 +52,14 @@ class ResidualBlock:
 
 
 _UNITS_OF_NOISE = 3.0
-"""Change of all residuals together, in units of noise, that a difference makes."""
+"""Change of all residuals together in one finite difference, in units of noise [-]."""
 
 _STEPS = (1.0e-7, 1.0e-3)
-"""Shortest and longest difference over the scale of a number."""
+"""Shortest and longest finite difference, as fractions of the scale of a variable [-]."""
 
 
 class FitRuns:
-    """Runs of a fit in scaled numbers, with the last one kept."""
+    """Model runs of a fit at scaled points; the residuals of the last single point are cached."""
 
     def __init__(
         self,
@@ -92,17 +91,17 @@ class FitRuns:
         return self.residuals(points * self.scale[:, None])
 
     def one(self, point: Floats) -> Floats:
-        """Return residuals [SI] at a scaled point, which is run once."""
+        """Return residuals [SI] (rows,) at one scaled point; a repeated call does not run the model again."""
         key = point.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = key, self.at(point[:, None])[:, 0]
         return self._last[1]
 
     def jacobian(self, point: Floats, weight: Floats, *, is_central: bool = True) -> Floats:
-        """Return the derivative of the residuals [SI] by scaled numbers, differences of one batch.
+        """Return the Jacobian of the residuals [SI] by the scaled variables, from finite differences in one batch.
 
-        ``weight`` [1/SI] by row sets the lengths of the differences of the next one. Differences to one side take half
-        the runs, and say well enough where to search.
+        ``weight`` [1/SI] by row sets the step lengths for the next call. One-sided differences need half the runs and
+        are accurate enough for the search.
         """
         above, below = np.minimum(point + self.step, self.high), np.maximum(point - self.step, self.low)
         sides = [above, below] if is_central else [np.where(above - point >= point - below, above, below)]
@@ -136,11 +135,11 @@ class FitRuns:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The channels, each once."""
+        """Names of the channels, without duplicates."""
         return tuple(dict.fromkeys(block.channel for block in self.blocks))
 
     def shared(self) -> Floats:
-        """Return the errors [SI] that rows of a recording share, a column for each recording that has some."""
+        """Return the errors [SI] common to the rows of a recording, shape (rows, recordings with such errors)."""
         names = dict.fromkeys(block.recording for block in self.blocks if block.shared is not None)
         columns = np.zeros((self.blocks[-1].rows.stop, len(names)))
         for index, name in enumerate(names):
@@ -150,9 +149,9 @@ class FitRuns:
         return columns
 
     def deviations(self, series: Floats) -> tuple[Floats, dict[str, float]]:
-        """Return the noise [SI] of each row, and by channel, pooled over its recordings; no less than the floor.
+        """Return the noise [SI] of each row, and by channel, pooled over recordings and no less than the floor.
 
-        ``series`` are residuals, and in further columns what the error of the numbers may hide of them.
+        ``series`` has the residuals as first column; further columns are the uncertainty of the fitted model.
         """
         noise, by_channel = np.empty(len(series)), {}
         for channel in self.channels:

@@ -1,6 +1,6 @@
-"""Recordings that values come from: traced to their files, used once, and with all that a procedure needs.
+"""Recordings used as evidence: traced to their files, used only once, and checked for the needs of a procedure.
 
-Every refusal names the file and the remedy.
+Every error message names the file and a remedy.
 """
 
 import hashlib
@@ -34,33 +34,37 @@ from ppafo.wording import nearest_name
 
 @dataclass(frozen=True, slots=True)
 class RecordingSource:
-    """A recording and its reference, ``static.csv sha256:0123...``; one that comes from no file has its label."""
+    """Recording with its reference, ``static.csv sha256:0123...``, or without a file the label of the recording."""
 
     recording: Recording
     reference: str = ""
 
     @property
     def name(self) -> str:
-        """Label in messages: the file's name, else the recording's label."""
+        """Name in messages: file name, or the label of the recording."""
         return self.reference.partition(" sha256:")[0] or self.recording.label
 
     @property
     def trace(self) -> str:
-        """Reference of the recording in the source of an estimate."""
+        """Reference of the recording among the sources of an estimate."""
         return self.reference or self.recording.label
 
 
 def source_of(path: Path, recording: Recording, trial: str = "") -> RecordingSource:
-    """Return a recording with the name and the hash of the file that it was read from; DataError if that is gone.
+    """Return a recording with name and hash of its file. Raises DataError if the file no longer exists.
 
-    ``trial`` stands behind the name where the file has several recordings.
+    ``trial`` is appended to the name if the file has several recordings.
     """
     return RecordingSource(recording, f"{path.name}{trial} sha256:{hashlib.sha256(read_bytes(path)).hexdigest()}")
 
 
 @dataclass(frozen=True, slots=True)
 class UsedRecording:
-    """A recording as it is used: by what, the file's trace, the channels that count, first and last time [s]."""
+    """Use of a recording.
+
+    ``by`` names the use in messages, ``trace`` the file; ``channels`` are the channels used (empty for all), from
+    ``first`` to ``last`` [s].
+    """
 
     by: str
     trace: str
@@ -70,18 +74,15 @@ class UsedRecording:
     last: float
 
     def overlaps(self, other: "UsedRecording") -> bool:
-        """Tell whether both uses share samples of a channel, if they are of the same recording.
-
-        Without channels all of them count.
-        """
+        """Return whether two uses of the same recording share samples of a channel; no channels means all channels."""
         is_alike = not (self.channels and other.channels) or bool(self.channels & other.channels)
         return is_alike and self.first < other.last and other.first < self.last
 
 
 def double_use(uses: Iterable[UsedRecording], others: Iterable[UsedRecording] | None = None) -> str:
-    """Return why some samples would count twice, in ``uses`` or also in ``others``; an empty text where none do.
+    """Return a message on samples used twice, within ``uses`` or also in ``others``; empty if there are none.
 
-    Recordings are the same where the hash of their numbers is, under whatever names their files go.
+    Recordings are compared by the hash of their numbers, independent of file names.
     """
     known = [(use, _digest(use.recording)) for use in uses]
     more = None if others is None else [(use, _digest(use.recording)) for use in others]
@@ -95,7 +96,7 @@ def double_use(uses: Iterable[UsedRecording], others: Iterable[UsedRecording] | 
 
 
 def _digest(recording: Recording) -> str:
-    """Return the hash of times and values, whatever the file looks like."""
+    """Return the hash of times and values, independent of the file format."""
     total = hashlib.sha256(recording.time.tobytes())
     for name in sorted(recording.names):
         # The name too: two channels that are exchanged make another recording.
@@ -106,28 +107,29 @@ def _digest(recording: Recording) -> str:
 
 _NO_SENSORS = ("command", "direction", "repetition")
 _SHARE_THAT_IS_CLIPPED = 0.05
-"""Share of the samples at one value from which a sensor is clipped."""
+"""Fraction of samples at one extreme value [-] from which a sensor counts as saturated."""
 _FEWEST_CLIPPED = 4
-"""Samples at one value without which none is clipped."""
+"""Least number of equal samples for saturation."""
 _FRACTION_THAT_MOVES = 0.02
-"""Fraction of its largest value by which what drives a channel must move for a constant one to be clipped."""
+"""Least change of the driving quantity, relative to its largest value [-], for a constant channel to be saturated."""
 _LARGEST_NUMBER = 1.0e12
-"""Size of a number above which no bench has measured it, in any SI unit."""
+"""Largest plausible magnitude of a measured value, in any SI unit."""
 _MOST_IMPOSSIBLE = 0.1
-"""Share of the readings of a flow meter that may be impossible; more are a mistake of signs or columns."""
+"""Largest fraction of impossible flow meter readings [-]; more means wrong signs or columns."""
 _FINE_SAMPLE, _GROSS_SAMPLE, _GROSS_READING = 0.01, 1.0 / 6.0, 0.25
-"""Shares of the usual range from which a sample over time, by 6 of them, and a reading are wrong, or grossly so.
+"""Outlier limits as fractions of the usual range [-]: of samples over time (a sixth of the limit), fine and gross; of
+readings, gross.
 
-A real logger's glitch of a third of the range is one of many samples, and no reason to refuse the recording.
+A glitch of a third of the range in a real logger is one of many samples, and no reason to refuse the recording.
 """
 _MOST_LEFT_OUT = 0.02
-"""Share of the samples of a recording over time that may be wrong, and are left out."""
+"""Largest fraction of the samples of a recording over time that may be left out as outliers [-]."""
 _COARSEST = 0.05
-"""Step of a converter over the largest right sample, from which it is none: two wrong samples may be alike."""
+"""Converter step divided by the largest valid sample [-], above which it is no step: two outliers may be equal."""
 _NO_DECAY = 0.5
-"""Share of the range by which a first sample differs from the next four where it is wrong."""
+"""Fraction of the range by which the first two samples may differ from the median of the first five [-]."""
 _ALIKE, _FEWEST_ALIKE = 6, 8
-"""Readings with which one is compared, and how many there must be."""
+"""Number of neighbours with which a reading is compared, and least number of readings for the comparison."""
 _KINDS: tuple[RecordingKind, ...] = ("synthetic", "simulated", "measured")
 
 
@@ -139,9 +141,9 @@ def check_sources(
     moving: Iterable[str] = (),
     absolute: Iterable[str] = (),
 ) -> None:
-    """Refuse recordings that lack a channel or have fewer samples than the procedure needs.
+    """Raise IdentificationError for recordings that lack a channel or have too few samples for a procedure.
 
-    A ``moving`` channel must change, an ``absolute`` pressure be above zero. IdentificationError names the recording.
+    A ``moving`` channel must change, and an ``absolute`` pressure must be positive. The message names the recording.
     """
     if not sources:
         raise IdentificationError(f"{procedure}: no recording was given")
@@ -179,9 +181,10 @@ def check_sources(
 
 
 def check_not_alone(source: RecordingSource, procedure: str, name: str) -> None:
-    """Refuse a value that lies further beyond all others of its channel than twice their range, and than their size.
+    """Raise IdentificationError for an isolated extreme value of a channel, naming the sample.
 
-    So is a reading of ten times its value in what nothing else drives. IdentificationError names the sample.
+    A value is isolated if its distance from the next one exceeds twice the range of all others and their median
+    magnitude. The check applies to driving quantities, for which there is no other check.
     """
     values = source.recording[name]
     order = np.argsort(values)
@@ -198,7 +201,7 @@ def _shown(source: RecordingSource, name: str, value: float) -> str:
 
 
 def check_moves(source: RecordingSource, procedure: str, name: str) -> None:
-    """Refuse a channel that never changes: nothing can be learnt from it. IdentificationError names the recording."""
+    """Raise IdentificationError, naming the recording, for a constant channel, which carries no information."""
     values = source.recording[name]
     if values.max() == values.min():
         raise IdentificationError(
@@ -215,10 +218,10 @@ def check_not_clipped(
     driving: Floats,
     fraction: float = _FRACTION_THAT_MOVES,
 ) -> None:
-    """Refuse a channel that stays exactly at its largest value while what drives it moves: a saturated sensor.
+    """Raise IdentificationError for a saturated sensor: a channel constant at an extreme value while its cause changes.
 
-    ``driving`` are the values of that, ``driver`` its name; it must move by ``fraction`` [-] of its largest value.
-    IdentificationError names the recording and the channel.
+    ``driving`` are the values of the driving quantity ``driver``, which must change by ``fraction`` [-] of its largest
+    value. The message names the recording and the channel.
     """
     values = source.recording[name]
     longest, _ = plateaus(values)
@@ -235,11 +238,11 @@ def check_not_clipped(
 def without_wrong_samples(
     sources: tuple[RecordingSource, ...], procedure: str, names: Sequence[str], start: float | None, end: float | None
 ) -> tuple[tuple[RecordingSource, ...], tuple[str, ...]]:
-    """Return recordings over time without the samples that no sensor made, and remarks on these.
+    """Return recordings over time without outliers in the channels ``names``, and remarks on the samples left out.
 
-    They are far off the samples around them by the rule of a fit of motion, in a channel of ``names`` from ``start`` to
-    ``end`` [s]; a step of the converter is none. IdentificationError where there are more than 2 in 100, with the
-    recording, the sample, its value and the median of those around.
+    An outlier is far off its neighbours, by the rule of the fit of motion, between ``start`` and ``end`` [s]; a step of
+    the converter is no outlier. Raises IdentificationError if more than 2 in 100 samples are outliers, with the
+    recording, the sample, its value and the median of its neighbours.
     """
     kept, said = [], []
     for source in sources:
@@ -267,7 +270,7 @@ def without_wrong_samples(
 
 
 def _off_by(values: Floats, most: int, share: float) -> NDArray[np.bool_]:
-    """Return which samples are off those around them by 6 times a share of the usual range, and of the noise."""
+    """Return flags of samples off their neighbours by 6 times the noise, and 6 times a share of the usual range."""
     # Of samples that stand still the noise is 0, and what moves first among them is no error.
     noise = max(noise_of(values), share * usual_range(values))
     is_out = outlying_samples(values, noise)
@@ -283,12 +286,12 @@ def _off_by(values: Floats, most: int, share: float) -> NDArray[np.bool_]:
 def check_no_wrong_reading(
     sources: tuple[RecordingSource, ...], procedure: str, name: str, drivers: Sequence[Floats], used: NDArray[np.bool_]
 ) -> None:
-    """Refuse readings of a channel far off the six readings that are nearest in what drives it, such as a typing error.
+    """Raise IdentificationError for a reading far off the six readings with the most similar driving quantities.
 
-    ``drivers`` are values of the readings of all recordings, ``used`` says which count. No law is needed: off
-    means by more than 10 times the usual distance, a quarter of the usual range and 3 times the range of those six, of
-    which one may be wrong too.
-    IdentificationError names the recording, the sample, its value and the median of the six.
+    An example is a typing error. ``drivers`` are the driving quantities of the readings of all recordings, ``used``
+    marks the readings that count. No law is needed: far off means by more than 10 times the usual distance, a quarter
+    of the usual range, and 3 times the range of the six readings, one of which may be wrong too. The message names the
+    recording, the sample, its value and the median of the six.
     """
     from scipy.spatial import cKDTree
 
@@ -317,7 +320,7 @@ def check_no_wrong_reading(
 
 
 def _recording_with(sources: tuple[RecordingSource, ...], place: int) -> tuple[RecordingSource, int]:
-    """Return the recording that has a sample of all of them, and how many samples lie before that recording."""
+    """Return the recording that contains a pooled sample, and the number of samples before that recording."""
     ends = np.cumsum([len(source.recording) for source in sources])
     at = int(np.searchsorted(ends, place, side="right"))
     return sources[at], int(ends[at]) - len(sources[at].recording)
@@ -330,15 +333,15 @@ def meter_readings(
     zero: float,
     used: NDArray[np.bool_] | None = None,
 ) -> tuple[Floats, NDArray[np.bool_], tuple[str, ...]]:
-    """Readings of the flow meter with their direction [kg/s], which of them can be, and remarks on the others.
+    """Return flow meter readings with their sign [kg/s], flags of the possible ones, and remarks on the others.
 
-    Under every law gas flows from the higher to the lower pressure. A meter that never shows a flow below 0 has no
-    sign: where the flow went the other way in many readings, it gets the sign of its direction. Any other reading
-    against its direction by more than the ``zero`` of the meter [fraction of its largest reading] is impossible, and so
-    is one of a meter without sign at all.
+    Under every law gas flows from the higher to the lower pressure. A meter that never shows a negative flow has no
+    sign; if the flow was reversed in many readings, each reading gets the sign of ``direction``. Otherwise a reading
+    against its direction is impossible, with a signed meter only beyond its ``zero`` error [fraction of the largest
+    reading].
 
-    Arguments: ``direction`` (readings,) of all recordings, above 0 for a flow that counts above 0; ``used`` tells which
-    readings count, all by default. Raises IdentificationError where more than a tenth are impossible.
+    Arguments: ``direction`` (readings,) of all recordings, positive for a positive flow; ``used`` marks the readings
+    that count, default all. Raises IdentificationError if more than a tenth are impossible.
     """
     flow = pool(sources, "mass_flow")
     counted = np.ones(flow.size, dtype=np.bool_) if used is None else used
@@ -367,7 +370,7 @@ def meter_readings(
 
 
 def usual_range(values: Floats) -> float:
-    """Return how far all values go but the highest and the lowest twentieth, in their unit."""
+    """Return the range between the 5 % and 95 % quantiles, in the unit of the values."""
     return float(np.subtract(*np.quantile(values, (0.95, 0.05))))
 
 
@@ -382,9 +385,9 @@ def _refuse_outlier(
 
 
 def check_no_gap(source: RecordingSource, procedure: str, part: Recording) -> int:
-    """Return how many samples of a recording lie before a part of it; refuse a part with a gap.
+    """Return the number of samples before a part of a recording. Raises IdentificationError for a part with a gap.
 
-    IdentificationError says where the gap is.
+    The message gives the time of the gap.
     """
     skipped = int(np.searchsorted(source.recording.time, part.time[0]))
     gap = longest_gap(part.time)
@@ -397,7 +400,7 @@ def check_no_gap(source: RecordingSource, procedure: str, part: Recording) -> in
 
 
 def window(recording: Recording, start: float | None, end: float | None) -> Recording:
-    """Return the part of a recording between two times [s]; None is its own start or end."""
+    """Return the part of a recording between two times [s]; None means the start or end of the recording."""
     if start is None and end is None:
         return recording
     first = float(recording.time[0]) if start is None else start
@@ -406,12 +409,12 @@ def window(recording: Recording, start: float | None, end: float | None) -> Reco
 
 
 def kind_of(kinds: Iterable[RecordingKind]) -> RecordingKind:
-    """Return the kind of the whole: one synthetic recording makes the result synthetic."""
+    """Return the kind of a result: synthetic if any recording is, else simulated if any is, else measured."""
     return min(kinds, key=_KINDS.index, default="measured")
 
 
 def remarks_on_readings(sources: tuple[RecordingSource, ...]) -> tuple[str, ...]:
-    """Return remarks on what the sensors did not show: pauses, and values beyond a limit."""
+    """Return remarks on gaps in time and on values at the limit of a sensor."""
     remarks = []
     for source in sources:
         gap = longest_gap(source.recording.time)
@@ -432,5 +435,5 @@ def remarks_on_readings(sources: tuple[RecordingSource, ...]) -> tuple[str, ...]
 
 
 def pool(sources: tuple[RecordingSource, ...], name: str) -> Floats:
-    """Return a channel [SI] of all recordings, one after the other."""
+    """Return a channel [SI] of all recordings, concatenated."""
     return np.concatenate([source.recording[name] for source in sources])

@@ -1,7 +1,7 @@
-"""Tolerances of bench and parameter set: the table [bench], the defaults, and the one rule for priors.
+"""Tolerances of bench and parameter set: table [bench], defaults, and conversion to priors.
 
-Usual errors of sensors and supply are those of ``usual_errors.py``. A set states half a 95 % interval, which is 1.96
-standard deviations.
+Usual errors of sensors and supply are defined in ``usual_errors.py``. A set states the half-width of a 95 % interval,
+which is 1.96 standard deviations.
 """
 
 import math
@@ -26,7 +26,7 @@ from ppafo.units import parse_quantity
 Sensed = Literal["zero", "gain"]
 
 GAS_TEMPERATURE, GAS_LAW = 15.0, 0.01
-"""Limits of the gas temperature [K] and of the departure from the ideal gas law [-] where nobody states one."""
+"""Default limits of the gas temperature error [K] and of the relative departure from the ideal gas law [-]."""
 
 HELD = {
     "gas.molar_mass": GAS_LAW,
@@ -47,17 +47,17 @@ HELD = {
     "valve.discharge_coefficient": 0.1,
     "valve.sonic_conductance": 0.1,
 }
-"""Limits [-] of numbers of which nobody states an uncertainty, over the number; ``valve`` is the chosen valve."""
+"""Default relative limits [-] of parameters without a stated uncertainty; ``valve`` is the chosen valve."""
 
 _OTHER_SETTING = 0.1
-"""Limit [-] of a setting of the valve, an effect or an actuator of another kind."""
+"""Default relative limit [-] of all other parameters, such as settings of valves and effects."""
 
 _LARGEST_FRACTION = 0.5
-"""Largest limit of a gain [-]: beyond it a sensor is broken and not inexact."""
+"""Largest relative limit [-] that may be stated; beyond it a sensor is broken rather than inaccurate."""
 
 
 class BenchSection(StrictTable):
-    """Tolerances of the bench: limits on either side; 0 for an exact value."""
+    """Tolerances of the bench as limits (+-); 0 for an exact value."""
 
     load: Annotated[Text | None, Field(description="of the external torque, of each recording; default 2 %")] = None
     supply: Annotated[Text | None, Field(description="of each supply pressure, of each recording; 1 psi_d")] = None
@@ -99,9 +99,9 @@ class BenchSection(StrictTable):
 
 @dataclass(frozen=True, slots=True)
 class Tolerances:
-    """Limits on either side of what a bench does not know exactly, in SI units or as a fraction; 0 is known.
+    """Limits (+-) of the uncertain quantities of a bench, in SI units or as fractions; 0 for an exact quantity.
 
-    None takes the default of the channel or number. Those ``each_recording`` names are others in each recording.
+    None means the default of the channel or parameter. Errors named in ``each_recording`` differ between recordings.
     """
 
     load: float = 0.02
@@ -120,11 +120,11 @@ class Tolerances:
     each_recording: tuple[Sensed, ...] = ()
 
     def zero_of(self, channel: str) -> float:
-        """Return the limit of the zero of a channel [rad], [Pa]."""
+        """Return the limit of the zero error of a channel [rad], [Pa]."""
         return self.zero_of_angle if channel == "angle" else self.zero_of_pressure
 
     def gain_of(self, channel: str) -> float:
-        """Return the limit of the gain of a channel [-]; an angle sensor counts as exact where nothing is stated."""
+        """Return the limit of the gain error of a channel [-]; default 0 for an angle sensor."""
         # Of an angle alone a gain is one of all its numbers, which no fit tells from it.
         usual = 0.0 if channel == "angle" else PRESSURE_ERRORS.gain
         return usual if self.gain is None else self.gain
@@ -135,10 +135,10 @@ class Tolerances:
         return GAS_LAW if self.gas_law is None else self.gas_law
 
     def deviation_of(self, path: str, value: float, half_width: float) -> float:
-        """Return the standard deviation of a number that is held at a ``value`` [SI].
+        """Return the standard deviation of a fixed parameter, given its ``value`` [SI].
 
-        The first that is there counts: a limit that the bench states of this number, the ``half_width`` of the 95 %
-        interval that the set states, the limit of ``held``, the default by kind.
+        In order of precedence: the limit that the bench states for this parameter; the ``half_width`` of the 95 %
+        interval stated in the set; the limit ``held``; the default by kind of parameter.
         """
         gas_law = None if self.gas_law is None else abs(value) * self.gas_law
         # What was measured on the day counts before what a set says of any day.
@@ -153,7 +153,7 @@ class Tolerances:
 
 
 DEFAULTS = Tolerances()
-"""Tolerances of a bench without a section [bench]."""
+"""Tolerances of a bench without a table [bench]."""
 
 _UNITS = {
     "load": "1",
@@ -173,7 +173,7 @@ _UNITS = {
 
 
 def tolerances_of(section: BenchSection | None, file: str) -> Tolerances:
-    """Return the tolerances of a table [SI], defaults without one; IdentificationError for one below 0."""
+    """Return the tolerances of a table [SI], or the defaults. Raises IdentificationError for a negative limit."""
     limits = {}
     for name, unit in _UNITS.items():
         text = None if section is None else getattr(section, name)
@@ -189,9 +189,9 @@ def tolerances_of(section: BenchSection | None, file: str) -> Tolerances:
 
 
 def quantity_of(said: str, text: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Return the number in a text of a problem file in ``unit``; ``said`` is file and key.
+    """Return the number in a text of a problem file, in ``unit``; ``said`` is the file and key in messages.
 
-    IdentificationError where the text does not fit the unit.
+    Raises IdentificationError if the text does not fit the unit.
     """
     with refused_as(IdentificationError, f"{said} = '{text}'", UnitError):
         return parse_quantity(text, unit, atmosphere)

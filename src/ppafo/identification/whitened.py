@@ -1,4 +1,4 @@
-"""Residuals and their Jacobian with the noise made white: the linear problem at a point, and its least squares."""
+"""Whitened residuals and Jacobian: linearised least-squares problem at a point, and its solution."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -11,19 +11,21 @@ from ppafo.identification.residuals import FitRuns, Flags
 from ppafo.signals.recording import Floats
 
 _OF_ANY_SIZE = 1.0e8
-"""Standard deviation of an error of which nothing is known, over the noise [-]."""
+"""Standard deviation, relative to the noise [-], of an error of unknown magnitude."""
 _ROUNDS = 20
-"""Rounds of noise and numbers at most; most fits settle in a few."""
+"""Largest number of iterations between noise and variables; most fits converge in a few."""
 
 _RANK = 1.0e-13
-"""Eigenvalue [-] of scaled numbers from which they are seen."""
+"""Least eigenvalue of the scaled curvature [-] of an observable direction."""
 
 
 class Linear(NamedTuple):
-    """Residuals and Jacobian whitened [-] side by side, root of the covariance of scaled numbers, noise by channel.
+    """Linearised least-squares problem.
 
-    ``shared`` are columns [-] of what rows have in common: errors of all samples of a recording, and samples that are
-    left out. Rows less ``shared`` times their products with it have errors that are independent.
+    ``rows``: whitened residuals and Jacobian [-], side by side. ``shared``: columns [-] for correlated errors, common
+    to the samples of a recording or covering the samples left out; after subtraction of ``shared @ (shared.T @ x)`` the
+    errors are independent. ``root``: square root of the covariance of the scaled variables. ``noise``: noise of each
+    row [SI]. ``sensors``: noise model by channel.
     """
 
     rows: Floats
@@ -34,10 +36,10 @@ class Linear(NamedTuple):
 
 
 def linear_at(work: FitRuns, point: Floats, left: Floats, slopes: Floats) -> tuple[Linear, Floats]:
-    """Return the problem whitened at a point, and the step to its least squares within the bounds.
+    """Return the whitened problem at a point, and the step to its least-squares solution within the bounds.
 
-    What the numbers absorb of the noise is missing in the residuals; its expectation J C J' is added until both agree
-    (expectation and maximisation), so that slow noise is not taken for little noise.
+    Fitting absorbs part of the noise, which is then missing in the residuals. The expected part J C J' is added and the
+    noise re-estimated until both agree (expectation maximisation), so that slow noise is not underestimated.
     """
     step, hidden = np.zeros(len(point)), np.zeros((len(left), 0))
     limits = work.low - point - 1.0e-300, work.high - point + 1.0e-300
@@ -79,9 +81,9 @@ def linear_at(work: FitRuns, point: Floats, left: Floats, slopes: Floats) -> tup
 
 
 def root_of_inverse(curvature: Floats) -> tuple[Floats, Flags]:
-    """Return a matrix whose product with its transpose is the inverse, and which of its columns are seen at all.
+    """Return a square root of the inverse of a matrix, and flags of its columns that belong to observable directions.
 
-    The others are large, of numbers or combinations that nothing fixes.
+    The columns of unobservable directions are large.
     """
     sizes = np.sqrt(np.maximum(np.diag(curvature), 0.0))
     size = np.where(sizes > 1.0e-9 * sizes.max(initial=0.0), sizes, sizes.max(initial=1.0e-9) or 1.0)
@@ -90,7 +92,7 @@ def root_of_inverse(curvature: Floats) -> tuple[Floats, Flags]:
 
 
 def whitened_errors(work: FitRuns, left: Floats, linear: Linear) -> Floats:
-    """Return residuals [SI] (rows, points) as independent errors [-], by the noise of a linear problem."""
+    """Return residuals [SI] (rows, points) as independent errors [-], using the noise of a linearised problem."""
     scaled = left / linear.noise[:, None]
     kinds = {channel: replace(noise, deviation=1.0) for channel, noise in linear.sensors.items()}
     errors = np.concatenate([whiten(scaled[block.rows], kinds[block.channel]) for block in work.blocks])
@@ -98,11 +100,11 @@ def whitened_errors(work: FitRuns, left: Floats, linear: Linear) -> Floats:
 
 
 def squares_of(work: FitRuns, errors: Floats, points: Floats) -> Floats:
-    """Return the sums of squares [-] of whitened errors (rows, points) and of priors, for each scaled point."""
+    """Return the sum of squares [-] of whitened errors (rows, points) and priors, for each scaled point."""
     away = (points - work.mean[:, None]) * work.prior[:, None]
     return np.asarray(np.square(errors).sum(axis=0) + np.square(away).sum(axis=0))
 
 
 def cost_of(work: FitRuns, left: Floats, point: Floats, linear: Linear) -> float:
-    """Return the sum of squares [-] of whitened residuals [SI] (rows,) and priors at one scaled point."""
+    """Return the sum of squares [-] of priors and whitened residuals, given residuals [SI] (rows,) at a point."""
     return float(squares_of(work, whitened_errors(work, left[:, None], linear), point[:, None])[0])

@@ -1,4 +1,4 @@
-"""Numbers and sentences of a fit as people read them: units, digits, what widens an interval, who disagrees."""
+"""Presentation of fit results: units, digits, sources of uncertainty, and conflicting readings, in words."""
 
 import math
 
@@ -9,19 +9,19 @@ from ppafo.units.shown import shown_unit, shown_value
 from ppafo.units.spelling import split_pressure_kind
 
 _DIFFERENCES = {"Pa": "Pa_d"}
-"""Unit in SI to the one of a difference."""
+"""Unit of a difference by SI unit."""
 _SMALLEST, _LARGEST = 1.0e-2, 1.0e5
-"""Sizes between which a number is written without a power of ten."""
+"""Range of magnitudes written without a power of ten."""
 _SEVERAL = {"readings", "commands"}
-"""Words of groups that are more than one."""
+"""Last words of group names that are plural."""
 _SHARE, _MOST_NAMED = 0.05, 3
-"""Smallest fraction of the variance for which a tolerance is named, and how many are."""
+"""Least fraction of the variance [-] for which a tolerance is named, and largest number of tolerances named."""
 
 
 def in_shown_unit(number: float, unit: str, stated: str = "") -> tuple[float, str]:
-    """Number and unit for display: the file's unit if ``stated``, else the one that is shown.
+    """Return number and unit for display: in the unit ``stated`` in the file, or else in the display unit.
 
-    A pressure that a file has as gauge is shown absolute, as it is kept.
+    A pressure stated as gauge is shown absolute, as it is stored.
     """
     si_unit = _DIFFERENCES.get(unit, unit)
     shown = stated or shown_unit(si_unit)
@@ -31,7 +31,7 @@ def in_shown_unit(number: float, unit: str, stated: str = "") -> tuple[float, st
 
 
 def with_error(value: float, error: float) -> str:
-    """Return a value with its standard error, ``480.5 +- 6.9``: two digits of the error, and as many of the value."""
+    """Return a value with its standard error, ``480.5 +- 6.9``: two significant digits of the error, value to match."""
     if not (math.isfinite(value) and math.isfinite(error) and error > 0.0):
         return f"{value:.4g} +- {error:.2g}"
     size = max(abs(value), error)
@@ -52,7 +52,7 @@ def widened_by(fitted: Fit, name: str) -> str:
 
 
 def conflict_in_words(fitted: Fit, remedy: str) -> str:
-    """Return which readings alone give other values than all together, and a remedy; empty where they agree."""
+    """Return a sentence on the readings that contradict the others, with a remedy; empty if all agree."""
     conflict = fitted.conflict
     if conflict is None:
         return ""

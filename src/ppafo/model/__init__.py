@@ -1,1 +1,1 @@
-"""The physics: pure functions on floats, one module per component. No engine, no files, no units."""
+"""Physics as pure functions on floats, one module per component. Independent of engine, files and unit conversion."""

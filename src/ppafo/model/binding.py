@@ -1,7 +1,7 @@
-"""Functions with parts: one formula for many devices, which is given the functions that differ as an argument.
+"""Functions with parts: one formula for many devices; the functions that differ between devices are an argument.
 
-A function of this kind takes ``*, parts: P``, where ``P`` is a NamedTuple of functions, of row classes, of constants or
-of further parts, and calls ``parts.NAME(...)``. ``made_of`` gives it its parts; the engine compiles each of them in.
+Such a function takes ``*, parts: P``, where ``P`` is a NamedTuple of functions, of row classes, of constants or
+of further parts, and calls ``parts.NAME(...)``. ``made_of`` binds the parts; the engine compiles each of them in.
 """
 
 import types
@@ -13,14 +13,14 @@ from ppafo.model.declaration import PlainFunction
 
 
 class Frame(NamedTuple):
-    """Origin of a function that has been given its parts: the function as written, and the parts."""
+    """Origin of a function with bound parts: the original function, and the parts."""
 
     function: PlainFunction
     parts: Any
 
 
 class Recipe(NamedTuple):
-    """Picklable form of a function that no module has: the frame, the name and the parts of which it is made anew."""
+    """Picklable form of a function that no module defines: frame, name and parts from which it is rebuilt."""
 
     frame: Any
     name: str
@@ -28,30 +28,30 @@ class Recipe(NamedTuple):
 
 
 def is_made_of(value: object) -> bool:
-    """True for the parts of a function: a NamedTuple with a function, a class or further parts in it."""
+    """Return whether a value is parts of a function: a NamedTuple with a function, a class or further parts."""
     if not isinstance(value, tuple) or not hasattr(value, "_fields"):
         return False
     return any(isinstance(part, types.FunctionType | type) or is_made_of(part) for part in value)
 
 
 def frame_of(function: PlainFunction) -> Frame | None:
-    """Return what ``made_of`` made a function from; None for any other."""
+    """Return the original function and parts of a function made by ``made_of``; None for any other function."""
     found: Frame | None = vars(function).get("frame")
     return found
 
 
 def parts_of(function: PlainFunction) -> Any:
-    """Return the parts of a function with ``*, parts``, by its default or by ``made_of``; None where it has none."""
+    """Return the parts of a function with ``*, parts``, from its default or from ``made_of``; None if it has none."""
     return (getattr(function, "__kwdefaults__", None) or {}).get("parts")
 
 
 # Far more than the laws, valves and actuators of a process; a table is among the parts of its actuator.
 @lru_cache(maxsize=1024)
 def made_of(frame: PlainFunction, name: str, parts: tuple[Any, ...]) -> PlainFunction:
-    """Return a function whose last parameter is ``*, parts``, with these parts as the default, under another name.
+    """Return a function whose last parameter is ``*, parts``, with the given parts as default, under another name.
 
-    Equal parts give the same function, so that what has it is equal too: a scenario that is loaded twice, or in another
-    order of its overrides.
+    Equal parts give the same function object, so that values containing it compare equal: a scenario that is loaded
+    twice, or with its overrides in another order, equals the first one.
     """
     function: Any = frame
     # The name and module decide the name in the composed text, where two laws must not share one.
@@ -63,7 +63,7 @@ def made_of(frame: PlainFunction, name: str, parts: tuple[Any, ...]) -> PlainFun
 
 
 def recipe_of(value: Any) -> Any:
-    """Picklable form of a value: recipes in the place of functions that were given parts, also inside of tuples."""
+    """Picklable form of a value: functions with bound parts are replaced by recipes, also inside tuples."""
     frame = frame_of(value) if isinstance(value, types.FunctionType) else None
     if frame is None:
         return _item_by_item(recipe_of, value)
@@ -71,7 +71,7 @@ def recipe_of(value: Any) -> Any:
 
 
 def by_recipe(value: Any) -> Any:
-    """Value whose picklable form is given: in one process, the same functions as before."""
+    """Value rebuilt from its picklable form; within one process, with the same function objects."""
     if isinstance(value, Recipe):
         return made_of(by_recipe(value.frame), value.name, by_recipe(value.parts))
     return _item_by_item(by_recipe, value)

@@ -1,4 +1,4 @@
-"""The valves, actuators and effects that a device can have. To add one: a module in their folder and one line here.
+"""Valves, actuators and effects that a device can have. To add one: a module in their folder and one line here.
 
 Kinds of other packages are found by their entry points.
 """
@@ -57,13 +57,13 @@ EFFECTS: Kinds[Effect] = Kinds(
         "bandwidth": bandwidth.EFFECT,
     },
 )
-"""Effects whose settings stand in another part's section are named by no path: they are loaded from the beginning."""
+"""Effects by name. An effect with settings in another part's section is loaded at the start, as no path names it."""
 
 
 def find_effects(paths: Iterable[str]) -> None:
-    """Load the effects that some paths name, also from other packages.
+    """Load the effects named by some paths, also from other packages.
 
-    KindError for an effect that exists and cannot be used.
+    Raises KindError for an effect that exists but cannot be used.
     """
     for path in paths:
         section, _, rest = path.partition(".")
@@ -78,7 +78,7 @@ def find_effects(paths: Iterable[str]) -> None:
 
 
 def ordered_effects() -> tuple[Effect, ...]:
-    """Return all effects that are loaded, in the order in which they act: the package's own first, then by name."""
+    """Return all loaded effects in the order in which they act: the package's own first, then by name."""
     loaded = EFFECTS.loaded()
     # Entry points come in no order: sorted, a composed program has the same bits on every computer.
     others = sorted((effect for name, effect in loaded.items() if not EFFECTS.is_own(name)), key=lambda item: item.name)
@@ -86,5 +86,5 @@ def ordered_effects() -> tuple[Effect, ...]:
 
 
 def device_effects() -> tuple[Effect, ...]:
-    """Return the effects whose settings stand in parameter sets, in the order in which they act."""
+    """Return the effects whose settings are in parameter sets, in the order in which they act."""
     return tuple(effect for effect in ordered_effects() if effect.is_of_device)

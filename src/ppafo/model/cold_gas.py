@@ -1,11 +1,11 @@
-"""Gas that comes cold out of a regulator: throttled at constant enthalpy, warmed by the regulator's body and the hose.
+"""Cold gas downstream of a regulator: throttled at constant enthalpy, warmed by the regulator's body and the hose.
 
-A throttle keeps the enthalpy, and the vapour over liquid CO2 has less of it than the gas at room temperature has: it
-comes out cold, or partly as dry ice where the outlet lies below the pressure of the triple point. What it lacks it
-takes from the parts that it passes. A part has one temperature; gas that passes it takes up a fixed share, the
-effectiveness, of what would bring it to that temperature, since in turbulent flow the transfer grows nearly as the
-flow does (with its power 0.8, Dittus and Boelter). Dry ice stays in the seat and narrows it until gas with enough
-enthalpy takes it along.
+A throttle keeps the enthalpy, and the vapour over liquid CO2 has less enthalpy than the gas at room temperature: it
+leaves the throttle cold, or partly as dry ice where the outlet is below the triple-point pressure. The gas takes heat
+from the parts through which it flows. Each part has one temperature, and the gas takes up a fixed fraction of the heat
+that would bring it to this temperature, the effectiveness, because in turbulent flow the heat transfer grows nearly
+with the flow (power 0.8, Dittus and Boelter). Dry ice stays in the seat of the regulator and narrows it until gas with
+enough enthalpy removes it.
 """
 
 import math
@@ -35,13 +35,13 @@ from ppafo.model.source import (
 )
 
 DRY_ICE = 5.55e5
-"""Heat that turns dry ice into vapour at the triple point [J/kg]: 350 of evaporation (tables), 205 of melting (CRC)."""
+"""Heat of sublimation at the triple point [J/kg]: 350 000 of evaporation (tables), 205 000 of melting (CRC)."""
 
 LARGEST_CHANGE = 0.2
-"""Share of a difference of temperature that a step of Heun's rule may even out; above 2 it would swing up."""
+"""Largest fraction of a temperature difference equalised by one step of Heun's rule; above 2 the rule is unstable."""
 
 _LEAST_HEAT_CAPACITY = 2.5
-"""Heat capacity of air, nitrogen or CO2 at constant volume over the gas constant [-], at least."""
+"""Lower bound for the heat capacity at constant volume divided by the gas constant [-], for air, nitrogen and CO2."""
 
 # First difference [K] of the secants, difference [K] that is none, and how many are tried before a search in the whole
 # table.
@@ -49,7 +49,7 @@ _FIRST_SECANT, _SAME_TEMPERATURE, _MAXIMUM_SECANTS = 1.0e-3, 1.0e-9, 12
 
 
 class Passage(NamedTuple):
-    """A part that the gas passes: heat capacity [J/K], effectiveness [-], heat per kelvin from the room [W/K]."""
+    """Part through which the gas flows: heat capacity [J/K], effectiveness [-], heat transfer from the room [W/K]."""
 
     heat_capacity: float
     effectiveness: float
@@ -57,9 +57,9 @@ class Passage(NamedTuple):
 
 
 class Isobar(NamedTuple):
-    """Gas at one pressure [Pa]: enthalpies [J/kg] at temperatures [K], straight between; ``freezes`` 1 where ice forms.
+    """Gas at one pressure [Pa]: enthalpies [J/kg] at temperatures [K], linear between; ``freezes`` 1 where ice forms.
 
-    The first node is where the gas begins to condense or to freeze, or where the table begins.
+    The first node is where the gas starts to condense or to freeze, or the start of the table.
     """
 
     pressure: float
@@ -69,7 +69,7 @@ class Isobar(NamedTuple):
 
 
 class ColdSupply(NamedTuple):
-    """A bottle with what stands behind it: volume [m^3], wall, regulator with the room for ice in its seat [kg], hose.
+    """Bottle with downstream parts: volume [m^3], wall, regulator, its body, ice capacity of the seat [kg], hose.
 
     ``room_temperature`` [K]; ``heat_capacity_ratio`` [-] of the gas.
     """
@@ -87,7 +87,7 @@ class ColdSupply(NamedTuple):
 class SupplyState(NamedTuple):
     """State of a supply: ``BottleState``, temperatures of regulator and hose [K], dry ice in the seat [kg].
 
-    Totals since the start [J]: enthalpy that left the bottle, enthalpy delivered, heat from the room into all parts.
+    Totals since the start [J]: enthalpy out of the bottle, enthalpy delivered, heat from the room into all parts.
     """
 
     mass: float
@@ -102,9 +102,9 @@ class SupplyState(NamedTuple):
 
 
 class SupplyNow(NamedTuple):
-    """Capability of a supply: content of the bottle, highest pressure [Pa] and flow [kg/s] of its regulator.
+    """Capability of a supply: content of the bottle, and largest pressure [Pa] and flow [kg/s] of its regulator.
 
-    ``outlet_temperature`` of the gas behind the regulator and ``gas_temperature`` behind the hose [K].
+    ``outlet_temperature`` is the gas temperature after the regulator, ``gas_temperature`` after the hose [K].
     """
 
     content: BottleContent
@@ -115,7 +115,7 @@ class SupplyNow(NamedTuple):
 
 
 def isobar(table: FluidTable, pressure: float) -> Isobar:
-    """Enthalpies of a gas at a pressure [Pa], at the temperatures of its table from where it is dry gas."""
+    """Enthalpies of a gas at a pressure [Pa], for the temperatures of its table at which it is dry gas."""
     # At a lower node the gas would condense before it reached the pressure.
     dry = [node for node in table.temperatures if fluid_pressure(table, node, densest_gas(table, node)) >= pressure]
     enthalpies = tuple(gas_enthalpy(table, node, pressure) for node in dry)
@@ -133,35 +133,35 @@ def gas_enthalpy(table: FluidTable, temperature: float, pressure: float) -> floa
 
 
 def enthalpy_at(line: Isobar, temperature: float) -> float:
-    """Specific enthalpy [J/kg] on an isobar at a temperature [K]; its ends hold outside it."""
+    """Specific enthalpy [J/kg] on an isobar at a temperature [K]; constant outside of its ends."""
     return between(line.enthalpies, place_among(line.temperatures, temperature))
 
 
 def temperature_at(line: Isobar, enthalpy: float) -> float:
-    """Temperature [K] on an isobar at a specific enthalpy [J/kg]; below its first node the gas is wet and as cold."""
+    """Temperature [K] on an isobar at a specific enthalpy [J/kg]; constant below the first node (wet gas)."""
     return between(line.temperatures, place_among(line.enthalpies, enthalpy))
 
 
 def enthalpy_behind(line: Isobar, passage: Passage, part_temperature: float, enthalpy: float) -> float:
-    """Specific enthalpy [J/kg] of gas behind a part at a temperature [K] that it reached with ``enthalpy`` [J/kg]."""
+    """Specific enthalpy [J/kg] of gas after a part at a temperature [K], for the inlet enthalpy ``enthalpy`` [J/kg]."""
     return enthalpy + passage.effectiveness * (enthalpy_at(line, part_temperature) - enthalpy)
 
 
 def heat_to_warm(table: FluidTable, content: BottleContent, temperature: float, pressure: float) -> float:
-    """Heat [J/kg] that brings what leaves a bottle to a temperature [K] at a pressure [Pa] behind the regulator."""
+    """Heat [J/kg] that brings the outflow of a bottle to a temperature [K] at the pressure [Pa] after the regulator."""
     return gas_enthalpy(table, temperature, pressure) - content.outflow_enthalpy
 
 
 def open_share(supply: ColdSupply, ice: float) -> float:
-    """Share of the seat [-] that dry ice [kg] leaves open."""
+    """Fraction of the seat [-] that dry ice [kg] leaves open."""
     return max(0.0, 1.0 - ice / supply.ice_capacity)
 
 
 def ice_rate(line: Isobar, enthalpy: float, flow: float, ice: float, step: float) -> float:
-    """Growth of the dry ice in the seat [kg/s] while gas comes with an enthalpy [J/kg]; no more goes than is there.
+    """Growth rate of the dry ice in the seat [kg/s] for a gas enthalpy [J/kg]; no more ice is removed than there is.
 
-    What the gas lacks at the temperature where ice forms is taken from it as ice, and what it has beyond takes ice off:
-    ``flow`` [kg/s] goes on behind the seat, and flow plus growth comes from the bottle.
+    Gas with less enthalpy than the freezing point deposits ice, gas with more removes ice. ``flow`` [kg/s] is the flow
+    downstream of the seat; the flow out of the bottle is ``flow`` plus the growth rate.
     """
     if line.freezes < 0.5:
         return 0.0
@@ -171,10 +171,10 @@ def ice_rate(line: Isobar, enthalpy: float, flow: float, ice: float, step: float
 
 
 def enthalpy_behind_seat(line: Isobar, enthalpy: float, ice: float, mass: float) -> float:
-    """Specific enthalpy [J/kg] of a mass of gas [kg] behind a seat with dry ice [kg]; it comes with ``enthalpy``.
+    """Specific enthalpy [J/kg] of a mass of gas [kg] after a seat with dry ice [kg]; ``enthalpy`` is at the inlet.
 
-    It is as cold as the ice while there is some, warmer as far as the gas has more than all of the ice takes. The ice
-    that goes is part of the mass.
+    The gas is as cold as the ice while there is some, and warmer by the enthalpy that remains after all ice is removed.
+    The removed ice is part of the mass.
     """
     if line.freezes < 0.5:
         return enthalpy
@@ -188,7 +188,7 @@ def supply_now(
 ) -> SupplyNow:
     """Capability of a supply in a state with a content ``near`` a temperature [K]: pressure, flow and temperature.
 
-    ``mass`` [kg] is what the device draws in a step, the last one for the next, which dry ice cools while it lasts.
+    ``mass`` [kg] is the gas demand of the device in a step, taken from the previous step; dry ice cools this mass.
     """
     content = _content(table, supply, state, near)
     regulator = supply.regulator
@@ -223,11 +223,11 @@ def advance_supply(
     mass: float,
     step: float,
 ) -> SupplyState:
-    """The state after a step [s] in which a mass [kg] went on behind the seat evenly, by Heun's rule.
+    """State after a step [s] in which a mass [kg] passed the seat at a constant rate, by Heun's rule.
 
-    ``content`` of the bottle before it. The step is cut where little gas, or a part of little heat capacity,
-    follows faster than that rule does. SimulationError where the bottle holds no more than that: nobody can have drawn
-    it.
+    ``content`` is the content of the bottle before the step. The step is subdivided where little gas, or a part of
+    small heat capacity, responds too fast for the rule. Raises SimulationError if the bottle contains no more than the
+    mass.
     """
     if mass >= state.mass:
         raise SimulationError(
@@ -256,7 +256,7 @@ def advance_supply(
 
 
 def following_rates(table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float) -> dict[str, float]:
-    """The rates [1/s], by name, at which content, wall, regulator and hose follow what is around them, at most.
+    """Upper bounds of the rates [1/s], by name, at which content, wall, regulator and hose approach their surroundings.
 
     ``mass`` [kg] of gas in the bottle, ``flow`` [kg/s] through the regulator.
     """
@@ -278,7 +278,7 @@ def following_rates(table: FluidTable, line: Isobar, supply: ColdSupply, mass: f
 def supply_rates(
     line: Isobar, supply: ColdSupply, state: SupplyState, content: BottleContent, flow: float, step: float
 ) -> SupplyState:
-    """Time derivatives of a state under a flow [kg/s] behind the seat, as a state, to hold for a ``step`` [s]."""
+    """Time derivatives of a state for a flow [kg/s] downstream of the seat, as a state, valid for a ``step`` [s]."""
     arriving = enthalpy_behind(line, supply.body, state.body_temperature, content.outflow_enthalpy)
     growth = ice_rate(line, arriving, flow, state.ice, step)
     leaving = flow + growth
@@ -302,7 +302,7 @@ def supply_rates(
 
 
 def _content(table: FluidTable, supply: ColdSupply, state: SupplyState, near: float) -> BottleContent:
-    """Content of the bottle, whose temperature [K] is found by secants from one that is ``near``."""
+    """Content of the bottle; the temperature [K] is found by the secant method, starting at ``near``."""
     # A step changes the temperature by little: two or three secants find it without a search in the whole table.
     mass, volume, energy = state.mass, supply.volume, state.energy
     before, after = near, near + _FIRST_SECANT

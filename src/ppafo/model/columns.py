@@ -1,7 +1,7 @@
 """Functions of floats applied to columns: one value for each run of an ensemble.
 
-Plain arithmetic works on floats and on arrays (runs,) alike, bit for bit. What branches or takes a power or an
-exponential does not; here such a function is called as it is, once for each combination of values that occurs.
+Plain arithmetic gives the same bits on floats and on arrays (runs,). Functions with branches, powers or exponentials do
+not accept arrays; here such a function is called unchanged, once for each distinct combination of values.
 """
 
 import math
@@ -12,18 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 Numeric = TypeVar("Numeric", float, NDArray[np.float64])
-"""A float, or an array (runs,) of them: what a function of plain arithmetic takes and gives back."""
+"""Float or array (runs,) of floats, as argument and result of a function of plain arithmetic."""
 Result = TypeVar("Result")
 """Return type of a function of floats."""
 Problem = tuple[Any, Callable[[int], str]]
-"""Possible fault of runs: a truth value for all or an array (runs,), and the message about one of them.
+"""Possible fault of runs: a truth value for all or an array (runs,), and a function for the message about one run.
 
-The message is made of the number of a run, from 0; it is one line, as an error shows it.
+The function takes the number of a run, from 0, and returns one line.
 """
 
 
 def over_runs(function: Callable[..., Result], *arguments: Any) -> Result:
-    """Result of a function of floats; where an argument is an array (runs,), every number of it is one too.
+    """Apply a function of floats; if an argument is an array (runs,), every number of the result is one too.
 
     The function returns a float or a tuple, nested ones and NamedTuples among them, of the same shape for all runs.
     """
@@ -44,36 +44,36 @@ def over_runs(function: Callable[..., Result], *arguments: Any) -> Result:
 
 
 def root(number: Numeric) -> Numeric:
-    """Square root of a number; element by element for a column."""
+    """Square root of a number; elementwise for a column."""
     return np.sqrt(number) if isinstance(number, np.ndarray) else math.sqrt(number)
 
 
 def larger(first: Any, second: Any) -> Any:
-    """The larger of two numbers; where one is a column, run by run."""
+    """Larger of two numbers; elementwise for columns."""
     if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):
         return np.maximum(first, second)
     return max(first, second)
 
 
 def smaller(first: Any, second: Any) -> Any:
-    """The smaller of two numbers; where one is a column, run by run."""
+    """Smaller of two numbers; elementwise for columns."""
     if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):
         return np.minimum(first, second)
     return min(first, second)
 
 
 def choose(test: Any, yes: Any, no: Any) -> Any:
-    """The first number where a test holds, else the second; where one of the three is a column, run by run."""
+    """First number where a test holds, else the second; elementwise for columns."""
     return np.where(test, yes, no) if isinstance(test, np.ndarray) else (yes if test else no)
 
 
 def truncated(number: Numeric) -> Numeric:
-    """A number from -2^63 to 2^63 without its fraction, as a float; element by element for a column."""
+    """Integer part of a number from -2^63 to 2^63, as a float; elementwise for a column."""
     return np.trunc(number) if isinstance(number, np.ndarray) else float(int(number))
 
 
 def rounded_up(number: Numeric) -> Numeric:
-    """The next whole number from a number on, as a float; element by element for a column."""
+    """Smallest integer not below a number, as a float; elementwise for a column."""
     # One expression for floats and columns, where math.ceil would give an int.
     part = truncated(number)
     found: Numeric = choose(part < number, part + 1.0, part)
@@ -81,22 +81,22 @@ def rounded_up(number: Numeric) -> Numeric:
 
 
 def whole(number: Any) -> Any:
-    """A whole number as an int; an array of them as one of integers."""
+    """Integer value of a number without fraction, as an int; as an array of integers for a column."""
     return number.astype(np.int64) if isinstance(number, np.ndarray) else int(number)
 
 
 def at(number: Any, run: int) -> float:
-    """The number of one run, in its own unit."""
+    """Value for one run, in the unit of the number."""
     return float(number[run]) if isinstance(number, np.ndarray) else float(number)
 
 
 def first(number: Any) -> float:
-    """The number of the first run, in its own unit."""
+    """Value for the first run, in the unit of the number."""
     return at(number, 0)
 
 
 def _distinct(columns: Sequence[NDArray[np.float64]]) -> tuple[Iterable[Sequence[float]], NDArray[np.intp]]:
-    """The combinations of values of columns (runs,) that occur, and the number of the one that each run has (runs,)."""
+    """Distinct combinations of values of columns (runs,), and the index of the combination of each run (runs,)."""
     if len(columns) == 1:
         # One column is sorted as numbers, several as rows, which takes many times longer.
         values, value_of_run = np.unique(columns[0], return_inverse=True)
@@ -109,7 +109,7 @@ def _distinct(columns: Sequence[NDArray[np.float64]]) -> tuple[Iterable[Sequence
 
 
 def _gather(results: Sequence[Any], combination_of_run: NDArray[np.intp]) -> Any:
-    """The result of each run from those of the combinations: an array (runs,), or a tuple of them."""
+    """Result of each run, taken from the results of the combinations: an array (runs,), or a tuple of arrays."""
     first_result = results[0]
     if not isinstance(first_result, tuple):
         return np.array(results, dtype=np.float64)[combination_of_run]

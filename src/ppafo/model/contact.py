@@ -1,8 +1,8 @@
-"""The foot on the ground: four states, which of them a step ends in, and the forces under heel and toes.
+"""Foot on the ground: four contact states, the state after a step, and the forces under heel and toes.
 
-In the swing and while it rolls on the heel the foot moves by its own dynamics; flat on the ground it stands still and
-the ankle follows the shank; rolling over the toes the ankle follows the measured gait. A difference of angle at a
-hand-over fades, so that the ankle does not jump.
+In the swing and while rolling on the heel the foot moves by its own dynamics. A flat foot stands still and the ankle
+follows the shank. While rolling over the toes the ankle follows the measured gait. At a transition the difference of
+the ankle angles decays, so that the ankle does not jump.
 """
 
 from typing import NamedTuple
@@ -17,17 +17,17 @@ FLAT = 2.0
 TOE = 3.0
 
 FADING_TIME = 0.02
-"""Time [s] in which a difference of angle at a hand-over falls to a third: about the time of a foot slap."""
+"""Time [s] in which an angle difference at a transition decays to a third: about the time of a foot slap."""
 
 NEARLY_FLAT = 0.05235987755982989
-"""The measured foot stands on heel and toes while within this angle [rad], 3 deg, of flat; beyond it the heel is up.
+"""Angle to the ground [rad], 3 deg, below which the measured foot stands on heel and toes; above it the heel is up.
 
 Assumed: pad and sole of a loaded heel yield by some millimetres, so that the toes touch before the foot is flat.
 """
 
 
 class Ankle(NamedTuple):
-    """Angle [rad], rate [rad/s] and acceleration [rad/s^2] of the ankle that the ground and the shank prescribe."""
+    """Ankle motion prescribed by ground and shank: angle [rad], rate [rad/s] and acceleration [rad/s^2]."""
 
     angle: float
     rate: float
@@ -35,7 +35,10 @@ class Ankle(NamedTuple):
 
 
 class Landing(NamedTuple):
-    """Contact after a step, offset [rad] of the ankle to what the contact prescribes, and 1 for what just happened."""
+    """Contact state after a step, offset [rad] between the ankle and its prescribed angle, and events of the step.
+
+    ``strikes`` and ``leaves`` are 1 if the foot struck or left the ground in the step.
+    """
 
     contact: float
     offset: float
@@ -44,19 +47,19 @@ class Landing(NamedTuple):
 
 
 def is_free(contact: float, keeps_gait: float) -> bool:
-    """True where the foot moves by its own dynamics; never for a wearer who keeps the gait (1)."""
+    """Return whether the foot moves by its own dynamics; never for a wearer who keeps the gait (1)."""
     return contact < 1.5 and keeps_gait < 0.5
 
 
 def foot_angle(shank: float, ankle: float) -> float:
-    """Angle [rad] of the foot over the horizontal, above 0 with the toes up, from equation (12)'s angles."""
+    """Angle [rad] of the foot to the horizontal, positive with the toes up, for the angles of equation (12)."""
     return shank - ankle + QUARTER_TURN
 
 
 def prescribed_ankle(contact: float, now: GaitNow, ground_angle: float, keeps_gait: float) -> Ankle:
-    """Ankle [rad] that the ground prescribes: a flat foot leaves it to the shank, else it is as measured.
+    """Ankle motion prescribed by the ground: by the shank for a flat foot, else as measured.
 
-    For a wearer who keeps the gait (1) it is as measured all the time.
+    For a wearer who keeps the gait (1) the ankle is always as measured.
     """
     # Contacts are whole numbers kept as floats: 1.5 and 2.5 tell FLAT from HEEL and TOE.
     flat = contact > 1.5 and contact < 2.5 and keeps_gait < 0.5
@@ -70,9 +73,9 @@ def prescribed_ankle(contact: float, now: GaitNow, ground_angle: float, keeps_ga
 def landing(
     contact: float, timing: GaitTiming, now: GaitNow, angle: float, offset: float, keeps_gait: float
 ) -> Landing:
-    """Contact at the end of a step from the contact before, and the gait and the ankle angle [rad] then.
+    """Contact state at the end of a step from the previous contact, the present gait and the ankle angle [rad].
 
-    The foot of a wearer who keeps the gait (1) rolls its last degrees slowly, while its toes carry already.
+    The foot of a wearer who keeps the gait (1) rolls its last degrees slowly, while its toes are already loaded.
     """
     # The gait says when the foot is on the ground, the device's own motion only how it comes to lie flat.
     stance = now.phase < timing.toe_off
@@ -101,13 +104,13 @@ def landing(
 
 
 SETTLES = 3.0
-"""A foot that landed on its toes stands on its heel after one part in so many of the time to heel-off."""
+"""A foot that landed on its toes stands on its heel after the time to heel-off divided by this number."""
 
 
 def heel_fraction(contact: float, timing: GaitTiming, phase: float, toes_first: float) -> float:
-    """Fraction [-] of the ground force under the heel: all while it rolls there, none on the toes, straight between.
+    """Fraction [-] of the ground force under the heel: 1 while rolling on the heel, 0 on the toes, linear in between.
 
-    A foot that met the ground with its toes (``toes_first`` 1) has none under the heel at first.
+    A foot that landed on its toes (``toes_first`` 1) starts with a fraction of 0.
     """
     passed = max(0.0, min(1.0, phase / timing.heel_off))
     flat = 1.0 - passed
@@ -118,7 +121,7 @@ def heel_fraction(contact: float, timing: GaitTiming, phase: float, toes_first: 
 
 
 def ground_lever(leg: LegParameters, tilt: float) -> float:
-    """Lever [m] of the ground force behind the ankle, for a foot tilted up [rad]: it shrinks as the heel rolls down."""
+    """Lever arm [m] of the ground force behind the ankle for a tilt [rad]; it decreases as the heel rolls down."""
     # The tilt where it is above 0, else 0, and a fraction that saturates: smooth enough for the step's error estimate.
     raised = 0.5 * (tilt + abs(tilt))
     return leg.flat_heel_lever + (leg.heel_lever - leg.flat_heel_lever) * raised / (raised + leg.heel_roll_angle)
@@ -127,9 +130,9 @@ def ground_lever(leg: LegParameters, tilt: float) -> float:
 def heel_torque(contact: float, now: GaitNow, leg: LegParameters, ground_angle: float, angle: float) -> float:
     """Torque [N m] of the ground about the ankle while the foot rolls on its heel, positive in plantarflexion.
 
-    What the measured moment leaves to the ground of the torque that moves the healthy foot or, once that is flat, the
-    force on the lever of a heel that is nearly so; and the same force on a longer lever where this foot, at an ankle
-    angle [rad], is tilted up further: the ground force has rolled less far forward, which turns a loaded foot down.
+    The torque is the part of the measured moment that does not move the healthy foot or, for a flat foot, the force
+    times the lever arm of a nearly flat heel. At an ankle angle [rad] at which this foot is tilted up further, the same
+    force has a longer lever arm: the ground force has rolled less far forward, which turns a loaded foot down.
     """
     lever = ground_lever(leg, foot_angle(now.shank, angle) - ground_angle)
     healthy = ground_lever(leg, foot_angle(now.shank, now.ankle) - ground_angle)

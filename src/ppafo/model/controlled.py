@@ -1,7 +1,7 @@
 """Controlled quantity of a law: torque of the actuator, angle, pressure in a chamber, or pressure difference.
 
-A law is given its functions as ``*, parts: ErrorFunctions``, and hands them to ``seen_error``. To add a quantity: a
-function and a line of ``CONTROLLED``.
+A law receives the functions of the quantity as ``*, parts: ErrorFunctions``, and passes them to ``seen_error``. To add
+a quantity: a function and a line of ``CONTROLLED``.
 """
 
 from collections.abc import Callable
@@ -13,11 +13,11 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
 
 TORQUE, ANGLE = "torque", "angle"
-"""Names of two that other parts of the package must tell from the rest."""
+"""Names of the two quantities that other parts of the package treat separately."""
 
 
 def controlled(angle: float, pressure_1: float, pressure_2: float, torque: float) -> float:
-    """The torque [N m], of an angle [rad], absolute pressures [Pa] and a torque [N m]."""
+    """Torque [N m] of a measurement, for a loop that controls the torque."""
     return torque
 
 
@@ -37,25 +37,25 @@ def controlled_pressure_2(angle: float, pressure_1: float, pressure_2: float, to
 
 
 def controlled_difference(angle: float, pressure_1: float, pressure_2: float, torque: float) -> float:
-    """The pressure in chamber 1 less the one in chamber 2 [Pa]."""
+    """Pressure in chamber 1 minus pressure in chamber 2 [Pa]."""
     return pressure_1 - pressure_2
 
 
 def steered(error: float) -> float:
-    """An error, in the unit of the reference, as a law acts on it: above 0 where a command above 0 is needed."""
+    """Error with the sign that a law needs: positive where a positive command is needed."""
     return error
 
 
 def turned_round(error: float) -> float:
-    """An error of what a command above 0 lowers, as a law acts on it."""
+    """Error with reversed sign, for a quantity that a positive command lowers."""
     return -error
 
 
 class ErrorFunctions(NamedTuple):
     """Functions of the error on which a law acts.
 
-    ``value(angle, pressure_1, pressure_2, torque)`` is the controlled quantity of a measurement; ``steered(error)`` the
-    error, in the unit of the reference, above 0 where a command above 0 is needed.
+    ``value(angle, pressure_1, pressure_2, torque)`` is the controlled quantity of a measurement; ``steered(error)`` is
+    the error, in the unit of the reference, positive where a positive command is needed.
     """
 
     value: Callable[[float, float, float, float], float]
@@ -63,16 +63,16 @@ class ErrorFunctions(NamedTuple):
 
 
 OF_TORQUE = ErrorFunctions(controlled, steered)
-"""Functions of a torque error, of supplies above the atmosphere: also in every walk."""
+"""Functions of a torque error for supplies above the atmosphere; also used in every walk."""
 
 
 def seen_value(measurement: Measurement, *, parts: ErrorFunctions) -> float:
-    """Controlled quantity as measured, in the unit of the reference."""
+    """Measured controlled quantity, in the unit of the reference."""
     return parts.value(measurement.angle, measurement.pressure_1, measurement.pressure_2, measurement.torque)
 
 
 def seen_error(reference: float, measurement: Measurement, *, parts: ErrorFunctions) -> float:
-    """Reference less what the sensors show of it, above 0 where a command above 0 is needed."""
+    """Reference minus measured value, positive where a positive command is needed."""
     return parts.steered(reference - seen_value(measurement, parts=parts))
 
 
@@ -87,22 +87,22 @@ class Ends(NamedTuple):
 
 
 def stops(ends: Ends) -> tuple[Any, Any]:
-    """Return the angles [rad] between which a joint turns."""
+    """Return the angles [rad] of the lower and upper stop."""
     return ends.angle_min, ends.angle_max
 
 
 def reach_of_pressure_1(ends: Ends) -> tuple[Any, Any]:
-    """Between which pressures [Pa] a valve brings chamber 1: it is fed, or vented."""
+    """Return the lowest and highest pressure [Pa] in chamber 1: vented and supplied."""
     return _in_order(ends.atmospheric_pressure, ends.supply_pressure)
 
 
 def reach_of_pressure_2(ends: Ends) -> tuple[Any, Any]:
-    """Between which pressures [Pa] a valve brings chamber 2."""
+    """Return the lowest and highest pressure [Pa] in chamber 2: vented and supplied."""
     return _in_order(ends.atmospheric_pressure, ends.dorsiflexion_pressure)
 
 
 def reach_of_difference(ends: Ends) -> tuple[Any, Any]:
-    """Between which differences of pressure [Pa] a valve brings both: one is full while the other one is vented."""
+    """Return the lowest and highest pressure difference [Pa], with one chamber supplied and the other one vented."""
     room = ends.atmospheric_pressure
     return _in_order(room - ends.dorsiflexion_pressure, ends.supply_pressure - room)
 
@@ -114,13 +114,14 @@ def _in_order(one: Any, other: Any) -> tuple[Any, Any]:
 
 @dataclass(frozen=True, slots=True)
 class ControlledQuantity:
-    """Something that a reference can be a value of.
+    """Quantity that a reference can prescribe.
 
-    ``words`` name it in a sentence, ``level`` declares a value of it, ``difference`` is the unit of a difference of two
-    values. ``value(angle, pressure_1, pressure_2, torque)`` gives it of what sensors show. ``size`` is about as much of
-    it as 1 N m is of a torque: the ranges of gains are scaled by it. A command above 0 raises it, or lowers it where
-    ``sign`` is -1; the other way round where the supplies are below the atmosphere. ``reach`` says between
-    what it can be, called ``limits`` in a sentence; None of a torque, which depends on what moves the joint.
+    ``words`` name the quantity in a sentence, ``level`` declares a value, ``difference`` is the unit of a difference of
+    two values. ``value(angle, pressure_1, pressure_2, torque)`` computes the quantity from sensor readings. ``size`` is
+    the value that corresponds to a torque of 1 N m: it scales the ranges of gains. A positive command raises the
+    quantity, or lowers it if ``sign`` is -1; the reverse if the supplies are below the atmosphere. ``reach`` returns
+    the range of the quantity, called ``limits`` in a sentence; None for a torque, which depends on the external drive
+    of the joint.
     """
 
     name: str
@@ -140,7 +141,7 @@ class ControlledQuantity:
 
     @property
     def reference(self) -> str:
-        """The channel of its reference in a recording."""
+        """Channel of the reference of this quantity in a recording."""
         return "reference" if self.name == TORQUE else f"reference_{self.name}"
 
     @property
@@ -150,13 +151,13 @@ class ControlledQuantity:
 
     @property
     def plain_unit(self) -> str:
-        """Unit of a difference without a word on what it counts from, as the units of gains have it."""
+        """Unit of a difference without its reference point (gauge or absolute), as in the units of gains."""
         return self.difference.removesuffix("_d")
 
     def setting(self, quantity: Quantity) -> Quantity:
-        """Return the setting of a law that acts on this in the place of a torque, of the one that acts on a torque.
+        """Return a setting of a torque law converted to this quantity.
 
-        A default of the torque law that is not 0 means nothing in another unit, and is none.
+        A non-zero default of the torque law has no meaning in another unit, and is dropped.
         """
         if self.name == TORQUE or "N m" not in quantity.unit:
             return quantity
@@ -219,11 +220,11 @@ CONTROLLED: dict[str, ControlledQuantity] = {
         ),
     )
 }
-"""Controlled quantities, by the word that a file has in ``reference.of``."""
+"""Controlled quantities by their value of ``reference.of`` in a file."""
 
 
 def error_functions(name: str, has_vacuum: bool) -> ErrorFunctions:
-    """Functions of the error of a controlled quantity, of supplies above the atmosphere or below it."""
+    """Error functions of a controlled quantity, for supplies above the atmosphere or below it."""
     quantity = CONTROLLED[name]
     return ErrorFunctions(quantity.value, turned_round if (quantity.sign < 0.0) != has_vacuum else steered)
 

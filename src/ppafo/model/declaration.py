@@ -1,7 +1,6 @@
-"""Declaration of a component: its numbers, with name, unit, range and meaning, and its laws, plain functions.
+"""Declaration of a component: parameters with name, unit, range and meaning, and laws as plain functions.
 
-A number is declared once, as a field of a frozen dataclass or of a NamedTuple:
-``area: Annotated[float, Number("m^2", "area of the opening")]``.
+A parameter is declared once, as a field of a frozen dataclass or of a NamedTuple:
 """
 
 import collections
@@ -21,24 +20,24 @@ class Quantity:
     unit: str
     summary: str
     default: float | None = None
-    """None where it must be given."""
+    """Default value; None if a value must be given."""
     minimum: float = -math.inf
     maximum: float = math.inf
     minimum_allowed: bool = True
-    """False where it must be above ``minimum``."""
+    """False if the value must be above ``minimum``."""
     follows: tuple[str, ...] = ()
-    """Names of numbers that are added to the default: of ``control.kind``, or of a loop in ``control``."""
+    """Names of terms added to the default: of ``control.kind``, or of a loop in ``control``."""
 
 
 Number = partial(Quantity, "")
-"""The quantity that is declared of a field, which has its name."""
+"""Quantity declared for a field, without the name, which is the name of the field."""
 
 
 @cache
 def quantities_of(section: type) -> tuple[Quantity, ...]:
-    """Return the numbers that a dataclass or a NamedTuple declares, those of nested NamedTuples in their place.
+    """Return the quantities that a dataclass or a NamedTuple declares, with nested NamedTuples flattened.
 
-    They are in the order of its fields; a field without a ``Number`` is none.
+    Quantities are in the order of the fields; fields without a ``Number`` are omitted.
     """
     quantities: list[Quantity] = []
     for name, hint in get_type_hints(section, include_extras=True).items():
@@ -50,7 +49,7 @@ def quantities_of(section: type) -> tuple[Quantity, ...]:
 
 
 def row_with(name: str, row: Any, **hints: Any) -> Any:
-    """Return a NamedTuple class like ``row``, whose named fields have other types; new ones stand behind its own."""
+    """Return a NamedTuple class like ``row`` with other types for the named fields; new fields are appended."""
     namedtuple: Any = collections.namedtuple
     annotations = {**row.__annotations__, **hints}
     made = namedtuple(name, annotations, module=row.__module__)
@@ -59,24 +58,24 @@ def row_with(name: str, row: Any, **hints: Any) -> Any:
 
 
 def number_of(hint: Any) -> Quantity | None:
-    """Return what the type of a field declares of a number, None where it declares none."""
+    """Return the quantity declared by the type of a field, None if the type declares none."""
     declared = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
     return next((item for item in declared if isinstance(item, Quantity)), None)
 
 
 def range_rule(quantity: Quantity, limits: str) -> str:
-    """Return what a value out of range must be, such as "must be at least 0 m^2 (open area)"."""
+    """Return the rule that a value out of range breaks, such as "must be at least 0 m^2 (open area)"."""
     return f"must be {limits}" + (f" ({quantity.summary})" if quantity.summary else "")
 
 
 class EmptyRow(NamedTuple):
-    """Row without a number: settings of a component that has none, or state of one that remembers nothing."""
+    """Row without numbers: settings of a component without settings, or state of one without memory."""
 
 
 class PlainFunction(Protocol):
-    """A function as ``def`` makes it, of whatever parameters: its source, its code and the names that it sees are read.
+    """Function made by ``def``, with any parameters; its source, its code and its global names are read.
 
-    A partial function, a method or an object that can be called is none.
+    Partial functions, methods and callable objects are not plain functions.
     """
 
     __name__: str
@@ -86,10 +85,10 @@ class PlainFunction(Protocol):
 
     @property
     def __globals__(self) -> Mapping[str, Any]:
-        """Names of its module."""
+        """Global names of the module."""
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
-        """Call it as Python does."""
+        """Call the function."""
 
     def __hash__(self) -> int:
-        """Every function is itself alone: what was made of it is kept by it."""
+        """Hash by identity: compiled results are cached for each function object."""

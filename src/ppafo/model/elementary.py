@@ -1,7 +1,7 @@
 """Exponential, logarithm, power, sine and cosine from plain arithmetic alone: the same bits on every machine.
 
-A library's own differ between platforms, processors and browsers in the last bits. Most are for the constants that a
-run begins with; ``sine_and_cosine_of_turns`` is a short series for vector code, for what steps time.
+Library functions differ between platforms, processors and browsers in the last bits. Most functions here compute
+constants at the start of a run; ``sine_and_cosine_of_turns`` is a short series for vector code in the time stepping.
 """
 
 import math
@@ -13,7 +13,7 @@ from ppafo.model.columns import Numeric
 LOGARITHM_OF_2 = 0.6931471805599453
 _UPPER_PART = 0.693147180369123816490
 _LOWER_PART = 1.90821492927058770002e-10
-"""The logarithm of 2 in two parts: the upper one has few enough bits that a whole number times it is exact."""
+"""Logarithm of 2 in two parts: the upper part has few enough bits that its product with an integer is exact."""
 _LARGEST_EXPONENT = 709.0
 _ROOT_OF_HALF = 0.7071067811865476
 _MAXIMUM_DOUBLINGS = 1100
@@ -25,7 +25,7 @@ _TERMS_OF_SINE = 9
 def exponential(exponent: float) -> float:
     """Exponential function [-] of a number [-], within 2e-16; constant beyond -709 and 709, NaN for NaN.
 
-    Below -708.39 the result is subnormal, and has fewer digits: it is within 5e-324, not within a share of itself.
+    Below -708.39 the result is subnormal with fewer digits: its absolute error is 5e-324.
     """
     # The negated comparison is true for NaN, for which every direct one is false.
     if not abs(exponent) >= 0.0:
@@ -48,7 +48,7 @@ def exponential(exponent: float) -> float:
 
 
 def logarithm(number: float) -> float:
-    """Natural logarithm [-] of a positive, normal number [-], within 3e-16 of it or of 1e-16, whichever is more."""
+    """Natural logarithm [-] of a positive, normal number [-], within 3e-16 relative or 1e-16 absolute."""
     doublings = 0
     mantissa = number
     # Halving is exact. The limit ends the loop for infinity, which no halving brings down.
@@ -70,15 +70,12 @@ def logarithm(number: float) -> float:
 
 
 def power(base: float, exponent: float) -> float:
-    """A positive base [-] to an exponent [-]; its relative error is 3e-16 times (1 + the size of its logarithm).
-
-    A subnormal result has fewer digits, as in ``exponential``; NaN stays NaN.
-    """
+    """Power [-] of a positive base [-]; its relative error is 3e-16 times (1 + the absolute value of its logarithm)."""
     return exponential(exponent * logarithm(base))
 
 
 def sine_and_cosine(turns: Numeric) -> tuple[Numeric, Numeric]:
-    """Sine and cosine [-] of a number of turns or of an array of them, within 2e-16 for turns that are exact."""
+    """Sine and cosine [-] of a number or an array of turns, within 2e-16 for exact turns."""
     # To the nearest quarter turn, within which nine terms give all digits.
     quarters = np.rint(4.0 * turns)
     angle = 2.0 * math.pi * (turns - 0.25 * quarters)
@@ -102,16 +99,16 @@ QUARTER_TURN = 1.5707963267948966
 TURNS_OF_RADIAN = 1.0 / TURN
 
 DOUBLINGS = 12
-"""A function of a whole step is summed at a fraction of it, and doubled so often up to the whole."""
+"""Doublings from the fraction of a step at which a series is evaluated to the whole step."""
 SMALLEST_FRACTION = 0.5**DOUBLINGS
 TERMS = 9
-"""Terms of such a series, with the one of order 0."""
+"""Number of terms of such a series, including order 0."""
 
 
 def sine_and_cosine_of_turns(turns: float) -> tuple[float, float]:
-    """Sine and cosine [-] of a number of turns to 1e-9: power series within a quarter turn of the nearest half turn.
+    """Sine and cosine [-] of a number of turns, within 1e-9, by power series about the nearest half turn.
 
-    A library sine is a call for each run, which keeps a loop over runs from vector code.
+    A library sine would be a function call for each run, which prevents vector code over runs.
     """
     half_turns = float(int(2.0 * turns + (0.5 if turns >= 0.0 else -0.5)))
     odd = half_turns - 2.0 * float(int(0.5 * half_turns))

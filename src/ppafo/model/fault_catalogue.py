@@ -1,4 +1,4 @@
-"""Every fault that the plant of a walk may have, as its file names it, with the numbers that it takes."""
+"""Faults of the plant that a walk may have, with their names in files and their parameters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,10 +8,10 @@ from ppafo.model.declaration import Quantity
 
 @dataclass(frozen=True, slots=True)
 class PlantFault:
-    """A fault as ``[faults]`` of a walk knows it: the part that fails, how, in words, and its numbers.
+    """Fault in the ``[faults]`` section of a walk: failed part, kind of failure, summary, and parameters.
 
-    ``fields`` has the field of ``PlantFaults`` that a number fills, by the name of the number; a field of one chamber
-    is ``chamber_1.opening``.
+    ``fields`` maps the name of a parameter to the field of ``PlantFaults`` that it fills; a field of one chamber is
+    written as ``chamber_1.opening``.
     """
 
     part: str
@@ -22,7 +22,7 @@ class PlantFault:
 
 
 TIME = Quantity("time", "s", "when it fails", None, 0.0, 1.0e6)
-"""The number that every fault has."""
+"""Parameter of every fault: its start time."""
 
 
 def _of_chambers(
@@ -30,7 +30,7 @@ def _of_chambers(
 ) -> list[PlantFault]:
     """Return the fault of the part of chamber 1 and of chamber 2, ``valve_1`` and ``valve_2``.
 
-    ``by_field`` has its numbers beside the time by the field of ``ChamberFaults`` that each fills.
+    ``by_field`` maps fields of ``ChamberFaults`` to the parameters other than the time.
     """
     quantities = {time_field: TIME, **by_field}
     return [
@@ -131,4 +131,4 @@ PLANT_FAULTS = {
     part: {fault.kind: fault for fault in _FAULTS if fault.part == part}
     for part in dict.fromkeys(fault.part for fault in _FAULTS)
 }
-"""Every fault of the plant, by part and by kind."""
+"""Faults of the plant by part and by kind."""

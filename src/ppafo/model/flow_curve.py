@@ -1,6 +1,6 @@
-"""Fit of a flow curve to the exact function of an orifice, for a gas or for a critical ratio of ISO 6358.
+"""Fit of a flow curve to the exact flow function of an orifice, for a gas or for a critical ratio of ISO 6358.
 
-Curves are fitted by plain arithmetic and square roots alone, so that a run begins with the same bits on every machine.
+Curves are fitted by plain arithmetic and square roots alone, so that a run starts with the same bits on every machine.
 """
 
 import math
@@ -12,12 +12,12 @@ from ppafo.model.gas import critical_pressure_ratio
 from ppafo.model.orifice import TERMS, FlowCurve
 
 Terms = tuple[float, float, float, float, float, float, float]
-"""Coefficients of a series, ``TERMS`` in number."""
+"""Coefficients of a series, ``TERMS`` of them."""
 
 NODES: Terms = (0.01371, 0.117149, 0.300253, 0.522087, 0.735768, 0.900391, 0.988845)
-"""Nodes at which a curve meets the exact function: 1 - r over its value at the critical ratio.
+"""Nodes at which a curve equals the exact function: 1 - r divided by its value at the critical ratio.
 
-A curve that is best by relative least squares crosses the exact function of helium here, and of other gases nearby.
+The best fit by relative least squares crosses the exact function of helium at these nodes, and of other gases nearby.
 """
 
 
@@ -34,7 +34,7 @@ def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCur
 def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
     """Fitted curve [-] of ISO 6358 for a critical ratio b; within 1e-5 of the exact function below ``linear_ratio``.
 
-    The exact function depends on (1 - r) / (1 - b) alone, so one fit, scaled, serves every b.
+    The exact function depends on (1 - r) / (1 - b) alone, so one scaled fit is valid for every b.
     """
     # A factor on 1 - r scales the n-th coefficient by its n-th power, and the root in front by its own root.
     scale = 1.0 / (1.0 - critical_ratio)
@@ -53,7 +53,7 @@ def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
 
 
 def _isentropic_coefficients(heat_capacity_ratio: float) -> Terms:
-    """Coefficients of a gas, through the exact function of equation (7) at nodes in the subsonic region."""
+    """Coefficients for a gas that interpolate the exact function of equation (7) at nodes in the subsonic region."""
     k = heat_capacity_ratio
     critical_gap = 1.0 - critical_pressure_ratio(k)
     # Choked flow over the factor in front of the subsonic form: the curve is 1 where the flow is choked.
@@ -73,7 +73,7 @@ _remembered_coefficients = lru_cache(maxsize=4096)(_isentropic_coefficients)
 
 
 def _iso6358_coefficients() -> Terms:
-    """Coefficients for a critical ratio of 0, where the function is the root of (1 - r)(1 + r)."""
+    """Coefficients for a critical ratio of 0, where the exact function is the square root of (1 - r)(1 + r)."""
     values = NODES
     for place in range(TERMS):
         values = _with_item(values, place, math.sqrt(2.0 - NODES[place]))
@@ -84,7 +84,7 @@ _remembered_iso6358_coefficients = lru_cache(maxsize=1)(_iso6358_coefficients)
 
 
 def _polynomial_through(places: Terms, values: Terms) -> Terms:
-    """Coefficients, from the constant one upwards, of the polynomial that has some values at some places (Newton)."""
+    """Coefficients, constant term first, of the polynomial through values at some points (Newton interpolation)."""
     differences = values
     for order in range(1, TERMS):
         for number in range(order, TERMS):
@@ -106,7 +106,7 @@ def _polynomial_through(places: Terms, values: Terms) -> Terms:
 
 
 def _with_item(items: Terms, place: int, value: float) -> Terms:
-    """Some numbers with another one at a place."""
+    """Return numbers with the one at an index replaced."""
     return (
         value if place == 0 else items[0],
         value if place == 1 else items[1],

@@ -1,4 +1,4 @@
-"""Gait that leads the leg: a measured stride as Fourier series, repeated or in a task sequence.
+"""Gait that drives the leg: a measured stride as Fourier series, repeated or in a task sequence.
 
 First the series, then the gait phase and what was measured there, then a task sequence: standing, starting, changing
 the speed, stairs, stopping.
@@ -10,7 +10,7 @@ from ppafo.model.elementary import QUARTER_TURN, TURN, TURNS_OF_RADIAN, sine_and
 from ppafo.model.leg import LegParameters, ShankNow, foot_load, torque_of_shank
 
 HARMONICS = 8
-"""Harmonics that the engine follows; higher ones of the built-in gait are below 0.04 deg and 0.4 % of body weight."""
+"""Number of harmonics in the engine; higher ones of the built-in gait are below 0.04 deg and 0.4 % of body weight."""
 
 
 class Harmonic(NamedTuple):
@@ -21,7 +21,7 @@ class Harmonic(NamedTuple):
 
 
 class Series(NamedTuple):
-    """Mean, and the coefficients from the first harmonic on, all in the unit of the function."""
+    """Mean and Fourier coefficients from the first harmonic on, all in the unit of the function."""
 
     mean: float
     harmonics: Annotated[tuple[Harmonic, ...], HARMONICS]
@@ -51,7 +51,7 @@ def harmonics(turns: float) -> tuple[Harmonic, ...]:
 
 
 def value_at(series: Series, at: tuple[Harmonic, ...]) -> float:
-    """Value of a periodic series at a place in the stride, in the unit of the series."""
+    """Value of a periodic series at a point of the stride, in the unit of the series."""
     by = series.harmonics
     # Two sums that do not wait for each other, each without a loop.
     low = term_value(by[0], at[0]) + term_value(by[1], at[1]) + term_value(by[2], at[2]) + term_value(by[3], at[3])
@@ -60,7 +60,7 @@ def value_at(series: Series, at: tuple[Harmonic, ...]) -> float:
 
 
 def rate_at(series: Series, at: tuple[Harmonic, ...], frequency: float) -> float:
-    """Time derivative of a series, in its unit per second; ``frequency`` of the first harmonic [Hz]."""
+    """Time derivative of a series, in its unit per second; ``frequency`` [Hz] of the first harmonic."""
     by = series.harmonics
     low = (
         term_rate(by[0], at[0])
@@ -97,12 +97,12 @@ def acceleration_at(series: Series, at: tuple[Harmonic, ...], frequency: float) 
 
 
 def term_value(one: Harmonic, at: Harmonic) -> float:
-    """Value of a harmonic with the coefficients ``one`` where its angle has the cosine and the sine ``at``."""
+    """Value of a harmonic with the coefficients ``one`` at an angle with the cosine and sine ``at``."""
     return one.cosine * at.cosine + one.sine * at.sine
 
 
 def term_rate(one: Harmonic, at: Harmonic) -> float:
-    """Derivative of ``term_value`` with respect to the angle: its value a quarter of a turn later."""
+    """Derivative of ``term_value`` with respect to the angle."""
     return one.sine * at.cosine - one.cosine * at.sine
 
 
@@ -122,10 +122,10 @@ class GaitSeries(NamedTuple):
 
 
 class ShankSeries(NamedTuple):
-    """The shank of a gait without its ground: strides per second [Hz], phase in turns at time 0, and its curves.
+    """Shank in a gait without ground contact: stride frequency [Hz], phase [turns] at time 0, and Fourier series.
 
-    Angle of the shank and of the ankle as measured [rad], and acceleration of the knee forward and up [m/s^2], as in
-    ``GaitSeries``. ``toe_lever`` [m] reaches from the ankle forward to the toes.
+    Measured angles of shank and ankle [rad], and acceleration of the knee forward and up [m/s^2], as in ``GaitSeries``.
+    ``toe_lever`` [m] is the distance from the ankle forward to the toes.
     """
 
     frequency: float
@@ -138,7 +138,7 @@ class ShankSeries(NamedTuple):
 
 
 class GaitTiming(NamedTuple):
-    """Strides per second [Hz]; phases in turns from the heel strike; the foot's angle [rad] where it stands flat.
+    """Stride frequency [Hz]; phases in turns from the heel strike; angle of the flat foot [rad].
 
     ``start`` is the phase at time 0. ``clearance_from`` and ``clearance_to`` bound the part of the swing in which the
     toes must not touch the ground.
@@ -154,14 +154,14 @@ class GaitTiming(NamedTuple):
 
 
 class GaitPlace(NamedTuple):
-    """A place in the stride: phase in turns, cosines and sines of its multiples."""
+    """Point of the stride: phase [turns], cosines and sines of its multiples."""
 
     phase: float
     at: Annotated[tuple[Harmonic, ...], HARMONICS]
 
 
 class GaitMeasured(NamedTuple):
-    """Measured quantities of a gait at an instant: the first fields of ``GaitNow``, in its order."""
+    """Measured quantities of a gait at an instant: the first fields of ``GaitNow``, in the same order."""
 
     phase: float
     shank: float
@@ -177,10 +177,10 @@ class GaitMeasured(NamedTuple):
 
 
 class GaitNow(NamedTuple):
-    """The gait at an instant: phase in turns, angles [rad] with their derivatives, moment [N m], force [N].
+    """Gait at an instant: phase [turns], angles [rad] with their derivatives, moment [N m], force [N].
 
-    Accelerations of the knee forward and up [m/s^2]; sine and cosine of the shank angle, and sine of the measured
-    foot's angle over the horizontal; torque [N m] that moves the measured foot, by equation (11).
+    Accelerations of the knee forward and up [m/s^2]; sine and cosine of the shank angle; sine of the measured foot's
+    angle to the horizontal; torque [N m] that moves the measured foot, by equation (11).
     """
 
     phase: float
@@ -201,12 +201,12 @@ class GaitNow(NamedTuple):
 
 
 def gait_at(gait: GaitSeries, timing: GaitTiming, leg: LegParameters, time: float) -> GaitNow:
-    """The gait of a person with this leg at a time [s]; body mass and gravity make newtons of body weights."""
+    """Gait of a person with this leg at a time [s]; body mass and gravity convert body weights to newtons."""
     return gait_of(leg, measured_at(gait, timing, leg, place_at(timing, time)))
 
 
 def place_at(timing: GaitTiming, time: float) -> GaitPlace:
-    """Place in the stride [-], from 0 to 1, at a time [s] since a heel strike."""
+    """Point of the stride at a time [s] since a heel strike, with the phase from 0 to 1."""
     # Times are 0 or more, so int() is the floor; math.floor is a call in vector code.
     turns = timing.start + timing.frequency * time
     phase = turns - float(int(turns))
@@ -214,7 +214,7 @@ def place_at(timing: GaitTiming, time: float) -> GaitPlace:
 
 
 def measured_at(gait: GaitSeries, timing: GaitTiming, leg: LegParameters, place: GaitPlace) -> GaitMeasured:
-    """Measured quantities of a gait at a phase of the stride, with forces [N] scaled to this leg."""
+    """Measured quantities of a gait at a point of the stride, with forces [N] scaled to this leg."""
     at = place.at
     return GaitMeasured(
         phase=place.phase,
@@ -232,7 +232,7 @@ def measured_at(gait: GaitSeries, timing: GaitTiming, leg: LegParameters, place:
 
 
 def shank_in_gait(gait: ShankSeries, time: float) -> ShankNow:
-    """The shank that a gait prescribes at a time [s]."""
+    """Shank motion prescribed by a gait at a time [s]."""
     at = harmonics(gait.start + gait.frequency * time)
     return ShankNow(
         angle=value_at(gait.shank, at),
@@ -244,9 +244,10 @@ def shank_in_gait(gait: ShankSeries, time: float) -> ShankNow:
 
 
 def foot_in_gait(gait: ShankSeries, time: float, angle: float) -> tuple[float, float, float]:
-    """Angles of a foot and of the measured one over the horizontal [rad], and how much higher its toes are [m].
+    """Angles of a foot and of the measured foot to the horizontal [rad], and height difference of their toes [m].
 
-    The foot stands on the shank of a gait, with an ankle angle [rad] at a time [s].
+    The foot is on the shank of a gait, with an ankle angle [rad] at a time [s]; the height is positive if its toes are
+    higher than the measured ones.
     """
     at = harmonics(gait.start + gait.frequency * time)
     shank = value_at(gait.shank, at)
@@ -257,7 +258,7 @@ def foot_in_gait(gait: ShankSeries, time: float, angle: float) -> tuple[float, f
 
 
 def gait_of(leg: LegParameters, now: GaitMeasured) -> GaitNow:
-    """The measured gait with what follows from it for this leg."""
+    """Measured gait with the derived quantities for this leg."""
     sine_shank, cosine_shank = sine_and_cosine_of_turns(now.shank * TURNS_OF_RADIAN)
     sine_foot, cosine_foot = sine_and_cosine_of_turns((now.shank - now.ankle) * TURNS_OF_RADIAN + 0.25)
     load, rate, acceleration = foot_load(leg), now.shank_rate, now.shank_acceleration
@@ -287,28 +288,27 @@ def gait_of(leg: LegParameters, now: GaitMeasured) -> GaitNow:
 
 PARTS = 32
 NEVER = 1.0e6
-"""Time [s] of a part that is not used, and length of one that does not end."""
+"""Start time [s] of an unused part, and length of a part without end."""
 
 STANDS_AT = 0.5
-"""Gait phase of standing over the phase of heel-off: half of the weight is under the heel there."""
+"""Gait phase of standing divided by the phase of heel-off: half of the weight is under the heel there."""
 
 SCUFF_AT = 0.5
-"""Place of a scuff as a fraction of the swing."""
+"""Centre of a scuff as a fraction of the swing."""
 SCUFF_FORCE = 0.2
-"""Force of a scuff under the toes in body weights. Assumed; twice what the shipped controllers take for a load."""
+"""Force of a scuff under the toes in body weights. Assumed; twice the load threshold of the shipped controllers."""
 
 WALKS_ABOVE = 0.5
-"""Strides per second over the recorded ones from which on the foot carries as in walking; below, partly as in
-standing."""
+"""Cadence relative to the recorded one above which the foot is loaded as in walking; below, partly as in standing."""
 
 
 class SequencePart(NamedTuple):
     """Part of a task sequence: start and length [s], initial phase [turns], initial value and gain of each quantity.
 
-    Strides per second [Hz], ``stride`` (angles over the recorded ones) [-] and ``load`` [body weights] that the foot
-    carries in standing. ``slope`` [rad] of the ground, above 0 uphill, which its gain changes too. ``tilt`` [rad] leans
-    the shank forward at the strike, so that the toes come first; ``scuff`` [s] is how long the toes touch the ground in
-    the swing; both hold for the whole part.
+    ``frequency`` is strides per second [Hz], ``stride`` the angles divided by the recorded ones [-], ``load`` the body
+    weights on the foot in standing, and ``slope`` the slope of the ground [rad], positive uphill. ``tilt`` [rad] leans
+    the shank forward at the strike, so that the toes land first; ``scuff`` [s] is the time for which the toes touch the
+    ground in the swing; both are constant within the part.
     """
 
     start: float
@@ -327,13 +327,13 @@ class SequencePart(NamedTuple):
 
 
 class TimedSequence(NamedTuple):
-    """Parts in the order of their starts; unused ones start at ``NEVER``."""
+    """Parts in the order of their start times; unused parts start at ``NEVER``."""
 
     parts: Annotated[tuple[SequencePart, ...], PARTS]
 
 
 class Kinematics(NamedTuple):
-    """A value with its first and second derivative: an angle [rad] with its own by time, or a fraction."""
+    """Angle [rad] with its first and second time derivative, or a fraction with its first and second derivative."""
 
     value: float
     rate: float
@@ -341,9 +341,9 @@ class Kinematics(NamedTuple):
 
 
 class PhaseMotion(NamedTuple):
-    """Phase [turns], strides per second [Hz], stride [-] and their time derivatives; load, tilt, scuff as in a part.
+    """Phase [turns], stride frequency [Hz], stride [-] and their time derivatives; load, tilt and scuff as in a part.
 
-    Slope of the ground [rad] with its derivatives.
+    ``slope`` of the ground [rad] with its derivatives.
     """
 
     turns: float
@@ -359,14 +359,14 @@ class PhaseMotion(NamedTuple):
 
 
 class Marks(NamedTuple):
-    """Features of the present stride: force [N] of a scuff under the toes, and 1 for a forefoot strike."""
+    """Special features of the present stride: force [N] of a scuff under the toes, and 1 for a forefoot strike."""
 
     scuff_force: float
     forefoot: float
 
 
 def blend(fraction: float) -> Kinematics:
-    """Rise from 0 to 1 over a fraction from 0 to 1, with both derivatives 0 at both ends."""
+    """Smooth step from 0 to 1 over a fraction from 0 to 1, with both derivatives 0 at both ends."""
     rest = 1.0 - fraction
     square = fraction * fraction
     return Kinematics(
@@ -377,7 +377,7 @@ def blend(fraction: float) -> Kinematics:
 
 
 def part_at(sequence: TimedSequence, time: float) -> SequencePart:
-    """The part in force at a time [s] from 0 on."""
+    """Part of the sequence at a time [s] of 0 or later."""
     found = sequence.parts[0]
     for part in sequence.parts[1:]:
         # A select for each field: choosing a whole struct would be a branch, which vector code cannot have.
@@ -401,7 +401,7 @@ def part_at(sequence: TimedSequence, time: float) -> SequencePart:
 
 
 def pace_in(part: SequencePart, time: float) -> PhaseMotion:
-    """Phase, strides per second and stride in a part at a time [s] within it."""
+    """Phase, stride frequency and stride amplitude at a time [s] within a part."""
     passed = time - part.start
     fraction = min(passed / part.length, 1.0)
     shape = blend(fraction)
@@ -427,7 +427,7 @@ def pace_in(part: SequencePart, time: float) -> PhaseMotion:
 
 
 def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: PhaseMotion, standing: float) -> Kinematics:
-    """An angle between its value in standing [rad] and the gait's."""
+    """Angle [rad] between its value in standing and the gait's, weighted by the stride amplitude."""
     away = value_at(series, at) - standing
     rate = rate_at(series, at, pace.frequency)
     # A changing cadence adds its own term to the second derivative, with the shape of the rate.
@@ -458,7 +458,7 @@ def tilt_of_shank(timing: GaitTiming, phase: float, pace: PhaseMotion) -> Kinema
 
 
 def marks_at(timing: GaitTiming, leg: LegParameters, phase: float, pace: PhaseMotion) -> Marks:
-    """The marks at a phase; none in a part without a scuff and a tilt."""
+    """Special features of the stride at a phase; none in a part without scuff and tilt."""
     since = phase - timing.toe_off - SCUFF_AT * (1.0 - timing.toe_off)
     # The scuff lasts for a time, while the phase counts turns: the cadence is between them.
     weight = SCUFF_FORCE * leg.body_mass * leg.gravity
@@ -469,15 +469,16 @@ def marks_at(timing: GaitTiming, leg: LegParameters, phase: float, pace: PhaseMo
 def gait_in_task_sequence(
     gait: GaitSeries, sequence: TimedSequence, timing: GaitTiming, leg: LegParameters, time: float
 ) -> tuple[GaitNow, Marks]:
-    """The gait of a person with this leg at a time [s] of a task sequence, and what marks the stride.
+    """Gait of a person with this leg at a time [s] of a task sequence, and special features of the stride.
 
-    The ground force keeps the gait's curve at any speed, and passes to the load of standing below ``WALKS_ABOVE``. The
-    acceleration of the knee goes with stride and cadence squared; the body's own acceleration as its speed
-    changes is neglected: at most 1 m/s^2 beside 10 to 20.
+    The ground force has the curve of the gait at any speed, and changes to the standing load below ``WALKS_ABOVE``. The
+    acceleration of the knee is proportional to the stride and to the square of the cadence. The acceleration of the
+    body during changes of speed is neglected: at most 1 m/s^2 compared with 10 to 20.
 
-    On a slope all angles count from the ground: the shank keeps its angle to the vertical, and the ankle takes the
-    slope up, in stance and in the swing (the invariance of A. H. Hansen, D. S. Childress, S. C. Miff, Hum. Mov. Sci. 23
-    (2004) 807). Moment, force and the direction of gravity on the unloaded foot are taken from level walking.
+    On a slope all angles are relative to the ground: the shank keeps its angle to the vertical, and the ankle
+    compensates the slope, in stance and in swing (the invariance of A. H. Hansen, D. S. Childress, S. C. Miff, Hum.
+    Mov. Sci. 23 (2004) 807). Moment, force and the direction of gravity on the unloaded foot are taken from level
+    walking.
     """
     pace = pace_in(part_at(sequence, time), time)
     phase = pace.turns - float(int(pace.turns))

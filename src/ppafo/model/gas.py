@@ -1,7 +1,7 @@
-"""Gases: the constants of orifice flow that follow from them, and gas that is not isothermal.
+"""Gases: constants of orifice flow, and energy balance of a gas that is not isothermal.
 
-The energy of a chamber changes with the enthalpy of the gas that flows in or out, the work of the moving wall and the
-heat through it: ``dE/dt = sum of m_dot h_up - P dV/dt + h A (T_wall - T)``. Gas that is not ideal is
+The energy of a chamber changes by the enthalpy of the inflow and outflow, the work of the moving wall and the heat
+through the wall: ``dE/dt = sum of m_dot h_up - P dV/dt + h A (T_wall - T)``. A real gas is in
 ``effects/second_virial.py``.
 """
 
@@ -44,13 +44,13 @@ def specific_gas_constant(universal_gas_constant: float, molar_mass: float) -> f
 
 
 def critical_pressure_ratio(heat_capacity_ratio: float) -> float:
-    """Downstream over upstream pressure [-] at and below which flow is choked; the inverse of the paper's 1.832."""
+    """Largest ratio of downstream to upstream pressure [-] with choked flow; the inverse of the paper's 1.832."""
     k = heat_capacity_ratio
     return over_runs(power, 2.0 / (k + 1.0), k / (k - 1.0))
 
 
 def choked_flow_constant(heat_capacity_ratio: float, gas_constant: float, temperature: float) -> float:
-    """C1 [s/m] of equation (6), with the exponent (k + 1)/(k - 1); ``gas_constant`` is R/M."""
+    """Constant C1 [s/m] of equation (6), with the exponent (k + 1)/(k - 1); ``gas_constant`` is R/M [J/(kg K)]."""
     # With this exponent the paper's own value, 0.00281 s/m, comes out.
     k = heat_capacity_ratio
     choked = over_runs(power, 2.0 / (k + 1.0), (k + 1.0) / (k - 1.0))
@@ -58,7 +58,7 @@ def choked_flow_constant(heat_capacity_ratio: float, gas_constant: float, temper
 
 
 def subsonic_flow_constant(heat_capacity_ratio: float, gas_constant: float, temperature: float) -> float:
-    """C2 [s/m] of equation (7); ``gas_constant`` is the specific one."""
+    """Constant C2 [s/m] of equation (7); ``gas_constant`` is R/M [J/(kg K)]."""
     k = heat_capacity_ratio
     return math.sqrt(2.0 * k / (gas_constant * temperature * (k - 1.0)))
 
@@ -84,39 +84,40 @@ def heat_from_wall(temperature: float, wall_temperature: float, heat_transfer_co
 
 
 def energy_rate(enthalpy_flow: float, pressure: float, volume_rate: float, heat: float) -> float:
-    """Time derivative [W] of a chamber's energy: enthalpy that flows in, less work P dV/dt, plus heat [W]."""
+    """Time derivative [W] of a chamber's energy: enthalpy inflow [W], minus work P dV/dt, plus heat [W]."""
     return enthalpy_flow - pressure * volume_rate + heat
 
 
 def wall_exchange(
     heat_transfer_coefficient: float, area_per_volume: float, heat_capacity_ratio: float, gas_constant: float
 ) -> float:
-    """Heat of the walls over the heat that one kelvin takes up, h a/c_v [kg/(s m^3)]; ``gas_constant`` is specific."""
+    """Wall heat transfer per volume and kelvin divided by c_v, h a/c_v [kg/(s m^3)]; ``gas_constant`` is R/M."""
     return heat_transfer_coefficient * area_per_volume * (heat_capacity_ratio - 1.0) / gas_constant
 
 
 def mass_flow_ratio(root: float) -> float:
-    """Mass flow [-] relative to gas at the reference temperature; ``root`` is sqrt(T_up/T_ref) [-], equation (6)."""
+    """Mass flow relative to the flow at the reference temperature [-]; ``root`` is sqrt(T_up/T_ref). Equation (6)."""
     return 1.0 / root
 
 
 def enthalpy_flow_ratio(root: float, heat_capacity_ratio: float) -> float:
-    """Enthalpy that a flow carries over c_v T_ref and over its flow at the reference temperature [-].
+    """Enthalpy flow divided by c_v T_ref and by the mass flow at the reference temperature [-].
 
-    ``root`` is sqrt(T_up/T_ref) [-]: gas at four times the temperature flows half as much and is four times as rich.
+    ``root`` is sqrt(T_up/T_ref) [-]: gas at four times the temperature has half the mass flow and four times the
+    specific enthalpy.
     """
     # Flow goes as 1/root, enthalpy per mass as root^2, so their product as the root.
     return heat_capacity_ratio * root
 
 
 def energy_per_content(gas_product: float, heat_capacity_ratio: float) -> float:
-    """Internal energy over gas content [J/kg], ``R T_ref / (M (k - 1))``, from ``R T_ref / M`` [J/kg].
+    """Internal energy divided by gas content [J/kg], ``R T_ref / (M (k - 1))``, from ``R T_ref / M`` [J/kg].
 
-    The gas content of a chamber is the mass that would give its pressure at the reference temperature.
+    The gas content of a chamber is the mass of gas at the reference temperature that has the pressure of the chamber.
     """
     return gas_product / (heat_capacity_ratio - 1.0)
 
 
 def temperature_flow_factor(reference_temperature: float, upstream_temperature: float) -> float:
-    """Factor [-] on a conductance that holds at a reference temperature [K]: sqrt(T_ref/T_up), from equation (6)."""
+    """Correction factor [-] of a conductance given at a reference temperature [K]: sqrt(T_ref/T_up), equation (6)."""
     return math.sqrt(reference_temperature / upstream_temperature)

@@ -1,4 +1,4 @@
-"""Codes of a walking controller in lanes and recordings: phase of the stride, assistance level."""
+"""Codes of a walking controller in state and recordings: phase of the stride, assistance level."""
 
 SWING = 0.0
 LANDING = 1.0
@@ -9,4 +9,4 @@ HELPS = 0.0
 LIFTS = 1.0
 PAUSED = 2.0
 STOPPED = 3.0
-"""Level of help: in all phases, in the swing only, none until some good strides, none for good."""
+"""Assistance levels: in all phases, in the swing only, paused until some good strides, permanently stopped."""

@@ -1,4 +1,4 @@
-"""Quantities and metrics as people are shown them, in the units of ``units/shown.py``; files and data stay in SI."""
+"""Quantities and metrics in display units, as set in ``units/shown.py``; files and data stay in SI units."""
 
 import math
 from collections.abc import Mapping
@@ -14,34 +14,34 @@ Floats = NDArray[np.float64]
 
 
 _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
-"""Kind of quantity of a metric by its unit in SI: masses among the metrics are masses of gas."""
+"""Kind of quantity of a metric by its SI unit: a mass among the metrics is a mass of gas."""
 _ON_AXES = {"psi_g": "psig", "psi_a": "psia", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
-"""Units that an axis writes in a form of their own."""
+"""Units with a different form on an axis."""
 _PRESSURE_KINDS = {"_g": " gauge", "_a": " absolute"}
-"""Words on an axis for the ending of a pressure unit."""
+"""Words for the suffix of a pressure unit on an axis."""
 _METRIC = ".4g"
-"""Digits of a metric."""
+"""Number format of a metric."""
 
 
 def si_unit(quantity: str) -> str:
-    """Return the unit in SI of a quantity, as files write it; empty for a plain number."""
+    """Return the SI unit of a quantity as written in files; empty for a dimensionless number."""
     return QUANTITIES[quantity].si if quantity else ""
 
 
 def display_unit(quantity: str) -> str:
-    """Return the unit in which a quantity is shown, as a table writes it; empty for a plain number."""
+    """Return the display unit of a quantity as written in a table; empty for a dimensionless number."""
     return unit_of(quantity).removesuffix("_d") if quantity else ""
 
 
 def change_unit(quantity: str, given: str = "") -> str:
-    """Return the unit in which a difference of two values is shown; empty for a plain number."""
+    """Return the display unit of a difference of two values; empty for a dimensionless number."""
     unit = given or display_unit(quantity)
     # A difference of pressures is neither gauge nor absolute.
     return unit[:-2] if quantity == "pressure" and unit.endswith(("_g", "_a")) else unit
 
 
 def axis_unit(quantity: str, given: str = "") -> str:
-    """Return the unit in which a quantity is shown, as the label of an axis writes it: with raised exponents."""
+    """Return the display unit of a quantity for an axis label, with raised exponents."""
     unit = given.removesuffix("_d") or display_unit(quantity)
     if unit in _ON_AXES:
         return _ON_AXES[unit]
@@ -51,11 +51,12 @@ def axis_unit(quantity: str, given: str = "") -> str:
 
 
 def display_value(value: float, quantity: str, atmosphere: float | None = None, unit: str = "") -> float:
-    """Return a value in SI in the unit in which it is shown.
+    """Return a value given in SI in its display unit.
 
-    Gauge counts from ``atmosphere`` [Pa absolute], of the device in force unless given (``units/shown.py``).
+    Gauge pressure is relative to ``atmosphere`` [Pa absolute], by default of the active device (``units/shown.py``).
 
-    What is zero within the accuracy of a run is 0. ``unit`` is the one in which it was given, where that is known.
+    A value that is zero within the accuracy of a run is shown as 0. ``unit`` replaces the display unit, for example by
+    the unit of the user's input.
     """
     if quantity not in QUANTITIES or not math.isfinite(value):
         return float(value)
@@ -64,36 +65,36 @@ def display_value(value: float, quantity: str, atmosphere: float | None = None, 
 
 
 def display_difference(value: float, quantity: str, unit: str = "") -> float:
-    """Return a difference of two values in SI in the unit in which it is shown, or was given."""
+    """Return a difference of two values, given in SI, in its display unit or in ``unit``."""
     # The zero of gauge pressures and of degrees Celsius falls out.
     return display_value(value, quantity, unit=unit) - display_value(0.0, quantity, unit=unit)
 
 
 def display_values(values: Floats, quantity: str, atmosphere: float | None = None, unit: str = "") -> Floats:
-    """Return values in SI (any shape) in the unit in which they are shown, or were given."""
+    """Return an array of values, given in SI (any shape), in the display unit or in ``unit``."""
     # Units are affine, so that two values decide all.
     zero, one = (display_value(number, quantity, atmosphere, unit) for number in (0.0, 1.0))
     return values if (zero, one) == (0.0, 1.0) else zero + (one - zero) * values
 
 
 def quantity_text(value: float, quantity: str, form: str = ".3g") -> str:
-    """Return a value in SI as text with the unit in which it is shown."""
+    """Return a value given in SI as text in its display unit, with this unit."""
     return f"{without_exponent(display_value(value, quantity), form)} {display_unit(quantity)}".rstrip()
 
 
 def metric_quantity(si_unit: str) -> str:
-    """Return the kind of quantity of a metric or channel that has a unit in SI, empty for a plain number."""
+    """Return the kind of quantity of a metric or channel from its SI unit; empty for a dimensionless number."""
     return _OF_GAS.get(si_unit) or quantity_of_unit(si_unit)
 
 
 def metric_words(name: str) -> str:
-    """Return the name of a metric in words: ``RMS error``."""
+    """Return the name of a metric in words, for example ``RMS error``."""
     words = name.replace("_", " ").replace("rms", "RMS")
     return words[:1].upper() + words[1:]
 
 
 def metrics_lines(metrics: Mapping[str, Metric]) -> list[str]:
-    """Return a line of text for each metric: name, value and unit as people are shown it, meaning."""
+    """Return a line of text for each metric: name, value, display unit and meaning."""
     levels = [metric_level(metric.value, metric.unit) for metric in metrics.values()]
     values, units = [without_exponent(value, _METRIC) for value, _ in levels], [unit for _, unit in levels]
     name_width, value_width, unit_width = (max(map(len, texts), default=0) for texts in (metrics, values, units))
@@ -104,25 +105,25 @@ def metrics_lines(metrics: Mapping[str, Metric]) -> list[str]:
 
 
 def metric_text(value: float, si_unit: str) -> str:
-    """Return a value of a metric or channel as text with its unit, as people are shown them."""
+    """Return the value of a metric or channel as text in its display unit, with this unit."""
     shown, unit = metric_level(value, si_unit)
     return f"{without_exponent(shown, _METRIC)} {unit}".rstrip()
 
 
 def name_lines(metrics: Mapping[str, Metric]) -> list[str]:
-    """Return a line of text for each metric: name, value and unit as people are shown it, for ``repr``."""
+    """Return a short line of text for each metric, for ``repr``: name, value and display unit."""
     width = max(map(len, metrics), default=0)
     return [f"  {name:<{width}}  {metric_text(metric.value, metric.unit)}" for name, metric in metrics.items()]
 
 
 def metric_level(value: float, si_unit: str) -> tuple[float, str]:
-    """Return a value of a metric or channel, and its unit, as people are shown them."""
+    """Return the value of a metric or channel in its display unit, and this unit."""
     quantity = metric_quantity(si_unit)
     return display_value(value, quantity), display_unit(quantity) or si_unit.removeprefix("-")
 
 
 def metric_change(value: float, si_unit: str) -> tuple[float, str]:
-    """Return a difference of two values of a metric or channel, and its unit, as people are shown them."""
+    """Return the difference of two values of a metric or channel in its display unit, and this unit."""
     quantity = metric_quantity(si_unit)
     # A difference of temperatures counts in kelvin.
     unit = {"degC": "K"}.get(change_unit(quantity), change_unit(quantity))

@@ -1,4 +1,4 @@
-"""The drawing library, loaded without the work that it does at import for other programs."""
+"""Import of Matplotlib without parts of its start-up that are not needed here."""
 
 import importlib
 import importlib.util
@@ -16,11 +16,11 @@ _AXES_IN_SPACE = "mpl_toolkits.mplot3d"
 
 
 def load_drawing() -> None:
-    """Import matplotlib without what it does at import for others.
+    """Import Matplotlib without slow initialisation that is not needed here.
 
-    It writes tables of settings into its documentation, and loads axes in three dimensions and the names of glyphs of
-    TeX; the latter are loaded when they are first used, the others never are here. DataError where a setting of the
-    user's own stops it.
+    Matplotlib would fill its docstrings with property tables, and load three-dimensional axes and the glyph names of
+    TeX. The glyph names are loaded at first use, the other parts never. Raises DataError if a setting of the user
+    prevents the import.
     """
     if "matplotlib.artist" in sys.modules:
         return
@@ -48,7 +48,7 @@ def load_drawing() -> None:
 
 
 def _load_late(name: str) -> None:
-    """Have a module loaded when something of it is first used; one that is absent stays so."""
+    """Defer the import of a module until its first use; a module that is not installed is ignored."""
     package, _, own = name.rpartition(".")
     if name in sys.modules or importlib.util.find_spec(package) is None:
         return
@@ -68,7 +68,7 @@ def _load_late(name: str) -> None:
 
 @contextmanager
 def _replaced(names: dict[str, Any], name: str, stand_in: object) -> Iterator[None]:
-    """Replace a name in a dictionary for the length of a ``with`` block."""
+    """Replace an entry of a dictionary within a ``with`` block."""
     before = names.get(name)
     names[name] = stand_in
     try:
@@ -82,7 +82,7 @@ def _replaced(names: dict[str, Any], name: str, stand_in: object) -> Iterator[No
 
 @contextmanager
 def _attribute_replaced(owner: Any, name: str, stand_in: object) -> Iterator[None]:
-    """Replace an attribute of a class for the length of a ``with`` block; nothing where another version has none."""
+    """Replace an attribute of a class within a ``with`` block; does nothing if the class has no such attribute."""
     before = vars(owner).get(name)
     if before is None:
         yield

@@ -1,6 +1,6 @@
-"""Finding of an analysis as values: sentences, tables of columns, panels. In SI until it becomes text.
+"""Report of an analysis as data: sentences, tables and figure panels, in SI units until converted to text.
 
-A ``Finding`` is all that an analysis returns; text, JSON, page, figures and folder are made of it here.
+A ``Finding`` is the return value of every analysis; this module generates its text, JSON, page, figures and folder.
 """
 
 import html
@@ -26,26 +26,26 @@ if TYPE_CHECKING:
 
 T_co = TypeVar("T_co", covariant=True)
 Cell = str | float | ConfidenceInterval | None
-"""A number in SI, an estimate with its interval, a text, or None where there is nothing to say."""
+"""Number in SI units, estimate with its confidence interval, text, or None for an empty cell."""
 NOTHING = "-"
-"""The text of a cell in which there is nothing to say."""
+"""Text of an empty cell."""
 MARK = "*"
 """Mark before a highlighted row."""
 REPORT = "report.html"
 FORMATS = ("png", "svg")
-"""Formats of a figure in a folder."""
+"""File formats of a figure in a folder."""
 _UNIT_IN_BRACKETS = re.compile(r"\([^(]*\)$")
 _ORIGINS = {
     "simulated": "Every run is of the model; nothing on this page was measured.",
     "synthetic": "The recordings are synthetic: the simulated test bench made them, nothing was measured.",
     "measured": "",
 }
-"""Statement of a page on the origin of its numbers, by kind."""
+"""Statement on the origin of the numbers of a page, by kind."""
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column of a table: title, kind of its numbers, and the cells in SI; ``is_change`` for differences of levels."""
+    """Column of a table: title, cells in SI units, kind of the numbers; ``is_change`` marks differences of values."""
 
     title: str
     values: Sequence[Cell]
@@ -54,13 +54,13 @@ class Column:
 
     @property
     def head(self) -> str:
-        """The title with the unit in which its numbers are shown."""
+        """Title, with the display unit of the numbers in brackets."""
         unit = self.kind.shown_change_unit if self.is_change else self.kind.shown_unit
         return f"{self.title} ({unit})" if unit and self.kind.quantity else self.title
 
     @property
     def texts(self) -> list[str]:
-        """The cells as text: numbers in the shown unit and form, whole plain ones with commas, a dash for nothing."""
+        """Cells as text: numbers in display units, counts with thousands separators, a dash for a missing value."""
         kind, texts = self.kind, []
         for value in self.values:
             if isinstance(value, str):
@@ -79,7 +79,7 @@ class Column:
 
 
 def columns_of(titles: Sequence[str | tuple[str, Kind]], rows: Iterable[Sequence[Cell]]) -> list[Column]:
-    """Return the columns of some rows, each with a title, or with a title and the kind of its numbers."""
+    """Return the columns of a table given by rows; each title is a text, or a pair of text and kind of the numbers."""
     pairs = [(title, PLAIN) if isinstance(title, str) else title for title in titles]
     # Without a row there still are titles.
     cells = list(zip(*rows, strict=True)) or [()] * len(pairs)
@@ -87,23 +87,23 @@ def columns_of(titles: Sequence[str | tuple[str, Kind]], rows: Iterable[Sequence
 
 
 def facts(rows: Iterable[Sequence[Cell]]) -> list[Column]:
-    """Return a list of facts, name and value: columns without a title."""
+    """Return a table of facts: columns of names and values, without titles."""
     return columns_of(("", ""), rows)
 
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A part of a finding, of which all may be left out: a heading, what is said, a table, a figure, a text to copy.
+    """Section of a report, with optional heading, sentences, table, figure, and code.
 
-    The table: ``columns``, of which the first ``left`` are names and set to the left; without titles they are a list of
-    facts. ``marked`` are the numbers of the rows, from 0, that stand out; ``remarks`` stand below.
+    Table: ``columns``, of which the first ``left`` are names and left-aligned; columns without titles form a list of
+    facts. ``marked`` are the indices of highlighted rows, from 0. ``remarks`` are printed below the table.
 
-    The figure: ``name`` is the stem of its files, empty where there is none. It is made of ``panels``, or of a function
-    that makes them where the figure is wanted: ``across`` side by side, each of a ``size`` [inches], under a ``title``
-    and with a ``note``. Or ``draw`` makes all of it, which may be the bytes of an animation (GIF). The ``caption`` is
-    on the page.
+    Figure: ``name`` is the stem of its files, empty without a figure. It is drawn from ``panels``, or from a function
+    that returns panels on demand, with ``across`` panels per row, a panel ``size`` [inches], a ``title`` and a
+    ``note``. Alternatively ``draw`` returns the complete figure, or the bytes of an animation (GIF). ``caption`` is
+    printed on the page.
 
-    ``code`` is a text to copy. A part that ``is_detail`` is on the page only.
+    ``code`` is a text to be copied. A section with ``is_detail`` is on the page only.
     """
 
     heading: str = ""
@@ -125,16 +125,16 @@ class Section:
 
     @property
     def has_head(self) -> bool:
-        """Tell whether the columns have titles."""
+        """True if any column has a title."""
         return any(column.title for column in self.columns)
 
     @property
     def rows(self) -> list[tuple[str, ...]]:
-        """The table as text, without its head."""
+        """Rows of the table as text, without the titles."""
         return list(zip(*(column.texts for column in self.columns), strict=True))
 
     def drawn(self, kind: RecordingKind) -> "matplotlib.figure.Figure | bytes":
-        """Return the figure, of which panels say what kind of numbers they show."""
+        """Return the figure; its panels are marked with the kind of the numbers."""
         if self.draw is not None:
             return self.draw()
         panels = self.panels() if callable(self.panels) else self.panels
@@ -143,10 +143,10 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class LivePart:
-    """A part of a page that simulates: HTML with its own script, and the policy that allows that script alone.
+    """Interactive simulation on a page: HTML with its script, and the content security policy for this script alone.
 
-    ``remark`` is a sentence on how its runs begin otherwise than the page's, empty where they do not; without
-    ``html`` it says why nothing simulates.
+    ``remark`` is a sentence on differences between the start of its runs and of the page's, empty without differences.
+    Without ``html``, it gives the reason that nothing can be simulated.
     """
 
     policy: str = ""
@@ -155,19 +155,20 @@ class LivePart:
 
 
 def _units_of(finding: "Finding[Any]", *_: Any, **__: Any) -> Mapping[str, str]:
-    """Return the units in which a finding is shown, whatever else its function takes."""
+    """Return the display units of a finding; further arguments are ignored."""
     return finding.units
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Finding(Generic[T_co]):
-    """Finding of an analysis: ``found`` are the numbers in SI, which are also its JSON; the rest presents them.
+    """Report of an analysis: ``found`` are its results in SI units, and the other fields are for presentation.
 
-    A ``found`` that is more than its numbers says its JSON itself, as ``json_document()``. ``name`` is the stem of its
-    files and its command, unless ``command`` says another; ``kicker`` says above the title what kind of page this is.
-    ``passed`` is false where a check failed. ``kind`` says where the numbers come from. ``files`` are further files by
-    name. ``page`` makes a page of its own from the drawn figures. ``live`` makes the part of the page that simulates,
-    None where there can be none. ``units`` are those in which it is shown, by unit in SI: in force as it was made.
+    The JSON of a report is ``found`` as plain data, or the result of its method ``json_document()`` if defined.
+    ``name`` is the stem of the files, and of the command unless ``command`` is set. ``kicker`` is the line above the
+    title. ``said`` are the first sentences, ``parts`` the sections. ``passed`` is False if a check failed. ``kind`` is
+    the origin of the numbers. ``files`` are functions that return further files, by name. ``live`` returns the
+    interactive part of the page, or None. ``page`` generates a special page from the drawn figures. ``units`` are the
+    display units by SI unit, by default the ones active at creation.
     """
 
     name: str
@@ -186,36 +187,36 @@ class Finding(Generic[T_co]):
 
     @property
     def figures(self) -> dict[str, Section]:
-        """The parts that have a figure, by the stem of its files."""
+        """Sections with a figure, by the stem of the figure's files."""
         return {part.name: part for part in self.parts if part.name}
 
     def __str__(self) -> str:
-        """Return what the command prints."""
+        """Return the text printed by the command."""
         return text_of(self)
 
     def __iter__(self) -> Iterator[Any]:
-        """Go through what was found, where that has items, as the findings of an audit; TypeError where it has none."""
+        """Iterate over the results, for example the findings of an audit; raises TypeError if they are not iterable."""
         found: Any = self.found
         return iter(found)
 
     def __repr__(self) -> str:
-        """Return what was found, and of what."""
+        """Return a short description: kind of report and title."""
         return f"<{self.kicker}: {self.title}>"
 
     def _repr_html_(self) -> str:
-        """Return the page as a frame, which a notebook shows."""
+        """Return the page in an inline frame, for display in a notebook."""
         page = html.escape(files_of(self)[REPORT].decode())
         return f'<iframe srcdoc="{page}" width="100%" height="700" style="border: 0"></iframe>'
 
     @in_units(_units_of)
     def to_dict(self) -> dict[str, Any]:
-        """Return what ``--json`` prints, as plain data in SI."""
+        """Return the data printed with ``--json``, as plain data in SI units."""
         document = getattr(self.found, "json_document", None)
         return dict(plain(self.found) if document is None else document())
 
     @in_units(_units_of)
     def plot(self, name: str | None = None) -> "matplotlib.figure.Figure":
-        """Return a figure of the result, the first unless named; LookupError where it has none of that name."""
+        """Return a figure of the report by name, by default the first; raises LookupError for an unknown name."""
         figures = self.figures
         chosen = figures.get(name or next(iter(figures), ""))
         drawn = None if chosen is None else chosen.drawn(self.kind)
@@ -224,7 +225,10 @@ class Finding(Generic[T_co]):
         return shown(drawn)
 
     def save(self, folder: str | Path) -> None:
-        """Write text, JSON, page and figures into a folder: absent, empty or an earlier result, else DataError."""
+        """Write text, JSON, page and figures into a folder.
+
+        The folder must be absent, empty or an earlier result; otherwise DataError is raised.
+        """
         from ppafo.storage.result_folder import write_marked_folder
 
         write_marked_folder(Path(folder), files_of(self), self.command or self.name)
@@ -232,7 +236,7 @@ class Finding(Generic[T_co]):
 
 @in_units(_units_of)
 def text_of(finding: Finding[Any]) -> str:
-    """Return what is said first and every part that is no mere detail of the page."""
+    """Return the report as text: the first sentences, then every section that is not a detail of the page."""
     blocks = ["\n".join(finding.said)]
     for part in finding.parts:
         if not part.is_detail:
@@ -243,7 +247,7 @@ def text_of(finding: Finding[Any]) -> str:
 
 
 def _table_lines(part: Section) -> list[str]:
-    """Return the table of a part as aligned lines, its head first, its marked rows after a mark; none without rows."""
+    """Return the table of a section as aligned lines, with head and marks of highlighted rows; empty without rows."""
     rows: list[tuple[str, ...]] = part.rows
     if not rows:
         return []
@@ -258,7 +262,7 @@ def _table_lines(part: Section) -> list[str]:
 
 @in_units(_units_of)
 def page_of(finding: Finding[Any], drawn: Mapping[str, bytes]) -> bytes:
-    """Return the page of a finding; ``drawn`` has the SVG or GIF content of each of its figures by name."""
+    """Return the page of a report; ``drawn`` has the SVG or GIF content of each figure by name."""
     if finding.page is not None:
         return finding.page(drawn)
     values = {
@@ -274,7 +278,7 @@ def page_of(finding: Finding[Any], drawn: Mapping[str, bytes]) -> bytes:
 
 
 def _head_of(part: Section) -> list[str]:
-    """Return the titles of a table; a unit in brackets at the end of one is not broken over two lines."""
+    """Return the titles of a table, with non-breaking spaces within a unit in brackets."""
     if not part.has_head:
         return []
     heads = [column.head for column in part.columns]
@@ -283,7 +287,7 @@ def _head_of(part: Section) -> list[str]:
 
 @in_units(_units_of)
 def files_of(finding: Finding[Any]) -> dict[str, bytes]:
-    """Return text, JSON, page, figures and further files of a finding by name; figures are drawn here."""
+    """Return text, JSON, page, figures and further files of a report by name; this draws the figures."""
     drawn: dict[str, Mapping[str, bytes]] = {}
     for name, part in finding.figures.items():
         figure = part.drawn(finding.kind)

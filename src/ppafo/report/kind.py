@@ -1,4 +1,4 @@
-"""Kind of a number: its words, SI unit and display form, declared once for text, tables and axes."""
+"""Kind of a number: label, SI unit and number format, declared once for text, tables and axes."""
 
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ from ppafo.units.shown import quantity_of_unit
 
 @dataclass(frozen=True, slots=True)
 class ConfidenceInterval:
-    """An estimate and the ends of its confidence interval, all in one unit; an end may be infinite."""
+    """Estimate with the limits of its confidence interval, all in the same unit; a limit may be infinite."""
 
     value: float
     low: float
@@ -33,16 +33,16 @@ class ConfidenceInterval:
 
     @property
     def width(self) -> float:
-        """Distance of the two ends."""
+        """Width of the interval."""
         return self.high - self.low
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """Kind of a number: words, SI unit, quantity (``QUANTITIES``; else shown in SI), and form.
+    """Kind of a number: label, SI unit, quantity (of ``QUANTITIES``, else shown in SI), and number format.
 
-    ``zero`` [Pa absolute] is the pressure from which gauge ones count, None for the atmosphere of the device.
-    ``given`` is the unit in which the user gave the number, which replaces the one of the set.
+    ``zero`` [Pa absolute] is the reference of gauge pressures, None for the atmosphere of the device. ``given`` is the
+    unit of the user's input, which replaces the display unit.
     """
 
     words: str = ""
@@ -54,85 +54,85 @@ class Kind:
 
     @property
     def shown_unit(self) -> str:
-        """The unit in which it is shown; empty for a plain number."""
+        """Display unit; empty for a dimensionless number."""
         if self.given:
             return self.given.removesuffix("_d")
         return display_unit(self.quantity) if self.quantity else self.unit.removeprefix("-")
 
     @property
     def shown_change_unit(self) -> str:
-        """The unit in which a difference of two values is shown."""
+        """Display unit of a difference of two values."""
         return change_unit(self.quantity, self.given) if self.quantity else self.shown_unit
 
     @property
     def title(self) -> str:
-        """Words and unit for a table."""
+        """Label with unit, for a table."""
         return f"{self.words} ({self.shown_unit})" if self.shown_unit else self.words
 
     @property
     def axis(self) -> str:
-        """Words and unit for an axis."""
+        """Label with unit, for an axis."""
         return f"{self.words} ({self.axis_unit})" if self.axis_unit else self.words
 
     @property
     def axis_unit(self) -> str:
-        """The unit for an axis, empty for a plain number."""
+        """Display unit in the form for an axis; empty for a dimensionless number."""
         unit = axis_unit(self.quantity, self.given) if self.quantity else self.shown_unit
         return "" if unit == "1" else unit
 
     def values(self, values: ArrayLike) -> Floats:
-        """Return values in SI in the unit in which they are shown."""
+        """Return values given in SI in the display unit."""
         return display_values(np.asarray(values, dtype=np.float64), self.quantity, self.zero, self.given)
 
     def number(self, value: float, form: str = "") -> str:
-        """Return a value in SI as text in the unit in which it is shown, without that unit."""
+        """Return a value given in SI as text in the display unit, without the unit."""
         return without_exponent(display_value(value, self.quantity, self.zero, self.given), form or self.form)
 
     def text(self, value: float, form: str = "") -> str:
-        """Return a value in SI as text with the unit in which it is shown."""
+        """Return a value given in SI as text in the display unit, with the unit."""
         return f"{self.number(value, form)} {self.shown_unit}".rstrip()
 
     def change(self, value: float, form: str = ".3g") -> str:
-        """Return a difference of two values in SI as text with the unit in which it is shown."""
+        """Return a difference of two values, given in SI, as text in the display unit, with the unit."""
         return f"{self.change_number(value, form)} {self.shown_change_unit}".rstrip()
 
     def change_number(self, value: float, form: str = ".3g") -> str:
-        """Return a difference of two values in SI as text in the unit in which it is shown, without that unit."""
+        """Return a difference of two values, given in SI, as text in the display unit, without the unit."""
         return without_exponent(display_difference(value, self.quantity, self.given), form)
 
     def interval(self, interval: ConfidenceInterval, form: str = "") -> str:
-        """Return an estimate and the ends of its interval as text without unit."""
+        """Return an estimate with the limits of its confidence interval, given in SI, as text without unit."""
         value, low, high = (self.number(each, form) for each in (interval.value, interval.low, interval.high))
         return f"{value} [{low}, {high}]"
 
     def change_interval(self, interval: ConfidenceInterval, form: str = "") -> str:
-        """Return a difference and the ends of its interval as text without unit."""
+        """Return a difference with the limits of its confidence interval, given in SI, as text without unit."""
         ends = (interval.value, interval.low, interval.high)
         value, low, high = (self.change_number(each, form or self.form) for each in ends)
         return f"{value} [{low}, {high}]"
 
 
 PLAIN = Kind()
-"""A plain number, or a text."""
+"""Kind of dimensionless numbers, and of texts."""
 TIME = Kind("Time", "s", "time")
 
 
 def of_metric(name: str, form: str = ".4g") -> Kind:
-    """Return the kind of quantity of a metric, by which it is shown."""
+    """Return the kind of a metric, from the catalogue of metrics."""
     return of_stored_metric(name, METRICS[name].unit, form)
 
 
 def of_stored_metric(name: str, unit: str, form: str = ".4g") -> Kind:
-    """Return what a metric is whose unit in SI is stored beside it, so that its kind need not be there any more."""
+    """Return the kind of a stored metric from its name and SI unit, also for a metric that is no longer defined."""
     return Kind(metric_words(name), unit, metric_quantity(unit), form)
 
 
 def of_path(path: str, unit: str, form: str = ".6g", given: str = "") -> Kind:
-    """Return what the number at a path is, from its unit in SI, and the one in which it was given."""
+    """Return the kind of the number at a path, from its SI unit and the unit of the user's input, if any."""
     quantity = quantity_of_unit(unit)
     return Kind(label_of(path), unit, quantity, form, fixed_zero(path), given if quantity else "")
 
 
 def of_channel(name: str, unit: str) -> Kind:
-    """Return what a channel of a recording is, from its unit in SI."""
+    """Return the kind of a channel of a recording, from its SI unit."""
     return Kind(name.replace("_", " ").capitalize(), unit, quantity_of_unit(unit))

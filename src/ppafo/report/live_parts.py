@@ -1,4 +1,4 @@
-"""The part of a page that simulates: made by a guest, which is loaded where a page is written."""
+"""Interactive part of a page, provided by another package or module that is loaded when a page is written."""
 
 from collections.abc import Sequence
 from types import FunctionType
@@ -15,7 +15,7 @@ LIVE_PARTS: Kinds[FunctionType] = Kinds(
 
 
 def live_part(scenarios: Sequence[Any], name: str = "workbench") -> LivePart | None:
-    """Return the live part of some scenarios; one line in its place where what makes it is not installed."""
+    """Return the interactive part of a page for some scenarios; only a remark if its provider is not installed."""
     try:
         make = LIVE_PARTS[name]
     except KindError as error:

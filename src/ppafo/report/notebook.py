@@ -1,4 +1,4 @@
-"""Display of a result in a notebook: numbers as a table, and the figure as a picture."""
+"""Display of a result in a notebook: metrics as a table, and the figure as an image."""
 
 import base64
 import html
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def result_html(head: str, metrics: Mapping[str, Metric], figure: "Figure") -> str:
-    """Return how a run ended, its metrics in the units that people are shown, and its figure, as HTML."""
+    """Return status line, metrics in display units, and figure of a run as HTML."""
     rows = []
     for name, metric in metrics.items():
         cells = (metric_words(name), metric_text(metric.value, metric.unit), metric.summary)
@@ -29,11 +29,11 @@ def result_html(head: str, metrics: Mapping[str, Metric], figure: "Figure") -> s
 
 
 def png_of(figure: "Figure") -> bytes:
-    """Return a figure as the bytes of a PNG, for a notebook."""
+    """Return a figure as PNG bytes, for a notebook."""
     return render_figure(figure, ("png",))["png"]
 
 
 def shown(figure: "Figure") -> "Figure":
-    """Return a figure that a notebook shows, whether a backend of Matplotlib was chosen there or not."""
+    """Return the figure, prepared for display in a notebook with or without a Matplotlib backend."""
     vars(figure)["_repr_png_"] = partial(png_of, figure)
     return figure

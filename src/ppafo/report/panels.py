@@ -1,4 +1,4 @@
-"""Panels of a figure, as data, and drawn: what the shapes of marks look like; Matplotlib lays them out itself."""
+"""Panels of a figure: description as data, and drawing with Matplotlib, which computes the layout."""
 
 import re
 import textwrap
@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """Something drawn: a shape of ``SHAPES``, where, up to where [SI], its name, colour, words of Matplotlib."""
+    """Graphical element of a panel: shape (of ``SHAPES``), positions [SI], label, colour and Matplotlib keywords.
+
+    ``to`` is a third number, as an end, a half width or the value of a colour, depending on the shape.
+    """
 
     shape: str
     x: Any = ()
@@ -34,12 +37,13 @@ class Mark:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """A panel of a figure: what its axes are, and the marks on them.
+    """Panel of a figure: kinds of numbers on its axes, and the marks.
 
-    ``scale`` is what the colours of a map or of points stand for; panels that follow each other with one scale share
-    its bar. ``legend`` is "above", "inside", "figure" (above all panels) or empty. ``then`` has the last word on the
-    axes. ``tall`` is its height over the others'. Two below each other that ``shares_x`` have one horizontal axis,
-    and say above them what the vertical one is. Where one has no marks, its place stays empty.
+    ``scale`` is the kind of the numbers shown by colours of a map or of points; consecutive panels with the same scale
+    share a colour bar. ``legend`` is "above", "inside", "figure" (above all panels) or empty. ``then`` is a function
+    called last with the axes. ``tall`` is the height relative to the other panels [-]. Panels in the same column with
+    ``shares_x`` share the horizontal axis and show the label of the vertical axis as title. A panel without marks stays
+    empty.
     """
 
     x: Kind
@@ -54,27 +58,27 @@ class Panel:
 
 
 _TOP = 0.28
-"""Inches above the panels, in which the figure says that it is simulated."""
+"""Space above the panels for the kind of the numbers, such as "simulated" [inches]."""
 _LINE = 0.17
-"""Inches of a line of the note, and of names above all panels."""
+"""Line height of the note, and of a legend above all panels [inches]."""
 _UNDER_NAMES = 0.08
-"""Inches from these names to the panels."""
+"""Space between that legend and the panels [inches]."""
 _LETTERS, _FEWEST_LETTERS, _KIND = 11.0, 24, 1.0
-"""Letters of a title on an inch, the fewest on a line, and inches that its kind of numbers takes beside it."""
+"""Letters of a title per inch, least letters per line, and width of the kind of the numbers [inches]."""
 _ENTRY, _ENTRY_LETTERS = 0.53, 14.5
-"""Inches of an entry of a legend without its name, and letters of names on an inch."""
+"""Width of a legend entry without its name [inches], and letters of names per inch."""
 _ROW, _ABOVE = 13.0, 6.0
-"""Points of a row of a legend, and from the axes to a title."""
+"""Height of a legend row, and distance from the axes to a title [points]."""
 _LABEL_LETTERS, _AXIS_ROOM = 13.0, 0.55
-"""Letters of a label on an inch of its axis, and inches of the height of a panel that its axis does not have."""
+"""Letters of an axis label per inch, and part of the panel height outside the axis [inches]."""
 _DASHED_SHAPES = ("line", "bars")
-"""Shapes that have the dashes of their colours beside others."""
+"""Shapes with dashes that depend on their colour."""
 _TITLE_SIZE, _SMALLEST_TITLE = 11.0, 0.72
-"""Points of a title, and the fraction of them that it has at least."""
+"""Font size of a title [points], and smallest relative size of a shortened title."""
 _MARKUP = re.compile(r"\\[a-z]+|[${}_^]")
-"""Characters of a formula in a title that are not letters on the page."""
+"""Pattern of the markup in a title, which takes no space on the page."""
 _TITLE_LINE = 0.2
-"""Inches of a line of the title."""
+"""Line height of the title [inches]."""
 _OF_LEGEND: Mapping[str, Any] = {
     "borderaxespad": 0.1,
     "handlelength": 2.2,
@@ -82,9 +86,9 @@ _OF_LEGEND: Mapping[str, Any] = {
     "labelspacing": 0.2,
     "borderpad": 0.2,
 }
-"""Words of Matplotlib for a legend above the panels."""
+"""Matplotlib keywords of a legend above the panels."""
 _AREA = {"alpha": 0.15, "linewidth": 0}
-"""Words of Matplotlib for a band, unless it has its own."""
+"""Default Matplotlib keywords of a band."""
 
 
 def _line(axes: "Axes", mark: Mark, x: Any, y: Any) -> None:
@@ -141,9 +145,9 @@ def draw_panels(
     note: str = "",
     kind: RecordingKind = "simulated",
 ) -> "Figure":
-    """Return the figure of some panels, ``across`` of them side by side, each of a size [inches].
+    """Return a figure of panels, with ``across`` panels per row, each of a size [inches].
 
-    ``note`` stands below all of them.
+    ``note`` is printed below the panels.
     """
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -191,7 +195,7 @@ def draw_panels(
 
 
 def _legend_rows(panel: Panel, title: str, width: float) -> tuple[int, int]:
-    """Return entries of a legend side by side on so many inches, and its rows above those on which the title stands."""
+    """Return the legend entries per row for a width [inches], and the number of legend rows above the title."""
     names = [mark.label for mark in panel.marks if mark.label and mark.shape != "text"]
     widths = [_ENTRY + len(name) / _ENTRY_LETTERS for name in dict.fromkeys(names)]
     beside = len(title) / _LETTERS if title else 0.0
@@ -205,7 +209,7 @@ def _legend_rows(panel: Panel, title: str, width: float) -> tuple[int, int]:
 
 
 def _draw(axes: "Axes", panel: Panel, size: tuple[float, float]) -> Any:
-    """Draw a panel of a size [inches], and return what has colours that stand for numbers."""
+    """Draw a panel of a size [inches], and return the Matplotlib object with a colour scale, if any."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
     if not panel.marks:
@@ -252,13 +256,13 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float]) -> Any:
 
 
 def _wrapped(label: str, length: float) -> str:
-    """Return the label of an axis in a panel of a length [inches], on two lines where it is longer than the axis."""
+    """Return the label of an axis, wrapped to the length of the axis in a panel of a length [inches]."""
     letters = max(_FEWEST_LETTERS // 2, round(_LABEL_LETTERS * (length - _AXIS_ROOM)))
     return "\n".join(textwrap.wrap(label, letters, break_on_hyphens=False))
 
 
 class _DrawnPanel(NamedTuple):
-    """A panel that is drawn: its axes, and what of it has colours that stand for numbers, if anything has."""
+    """Panel with its Matplotlib axes, and the object with a colour scale, or None."""
 
     axes: "Axes"
     panel: Panel
@@ -266,7 +270,7 @@ class _DrawnPanel(NamedTuple):
 
 
 def _share_scales(figure: "Figure", drawn: Sequence[_DrawnPanel], height: float) -> None:
-    """Give panels of a height [inches] that follow each other with one scale the same limits and one bar."""
+    """Apply common limits and one colour bar to consecutive panels with the same scale; panel height in [inches]."""
     for scale, group in groupby(drawn, key=lambda each: each.panel.scale):
         members = list(group)
         if scale is None:

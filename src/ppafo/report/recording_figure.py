@@ -1,4 +1,4 @@
-"""The figure of a recording: one panel a quantity over a common time, each in the unit that the field uses."""
+"""Figure of a recording: one panel per quantity over a common time axis, in the usual unit of the field."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -33,21 +33,21 @@ if TYPE_CHECKING:
 
 FIGURE_FORMATS = ("png", "svg", "pdf")
 _SIZE = (5.4, 1.5)
-"""Inches of a panel with its title."""
+"""Size of a panel with its title [inches]."""
 _HEADROOM = 0.06
-"""Air above and below what is drawn, as a fraction of the axis."""
+"""Margin above and below the data, as a fraction of the axis."""
 _MAXIMUM_TICKS = 5
-"""Steps between ticks of a value axis at most."""
+"""Largest number of intervals between ticks of a value axis."""
 
 _ANGLE, _COMMAND = Kind("Ankle angle", "rad", "angle"), Kind("Valve command (-1 to 1)")
 _COMMAND_THAT_VENTS = Kind("Valve command (-1 to 1; 2 vents both chambers)")
 
 
 class _Quantity(NamedTuple):
-    """A panel of the figure: what its numbers are, and name and look of each channel that it may show.
+    """Panel of the figure: kind of the numbers, and label and style of each channel that may be drawn.
 
-    The axis spans at least ``smallest_span`` [SI], which keeps what hardly changes from looking wild, and always shows
-    the values of ``always_shown`` [SI].
+    The axis spans at least ``smallest_span`` [SI], so that small changes are not magnified, and always includes
+    ``always_shown`` [SI].
     """
 
     kind: Kind
@@ -102,12 +102,12 @@ def recording_figure(
     valve: str = "",
     joint: JointNames = ANKLE,
 ) -> "Figure":
-    """Return the figure of a recording, with a panel for every quantity that it has.
+    """Return the figure of a recording, with a panel for every quantity in it.
 
-    An ankle that a simulation holds at one angle is in the title instead, unless there is nothing else to draw.
-    ``remark`` stands below the panels, for example why a run stopped early. ``valve`` is the kind of valve, in whose
-    colour the device is drawn, ``joint`` what it turns. Gauge pressure counts from the atmosphere in force
-    (``units/shown.py``).
+    A constant ankle angle of a simulation is written in the title instead, unless nothing else can be drawn. ``remark``
+    is printed below the panels, for example the reason for an early stop. ``valve`` is the kind of valve, which
+    determines the colour of the device, and ``joint`` holds the names of the joint. Gauge pressure is relative to the
+    active atmosphere (``units/shown.py``).
     """
     title = title or recording.label
     held = _held_angle(recording)
@@ -126,7 +126,7 @@ def recording_figure(
 
 
 def _panel(recording: Recording, quantity: _Quantity, valve: str, joint: JointNames) -> Panel:
-    """Return the panel of a quantity of the recording."""
+    """Return the panel of one quantity of the recording."""
     kind = quantity.kind
     lines = {channel: line for channel, line in quantity.lines.items() if channel in recording}
     marks = []
@@ -146,7 +146,7 @@ def _panel(recording: Recording, quantity: _Quantity, valve: str, joint: JointNa
 
 
 def _held_angle(recording: Recording) -> float | None:
-    """Return the angle [rad] of a simulated ankle that never moves beside what else is drawn, None of any other."""
+    """Return the constant angle [rad] of a simulated locked ankle, or None if it moves or nothing else can be drawn."""
     others = [name for quantity in _QUANTITIES for name in quantity.lines if name != "angle" and name in recording]
     is_followed = "reference_angle" in recording
     if recording.kind != "simulated" or "angle" not in recording or not others or is_followed:
@@ -158,7 +158,7 @@ def _held_angle(recording: Recording) -> float | None:
 def _set_limits(
     ends: tuple[float, float] | None, smallest_span: float, always_shown: Sequence[float], axes: "Axes"
 ) -> None:
-    """Set the limits of the value axis to what is drawn and what is always shown, with some air, and few ticks."""
+    """Set the limits of the value axis to include the data and ``always_shown``, with a margin and few ticks."""
     shown = (*axes.dataLim.intervaly, *always_shown)
     span = max(shown) - min(shown)
     missing = max(0.0, smallest_span - span)
@@ -170,5 +170,5 @@ def _set_limits(
 
 
 def figure_files(figure: "Figure") -> dict[str, bytes]:
-    """Return the files that a result folder keeps of its figure, by name."""
+    """Return the files of a figure for a result folder, by name."""
     return {f"figure.{file_format}": content for file_format, content in render_figure(figure, ("png", "svg")).items()}

@@ -1,4 +1,4 @@
-"""Panels of every fit and comparison: measurements, the law or model beside them, and the residuals."""
+"""Panels of fits and comparisons: measurements with the fitted model, and the residuals."""
 
 import math
 from collections.abc import Sequence
@@ -20,9 +20,9 @@ _READING = {"linestyle": "none", "markersize": 5, "markeredgewidth": 1.1}
 
 
 class _ReadingStyle(NamedTuple):
-    """Style of readings: colour, largest number drawn, keywords of Matplotlib.
+    """Style of measured points: colour, largest number of points drawn, Matplotlib keywords.
 
-    A page with every sample would have some megabytes.
+    The number is limited because a page with every sample would be several megabytes.
     """
 
     colour: str
@@ -37,20 +37,20 @@ _LOOKS = {
     "circles": _ReadingStyle(BLACK, 90, {"marker": "o", "markersize": 3.6, "markeredgewidth": 0.7, **_HOLLOW}),
     "dots": _ReadingStyle(BLACK, 400, {"marker": ".", "markersize": 2.6, "linestyle": ""}),
 }
-"""Looks of readings by name."""
+"""Styles of measured points by name."""
 _ROUNDING = 1.0e-9
-"""Residual over the range of the samples that is none."""
+"""Residual relative to the range of the samples that counts as zero."""
 
 
 def readings_mark(label: str, x: Floats, y: Floats, look: str = "measured") -> Mark:
-    """Return readings or samples [SI], some of them where there are very many, in one of the looks."""
+    """Return measured points [SI] as a mark in a named style; of many points, an evenly spaced subset is drawn."""
     drawn_as = _LOOKS[look]
     some = slice(None, None, math.ceil(x.size / drawn_as.most))
     return Mark("line", x[some], y[some], (), label, drawn_as.colour, drawn_as.style)
 
 
 def curve_mark(label: str, x: Floats, y: Floats) -> Mark:
-    """Return the curve of a law [SI] in the order of x; an empty label stays out of the legend."""
+    """Return the curve of a model [SI], sorted by x; a curve with an empty label is not in the legend."""
     order = np.argsort(x, kind="stable")
     return Mark("line", x[order], y[order], (), label, BLACK, {"linewidth": 1.4})
 
@@ -58,7 +58,7 @@ def curve_mark(label: str, x: Floats, y: Floats) -> Mark:
 def with_residuals(
     title: str, x: Kind, y: Kind, marks: Sequence[Mark], at: Floats, residuals: Floats
 ) -> tuple[Panel, Panel]:
-    """Return a panel and the one of the residuals [SI] at places along its horizontal axis."""
+    """Return a panel with the given marks, and a panel of the residuals [SI] at horizontal positions ``at``."""
     quantity = "pressure change" if y.quantity == "pressure" else y.quantity
     left = [readings_mark("", at, residuals), Mark("level", (), 0.0, colour=BLACK, style={"linewidth": 1.4})]
     below = Panel(x, Kind("Residual (measured - model)", y.unit, quantity), left, "Residuals", legend="")
@@ -67,9 +67,10 @@ def with_residuals(
 
 @dataclass(frozen=True, slots=True)
 class FittedCurve:
-    """Samples and a model of them at the same times, in units of ``time`` and ``level``; ``colour`` is the model's.
+    """Samples and fitted model at the same times; ``time`` and ``level`` are the kinds of the numbers.
 
-    ``change`` is what a difference of both is, ``names`` are those of both in the legend.
+    ``change`` is the kind of the residual, ``names`` are the legend labels of samples and model, ``colour`` is the
+    colour of the model.
     """
 
     time: Kind
@@ -83,7 +84,7 @@ class FittedCurve:
 
 
 def course_panels(course: FittedCurve, look: str, legend: str, limits: Sequence[float] = ()) -> list[Panel]:
-    """Return samples and model over time and, half as tall below them, their residual, with ``limits`` dashed."""
+    """Return a panel of samples and model over time, and a half-height panel of the residual with dashed ``limits``."""
     upper = [
         readings_mark(course.names[0], course.times, course.samples, look),
         Mark("line", course.times, course.model, (), course.names[1], course.colour, {"linewidth": 1.3}),

@@ -1,4 +1,4 @@
-"""Display names of settings: ``setting_names.toml``, for the axes of figures and for the page that simulates."""
+"""Display names of settings from ``setting_names.toml``, for axis labels and for the page that simulates."""
 
 import tomllib
 from functools import cache
@@ -9,12 +9,12 @@ _PREFIXES = {"sensors": "Sensors: ", "supply_line": "Line: "}
 
 @cache
 def setting_names() -> dict[str, str]:
-    """Return the names by path of the settings that have one of their own."""
+    """Return the display names of settings by path; most settings have none."""
     return tomllib.loads(files("ppafo.report").joinpath("setting_names.toml").read_text(encoding="utf-8"))
 
 
 def label_of(path: str) -> str:
-    """Return what a setting is called; one without a name of its own is called after the last part of its path."""
+    """Return the display name of a setting; the default is the last part of its path."""
     group, _, name = path.rpartition(".")
     said = name.replace("_", " ")
     prefix = _PREFIXES.get(group.partition(".")[0], "")

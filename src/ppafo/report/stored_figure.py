@@ -1,6 +1,6 @@
-"""The figures of saved results and walks, with what their documents state: joint, atmosphere, units, why a run ended.
+"""Figures of saved results and walks, with the data stated in their documents: joint, atmosphere, units, ending.
 
-A document may have been written by anybody: what is of another form is named by its key.
+Documents may come from any source; each error names the key with an invalid value.
 """
 
 from collections.abc import Mapping
@@ -25,18 +25,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _LARGEST = 1e9
-"""No atmosphere [Pa absolute] and no time [s] is as large."""
+"""Upper limit for the atmosphere [Pa absolute] and for times [s] in a document."""
 _LONGEST_SHOWN = 60
-"""Characters of a key, a value or a word that a message or figure repeats."""
+"""Largest number of characters of a key, value or word in a message or figure."""
 _LONGEST_REMARK = 500
-"""Characters of what a document says of the end of a run."""
+"""Largest number of characters of a document's message on the end of a run."""
 _END_OF_WALK = 5.0
-"""Seconds at the end of a walk that are drawn, some strides: a minute of them is a black bar."""
+"""Duration drawn from the end of a walk [s]: a few strides, since a longer one would be unreadable."""
 
 
 @checked
 def read_result(folder: str | Path) -> StoredResult:
-    """Return what a result folder holds, with its figure. DataError for a folder that holds none.
+    """Return the content of a result folder, with its figure; raises DataError for a folder without a result.
 
     >>> import ppafo
     >>> folder = ppafo.simulate("step-response").save("step")
@@ -48,9 +48,9 @@ def read_result(folder: str | Path) -> StoredResult:
 
 
 def draw_stored_result(stored: StoredResult) -> "Figure":
-    """Return the figure of a saved result: the same that ``Result.plot`` gave.
+    """Return the figure of a saved result, identical to the figure of ``Result.plot``.
 
-    DataError names the key of ``run.json`` that is of another form.
+    Raises DataError that names the invalid key of ``run.json``.
     """
     file, document = stored.folder / RUN_FILE, stored.document
     name = _under(file, document, "scenario").get("name", "")
@@ -65,7 +65,7 @@ def draw_stored_result(stored: StoredResult) -> "Figure":
 def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recording) -> "Figure":
     """Return the figure of the last seconds of a saved walk, with the failure that ended it, if any.
 
-    ``document`` is what ``file`` holds, empty where there is none; DataError names the key that is of another form.
+    ``document`` is the content of ``file``, empty without a file. Raises DataError that names the invalid key.
     """
     end = float(recording.time[-1])
     # A short walk is drawn whole, and then nothing is left out that had to be said.
@@ -80,10 +80,10 @@ def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recordi
 def stated_units(
     file: Path, document: Mapping[str, Any], *keys: str, device: tuple[str, ...] = ("device",)
 ) -> dict[str, str]:
-    """Return the units in which a file's document says, at some keys, that numbers are shown, by unit in SI.
+    """Return the display units stated in a document at some keys, by SI unit.
 
-    With the atmosphere, from which gauge pressures count, of the device at the keys below these. DataError names one
-    that is no unit of that kind, and the key that is of another form.
+    They include the atmosphere of the device, the reference of gauge pressures. Raises DataError for a unit of a wrong
+    kind, and for an invalid value, with its key.
     """
     # The device itself says from which pressure gauge ones count.
     stated = {key: unit for key, unit in _under(file, document, *keys, "shown").items() if key != GAUGE_ZERO}
@@ -102,9 +102,9 @@ def stated_units(
 
 
 def stated_joint(file: Path, document: Mapping[str, Any], *device: str) -> JointNames:
-    """Return what the device at some keys of a file's document turns, in words; the ankle where it does not say.
+    """Return the names of the joint from the device at some keys of a document; the default is the ankle.
 
-    DataError names the key that is of another form.
+    Raises DataError that names the invalid key.
     """
     words = _under(file, document, *device, "joint")
     joint = {name: words.get(name, getattr(ANKLE, name)) for name in ("name", "positive", "negative")}
@@ -115,14 +115,14 @@ def stated_joint(file: Path, document: Mapping[str, Any], *device: str) -> Joint
 
 
 def _ending(file: Path, document: Mapping[str, Any]) -> str:
-    """Return why a run stopped before its end, empty where it did not."""
+    """Return the reason for an early stop of a run; empty for a completed run."""
     status = _under(file, document, "status")
     message = one_line(status.get("message", ""))[:_LONGEST_REMARK]
     return "" if status.get("kind", "completed") == "completed" else message
 
 
 def _under(file: Path, document: Mapping[str, Any], *keys: str) -> Mapping[str, Any]:
-    """Return a table of a document, an empty one where there is none."""
+    """Return the table at some keys of a document, empty if it is missing."""
     for depth, key in enumerate(keys, start=1):
         below = document.get(key, {})
         if not isinstance(below, Mapping):
@@ -132,5 +132,5 @@ def _under(file: Path, document: Mapping[str, Any], *keys: str) -> Mapping[str, 
 
 
 def _other_form(file: Path, path: str, given: object, wanted: str) -> DataError:
-    """Return the error of a value at a dotted path of a file that is not what is ``wanted`` there."""
+    """Return the error for an invalid value at a dotted path of a file; ``wanted`` describes the valid values."""
     return DataError(f"{file}: {path} = {one_line(repr(given))[:_LONGEST_SHOWN]} must be {wanted}")

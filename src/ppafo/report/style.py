@@ -1,4 +1,4 @@
-"""The look of every figure: fonts, colours, sizes, the panels of one that has several, and how it becomes bytes."""
+"""Common style of all figures: fonts, colours, sizes, grids of panels, and rendering to bytes."""
 
 import io
 from collections.abc import Iterable, Iterator, Sequence
@@ -20,9 +20,9 @@ VERMILION = "#D55E00"
 GREEN = "#009E73"
 ORANGE = "#E69F00"
 PURPLE = "#A33F77"
-"""Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
+"""Colours that are distinguishable with any kind of colour vision (Okabe and Ito, 2008)."""
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, BLACK, GREY)
-"""The order in which lines of one kind take colours."""
+"""Order of the colours of lines of one kind."""
 DASHES = MappingProxyType(
     {
         VERMILION: (0, (6, 1.5, 1.2, 1.5)),
@@ -32,13 +32,13 @@ DASHES = MappingProxyType(
         GREY: (0, (6, 1.2, 1.2, 1.2, 1.2, 1.2)),
     }
 )
-"""Dashes of a colour beside lines of other colours, as half of these colours are one grey; others are solid."""
+"""Dashes by colour for lines of several colours, half of which are equal in greyscale; other colours are solid."""
 MARKERS = MappingProxyType({VERMILION: "s", GREEN: "^", ORANGE: "D", PURPLE: "v", BLACK: "P", GREY: "X"})
-"""Marker of a colour beside others, a circle of one that is not named."""
+"""Marker by colour; the default is a circle."""
 
 
 class DrawingStyle(NamedTuple):
-    """Style of one item in every figure, and on the page that simulates: colour, line and marker."""
+    """Style of an item in every figure, and on the page that simulates: colour, line style and marker."""
 
     colour: str
     line: str = "-"
@@ -51,25 +51,25 @@ CHAMBER_1 = DrawingStyle(GREEN, marker="^")
 CHAMBER_2 = DrawingStyle(PURPLE, line="-.", marker="v")
 REFERENCE = DrawingStyle(BLACK, line="--")
 REFERENCE_2 = DrawingStyle(BLACK, line=":")
-"""Style of what is wanted of a second quantity in the same panel."""
+"""Style of a second reference in the same panel."""
 EXPERIMENT = DrawingStyle(GREY, marker=".")
-"""Style of measurements, from a bench or from the simulated test bench."""
+"""Style of measurements, from a real or a simulated test bench."""
 ACTUAL = DrawingStyle(BLUE)
-"""Style of a device irrespective of its valve."""
+"""Style of a device regardless of its valve."""
 _VALVES = MappingProxyType({"proportional": PROPORTIONAL, "solenoid": SOLENOID, "solenoid_recycling": SOLENOID})
 PAGE_COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
-"""Curves of the page that simulates, on white: numbers 1 to 4 of its style sheet."""
+"""Colours of curves on the page that simulates, on white: numbers 1 to 4 of its style sheet."""
 PAGE_LOOKS = MappingProxyType({kind: PAGE_COLOURS.index(look.colour) + 1 for kind, look in _VALVES.items()})
-"""Index of the page's colour for the curves of each kind of valve."""
+"""Index of the page's colour for each kind of valve."""
 
 
 def look_of_valve(kind: str) -> DrawingStyle:
-    """Return how a device with this kind of valve looks."""
+    """Return the drawing style of a device with this kind of valve."""
     return _VALVES.get(kind, ACTUAL)
 
 
 RESOLUTION = 150
-"""Dots per inch of a PNG file."""
+"""Resolution of a PNG file [dots per inch]."""
 _SETTINGS: Any = MappingProxyType(
     {
         "font.family": "sans-serif",
@@ -111,7 +111,7 @@ _SETTINGS: Any = MappingProxyType(
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Draw in the style of the house inside a ``with`` block; settings of the surrounding program stay as they are."""
+    """Apply the common style of figures within a ``with`` block; other Matplotlib settings are restored afterwards."""
     import matplotlib
 
     with matplotlib.rc_context():
@@ -122,7 +122,7 @@ def house_style() -> Iterator[None]:
 
 
 def render_figure(figure: "Figure", file_formats: Iterable[str]) -> dict[str, bytes]:
-    """Return file contents by format (``png``, ``svg``, ``pdf``); the same figure gives the same bytes."""
+    """Return the content of files by format (``png``, ``svg``, ``pdf``); equal figures give equal bytes."""
     # A date would give the same figure other bytes every second.
     undated: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     files, layout = {}, figure.get_layout_engine()
@@ -138,7 +138,7 @@ def render_figure(figure: "Figure", file_formats: Iterable[str]) -> dict[str, by
 
 
 def mark_kind(figure: "Figure", kind: RecordingKind) -> None:
-    """Say at the top right of a figure that what it shows is simulated or synthetic; nothing where it was measured."""
+    """Write "simulated" or "synthetic" at the top right of a figure; nothing for measured data."""
     if kind == "measured":
         return
     # In inches from the edge, as figures have many heights.
@@ -148,7 +148,7 @@ def mark_kind(figure: "Figure", kind: RecordingKind) -> None:
 
 @dataclass(frozen=True, slots=True)
 class FigureMargins:
-    """Inches around the panels, between rows and between columns, and from a panel to the name of its value axis."""
+    """Margins of a figure [inches]: around the panels, between rows and columns, and from a panel to its axis label."""
 
     left: float
     right: float
@@ -166,7 +166,7 @@ def figure_of_panels(
     columns: int = 1,
     heights: Sequence[float] | None = None,
 ) -> "tuple[Figure, list[list[Axes]]]":
-    """Return a figure of this width and height [inches] and its panels by row, all of them over one horizontal axis."""
+    """Return a figure of this width and height [inches] and its panels by row, with a shared horizontal axis."""
     figure, panel_width = _figure_with_margins(size, margins, rows, columns)
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False, height_ratios=heights).tolist()
     for axes in figure.axes:
@@ -177,7 +177,7 @@ def figure_of_panels(
 def figure_of_free_panels(
     size: tuple[float, float], margins: FigureMargins, rows: int, columns: int, widths: Sequence[float] | None = None
 ) -> "tuple[Figure, list[list[Axes]]]":
-    """Return a figure of this width and height [inches] and its panels by row, each with axes of its own."""
+    """Return a figure of this width and height [inches] and its panels by row, each with separate axes."""
     figure, _ = _figure_with_margins(size, margins, rows, columns)
     return figure, figure.subplots(rows, columns, squeeze=False, width_ratios=widths).tolist()
 
@@ -185,7 +185,7 @@ def figure_of_free_panels(
 def _figure_with_margins(
     size: tuple[float, float], margins: FigureMargins, rows: int, columns: int
 ) -> "tuple[Figure, float]":
-    """Return an empty figure with its margins, and the width of a panel [inches]."""
+    """Return an empty figure with margins, and the width of a panel [inches]."""
     from matplotlib.figure import Figure
 
     width, height = size

@@ -1,4 +1,4 @@
-"""Typesetting of output: signs and units, aligned columns, filled templates of pages."""
+"""Formatting of output: typographic signs and units, aligned columns, page templates."""
 
 import base64
 import re
@@ -33,7 +33,7 @@ _PATH = re.compile(r"\b[a-z_]+(?:\.[a-z0-9_]+)+\b")
 
 
 def typeset(text: str) -> str:
-    """Return a plain text with superscripts and indices, signs, quotation marks, and psig instead of psi_g."""
+    """Return plain text with typographic superscripts, subscripts, signs and quotation marks, and psig for psi_g."""
     # Powers of ten first: their sign is no minus sign of a number.
     text = _POWER_OF_TEN.sub(lambda found: f" {_TIMES} 10{str(int(found[1])).translate(_SUPERSCRIPTS)}", text)
     text = _EXPONENT.sub(lambda found: found[1].translate(_SUPERSCRIPTS), text)
@@ -46,17 +46,17 @@ def typeset(text: str) -> str:
 
 
 def with_paths_as_code(text: str) -> "Markup":
-    """Return a text as HTML in which every dotted path of a value, such as ``valve.area``, is marked as code."""
+    """Return text as HTML, with each dotted path of a value, such as ``valve.area``, marked as code."""
     from markupsafe import Markup, escape
 
     return Markup(_PATH.sub(lambda found: f"<code>{found[0]}</code>", str(escape(text))))
 
 
 def sentence(text: str, title: str = "") -> str:
-    """Return a text with a capital at its beginning and a full stop at its end; a path or symbol stays as it is.
+    """Return text as a sentence, with a capital letter and a full stop; a path or symbol at the start is unchanged.
 
-    So does a name: a word with a digit, the first word of the ``title`` of the page, and before a colon any of its
-    words.
+    Names are unchanged too: a word with a digit, the first word of the page ``title`` and, before a colon, any word of
+    it.
     """
     stripped = text.strip()
     if not stripped:
@@ -70,9 +70,9 @@ def sentence(text: str, title: str = "") -> str:
 
 
 def quantity(value: float | None, unit: str, digits: int = 4) -> str:
-    """Return number and unit in plain text, ``0.1000 N m``; a dash where there is no number.
+    """Return number and unit as plain text, such as ``0.1000 N m``; a dash for None.
 
-    A plain number has the unit ``-`` and, where it is whole, is written as a whole number.
+    A number with the unit ``-`` is dimensionless; a whole one is written without decimals.
     """
     if value is None:
         return UNKNOWN
@@ -84,12 +84,12 @@ def quantity(value: float | None, unit: str, digits: int = 4) -> str:
 
 
 def format_reported_quantity(value: float, unit: str) -> str:
-    """Return number and unit with no more digits than the number was printed with."""
+    """Return number and unit with no more digits than in the reported number."""
     return f"{value:g} {'' if unit == '-' else unit}".rstrip()
 
 
 def align_columns(rows: Sequence[Sequence[str]], left: int = 1) -> list[str]:
-    """Return rows of texts as lines of aligned columns: the first ``left`` to the left, all others to the right."""
+    """Return rows of texts as aligned lines: the first ``left`` columns left-aligned, the others right-aligned."""
     columns = []
     for place, column in enumerate(zip(*rows, strict=True)):
         width = max(map(len, column))
@@ -98,7 +98,7 @@ def align_columns(rows: Sequence[Sequence[str]], left: int = 1) -> list[str]:
 
 
 def render_page(template: str, values: Mapping[str, Any], package: str = "ppafo.report") -> str:
-    """Return a template of a package filled with values; texts are escaped, a value that is missing is an error."""
+    """Return a template of a package filled with values; texts are escaped, and a missing value is an error."""
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
     # A page of an analysis includes the style sheet, which all pages share.
@@ -118,6 +118,6 @@ def render_page(template: str, values: Mapping[str, Any], package: str = "ppafo.
 
 
 def inline_figure(content: bytes) -> str:
-    """Return the content of an SVG or GIF file as the address of an image that is part of the page."""
+    """Return an SVG or GIF file as a data URL, for an image embedded in a page."""
     kind = "gif" if content.startswith(b"GIF8") else "svg+xml"
     return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"

@@ -146,7 +146,12 @@ class Inputs(NamedTuple):
 
 
 class Observables(NamedTuple):
-    """Observable quantities of a bench: pressures [Pa, absolute], driving torque and static limit of friction [N m]."""
+    """Observable quantities of a bench.
+
+    ``pressure_1``, ``pressure_2``: chamber pressures [Pa absolute]
+    ``torque``: driving torque, with the torque of a leg [N m]
+    ``static_limit``: static limit of friction [N m]
+    """
 
     pressure_1: float
     pressure_2: float

@@ -94,7 +94,7 @@ def read_off(
 STEP = 5.0 * PASCALS_PER_PSI
 HIGHEST = 95.0 * PASCALS_PER_PSI
 TURN = 20.0 * PASCALS_PER_PSI
-"""Pressure [Pa] by which it goes beyond the highest reading before it falls, so that friction has turned by then."""
+"""Pressure [Pa] above the highest reading from which the pressure returns, so that friction has reversed before."""
 TORQUE_REPETITIONS = 3
 TORQUE_READING_INTERVAL = 10.0
 
@@ -150,7 +150,7 @@ COMMAND_STEPS = 100
 READING_INTERVAL = 2.0
 REPETITIONS = 2
 SMALL_METER = 0.1
-"""Range of the flow meter for the leak as a fraction [-] of the other's."""
+"""Ratio [-] of the flow range of the leak meter to the range of the other meter."""
 
 
 def record_open_valve(request: ExperimentRequest) -> ExperimentResult:
@@ -240,13 +240,13 @@ def _flow(physics: RigPhysics, upstream: float, downstream: float, fraction: flo
 
 
 LEAK_RATE = 20.0
-"""Samples in a second [Hz] of a leak that takes half a minute."""
+"""Sample rate [Hz] of a leak experiment that takes half a minute."""
 
 _SUPPLIES = {"supply_pressure": "supply_drop_1", "dorsiflexion_pressure": "supply_drop_2"}
 _SENSED = ("angle", "pressure_1", "pressure_2")
 _IN_MOTION = (*_SENSED, *_SUPPLIES, "command")
 _WHOLE = 1.0e-9
-"""Fraction of a sample by which the end of a run may miss it, by rounding."""
+"""Rounding tolerance at the end of a run, as a fraction of a sample."""
 
 _CLOSED_VALVE = {"kind": "constant", "command": 0, "rate": "1 kHz"}
 

@@ -103,7 +103,7 @@ SECTIONS: dict[str, tuple[Quantity, ...]] = {
     "torque_sensor": _sensor("N m", "scale"),
     "flow_sensor": _sensor("kg/s", "flow meter"),
 }
-"""All values are needed in every preset: what is off says so with a 0 and a reason."""
+"""Values of a preset, all of them required: physics that is off has the value 0 and a reason."""
 
 PATHS: dict[str, Quantity] = {
     f"{section}.{quantity.name}": quantity for section, members in SECTIONS.items() for quantity in members
@@ -142,7 +142,7 @@ def json_schema() -> dict[str, Any]:
 
 
 PREFIX = "rig."
-"""An override whose path begins so belongs to the preset, any other one to the device or the experiment."""
+"""Prefix of overrides of the preset; any other override concerns the device or the experiment."""
 
 _FILE = TomlKind("preset of the rig", "rig", resources.files("ppafo.rig") / "presets", ParameterError)
 
@@ -176,7 +176,7 @@ class Preset:
 
 
 def list_presets() -> tuple[str, ...]:
-    """Return the names of the presets that come with the package."""
+    """Return the names of the presets in the package."""
     return _FILE.names()
 
 
@@ -344,9 +344,9 @@ CHANNEL_SENSORS = {
     "friction": "",
     "dorsiflexion_pressure": "pressure_sensor",
 }
-"""Sensor of each channel; ``friction`` is no sensor but has a stream of random numbers too.
+"""Sensor of each channel; ``friction`` has no sensor, but a stream of random numbers.
 
-The order decides the streams: a new channel comes last, so that the numbers of the others stay.
+The order determines the streams: a new channel must come last, so that the other streams do not change.
 """
 
 # By its place, not its name: renaming a channel leaves its noise.
@@ -362,11 +362,14 @@ class SimulatedSensor:
     noise: Floats
 
     def reads(self, true: float, sample: int) -> float:
-        """Return the reading at a sample, in the unit of ``true`` [SI]."""
+        """Return the reading at a sample for a true value, both in SI.
+
+        ``sample`` is the number of the sample, which selects its noise.
+        """
         return quantise(true + self.offset + float(self.noise[sample]), self.resolution)
 
     def readings(self, true: Floats) -> Floats:
-        """Return the readings [SI] at the first samples."""
+        """Return the readings of true values [SI] at the first samples."""
         return np.array([self.reads(float(value), sample) for sample, value in enumerate(true)])
 
 

@@ -78,48 +78,48 @@ class Commands:
 Floats = NDArray[np.float64]
 
 UNKNOWNS = len(RigState._fields)
-"""Unknowns of the rig; those of the valve follow them in every array of unknowns."""
+"""Number of unknowns of the rig; the unknowns of the valve follow in every array of unknowns."""
 ANGLE = RigState._fields.index("angle")
 VELOCITY = RigState._fields.index("angular_velocity")
 
 
 @dataclass(frozen=True, slots=True)
 class RigRun:
-    """A run on the rig, in SI units."""
+    """Run on the rig, in SI units."""
 
     device: Device
-    """The device as it truly is, which the sensors and the controller do not know."""
+    """True device, which the sensors and the controller do not know."""
     run: Run
-    """Run on the plain model, without the additions of the rig."""
+    """Run on the identified model, without the additional physics of the rig."""
     physics: RigPhysics
     line_orifice: ExactOrifice
     initial: RigState
     sensors: dict[str, SimulatedSensor]
-    """Sensors by the channel that they read: at least angle, pressure_1 and pressure_2."""
+    """Sensors by channel: at least angle, pressure_1 and pressure_2."""
     sample_times: Floats
-    """When the sensors are recorded [s], the first at 0 and the last at the end."""
+    """Sample times of the sensors [s], the first at 0 and the last at the end."""
     control_period: float
     """Time between two decisions of the controller [s]."""
     command_delay: float
     """Dead time between a decision and the valve [s]."""
     hysteresis: float
-    """Play of the valve's spool in its command [-]."""
+    """Backlash of the valve's spool with respect to the command [-]."""
 
 
 @dataclass(slots=True)
 class RigSolution:
-    """True solution of a run: one row or number for each sample time."""
+    """True solution of a run, with a row or number for each sample time."""
 
     states: Floats
     """Unknowns (samples, unknowns of ``RigState``) [SI]."""
     pressures: Floats
     """Pressures of both chambers (samples, 2) [Pa, absolute]."""
     commands: Floats
-    """Commands that the controller had decided (samples,) [-]."""
+    """Commands decided by the controller (samples,) [-]."""
     impacts: list[float] = field(default_factory=list)
-    """Times [s] at which the vane met a stop."""
+    """Times [s] at which the vane hit a stop."""
     breakaways: list[float] = field(default_factory=list)
-    """Times [s] at which friction let the vane go."""
+    """Times [s] at which the vane broke away from friction."""
 
 
 def sensor_signals(physics: RigPhysics, state: Floats, pressures: Floats) -> tuple[float, float, float]:
@@ -237,7 +237,7 @@ class _Equations:
         return self.compiled.observe(unknowns[:UNKNOWNS], self.vane(time, unknowns))
 
     def distances(self, direction: float) -> Distances:
-        """Root functions of a mode: distance from breakaway, or from standstill and from the stop ahead."""
+        """Root functions of a mode: distance to breakaway at rest, or to standstill and to the stop ahead in motion."""
 
         def sliding(_time: float, unknowns: Floats) -> Roots:
             return roots_sliding(self.plant, float(unknowns[ANGLE]), float(unknowns[VELOCITY]), direction)

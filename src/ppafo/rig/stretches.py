@@ -12,12 +12,12 @@ from ppafo.rig.dynamics import RigState
 Floats = NDArray[np.float64]
 
 Slopes = Callable[[float, Floats], Floats]
-"""Right-hand side: slopes [SI/s] of the unknowns (unknowns,) at a time [s]."""
+"""Right-hand side: time derivatives [SI/s] of the unknowns (unknowns,) at a time [s]."""
 Distances = Callable[[float, Floats], Roots]
-"""Root functions of a time [s] and the unknowns (unknowns,): positive while the stretch lasts."""
+"""Root functions of time [s] and unknowns (unknowns,), positive until the event."""
 
 RELATIVE_TOLERANCE = 1.0e-8
-"""Error of a step over an unknown [-]: five digits below the 1e-3 to which the rig and the model are compared."""
+"""Relative tolerance of a step [-]: five digits below the 1e-3 to which rig and model are compared."""
 
 ABSOLUTE_TOLERANCES = RigState(
     angle=1e-10,
@@ -42,16 +42,16 @@ ABSOLUTE_TOLERANCES = RigState(
     sensor_pressure_1=1e-2,
     sensor_pressure_2=1e-2,
 )
-"""Errors [SI] below a millionth of usual values: a chamber has some 1e-4 kg and 10 J, a supply 1e5 Pa."""
+"""Absolute tolerances [SI], below a millionth of usual values: 1e-4 kg and 10 J in a chamber, 1e5 Pa of supply."""
 
 VALVE_TOLERANCE = 1e-10
-"""Absolute tolerance of each unknown of the valve, of which 1 is fully open [-]."""
+"""Absolute tolerance of each unknown of the valve, for which 1 is fully open [-]."""
 
 MAXIMUM_STEPS = 100_000
-"""Steps of one stretch above which the solver crawls and is stopped; usual stretches take some hundred."""
+"""Number of solver steps between two events at which the solver is stopped; a few hundred are usual."""
 
 _ROOT_TOLERANCE = 4.0 * float(np.finfo(np.float64).eps)
-"""Least relative tolerance [-] that ``scipy.optimize.brentq`` takes."""
+"""Smallest relative tolerance [-] that ``scipy.optimize.brentq`` accepts."""
 
 
 def solve_stretch(

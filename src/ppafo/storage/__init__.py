@@ -1,4 +1,4 @@
-"""Files in and out: recordings as NetCDF and CSV, and result folders. Nothing is ever half written."""
+"""Reading and writing of files: recordings as NetCDF and CSV, and result folders. All writes are atomic."""
 
 from ppafo.storage.comma_separated import read_csv, write_csv
 from ppafo.storage.netcdf import dataset_of, write_netcdf

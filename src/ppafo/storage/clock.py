@@ -1,4 +1,4 @@
-"""Clocks of loggers as seconds: times of day, with and without a date and a zone, and counters of 32 bits."""
+"""Logger clocks converted to seconds: times of day, with or without date and time zone, and 32-bit counters."""
 
 import re
 from collections.abc import Sequence
@@ -23,9 +23,9 @@ _TIME = re.compile(
     r"(?:\s*(?P<half>[AaPp])\.?\s?[Mm]\b\.?)?(?:\s*(?P<zone>Z\b|[+-]\d{2}:?(?:\d{2})?|[A-Z]{2,5}\b(?:[+-]\d{1,2})?))?"
     r"(?:\[[\w/]+\])?"
 )
-"""Hours, minutes and seconds, or two of them, with a fraction, a half of the day (am, pm), a zone and its place."""
+"""Time of day: hours, minutes and seconds, or two of them; optional fraction, am or pm, and time zone."""
 _COMPACT = re.compile(r"(?P<date>\d{8})T(?P<hour>\d{2})(?P<minute>\d{2})(?P<second>\d{2})(?P<rest>.*)")
-"""A date and a time in digits alone, ``20260321T080010``."""
+"""Date and time in digits alone, ``20260321T080010``."""
 _YEAR_FIRST = re.compile(r"(\d{4})[-/.]?(\d{2})[-/.]?(\d{2})|(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})")
 _DOTTED = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{2,4})")
 _SLASHED = re.compile(r"(\d{1,2})[/-](\d{1,2})[/-](\d{2,4})")
@@ -33,13 +33,13 @@ _MONTHS = ("jan", "feb", "mar mär mrz", "apr", "may mai", "jun", "jul", "aug", 
 _MONTH = {name: number for number, names in enumerate(_MONTHS, start=1) for name in names.split()}
 """Number of a month by the first three letters of its name, in English and German."""
 _PERIODS = (2.0**32 * 1.0e-6, 2.0**32 * 1.0e-3)
-"""Seconds after which a counter of 32 bits begins again, of microseconds and of milliseconds."""
+"""Periods [s] after which a 32-bit counter of microseconds or milliseconds wraps around."""
 _LARGEST_STEP = 10.0
-"""Usual intervals [-] across a fall; a longer one is a clock that was set back, and no counter."""
+"""Largest step across a counter overflow, in usual intervals [-]; a longer step means that the clock was set back."""
 
 
 class _Stamp(NamedTuple):
-    """A time of day [s], its zone, and the words beside it, which may be a date; texts are empty without one."""
+    """Time of day [s], its time zone, and the text beside it, which may be a date; texts are empty if absent."""
 
     seconds: float
     zone: str
@@ -47,7 +47,7 @@ class _Stamp(NamedTuple):
 
 
 def is_clock(cell: str) -> bool:
-    """Tell whether a cell is a time of day, with a date or without, and no number."""
+    """Return whether a cell contains a time of day, with or without a date, rather than a number."""
     text = cell.strip()
     return _COMPACT.fullmatch(text) is not None or _TIME.search(text) is not None
 
@@ -59,11 +59,12 @@ def clock_seconds(
     order: DateOrder | None = None,
     form: ClockForm | None = None,
 ) -> Floats:
-    """Return the seconds since the first of some times of day; ``rows`` say where each stands, for messages.
+    """Return the times of day in ``cells`` as seconds since the first; ``rows`` are the row labels for messages.
 
-    ``dates`` are cells of a column of dates beside the times; else a date may stand in the cell itself, and without
-    any a fall by more than half a day is midnight. ``order`` says how a date begins, ``form`` what 08:10 is. DataError
-    for a cell that is no time, for what may be two times, and for a clock that changes its zone by name.
+    ``dates`` are the cells of a separate date column. Otherwise a date may stand in the cell itself; without any date,
+    a decrease by more than half a day is taken as midnight. ``order`` is the order of day and month in a date, ``form``
+    the meaning of 08:10. Raises DataError for a cell that is no time, for an ambiguous time or date, and for a clock
+    that changes its time zone by name.
     """
     stamps = [_stamp(cell, form, row) for cell, row in zip(cells, rows, strict=True)]
     zones = dict.fromkeys(re.sub(r"[+-].*", "", stamp.zone) for stamp in stamps)
@@ -79,7 +80,7 @@ def clock_seconds(
 
 
 def _stamp(cell: str, form: ClockForm | None, row: str) -> _Stamp:
-    """Return the time of day in a cell; DataError, after what ``row`` says, for one that is none or may be two."""
+    """Return the time of day in a cell. Raises DataError, with ``row`` first, if there is none or it is ambiguous."""
     text = one_line(cell.strip())
     compact = _COMPACT.fullmatch(text)
     if compact is not None:
@@ -112,7 +113,7 @@ def _stamp(cell: str, form: ClockForm | None, row: str) -> _Stamp:
 
 
 def _offset(zone: str) -> float:
-    """Return by how many seconds a zone is ahead, as far as it says so in digits."""
+    """Return the offset of a time zone from UTC [s] if it is given in digits, else 0."""
     match = re.search(r"([+-])(\d{1,2}):?(\d{2})?$", zone)
     if match is None:
         return 0.0
@@ -120,7 +121,7 @@ def _offset(zone: str) -> float:
 
 
 def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: DateOrder | None) -> Floats:
-    """Return the day of every date as a number; which of two numbers is the month must show, or be said."""
+    """Return the day number of each date. Raises DataError if the order of day and month is ambiguous."""
     orders: tuple[DateOrder, ...] = ("day month", "month day") if order is None else (order,)
     readings: list[Floats] = []
     unread_row = 0
@@ -149,7 +150,7 @@ def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: Dat
 
 
 def _ordinal(word: str, order: DateOrder) -> int | None:
-    """Return a date as a number of days, None where it is none; weekdays do not count."""
+    """Return a date as ordinal day number, None if the text is no date; names of weekdays are ignored."""
     text = word.strip(" ,")
     if match := _YEAR_FIRST.fullmatch(text):
         year, month, day = (int(part) for part in match.groups() if part is not None)
@@ -174,7 +175,7 @@ def _ordinal(word: str, order: DateOrder) -> int | None:
 
 
 def counted_on(time: Floats) -> Floats:
-    """Return a time [s] without the falls of a counter of 32 bits, ``micros()`` or ``millis()``; any other as it is."""
+    """Return a time [s] without the overflows of a 32-bit counter, ``micros()`` or ``millis()``; others unchanged."""
     steps = np.diff(time)
     falls = steps < 0.0
     if not falls.any() or not (steps > 0.0).any():

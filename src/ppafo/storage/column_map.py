@@ -1,7 +1,7 @@
-"""Column maps: which columns of a table from elsewhere are which channels, in which units and with which signs.
+"""Column maps: channels, units and signs of the columns of a foreign table.
 
-A map is part of a TOML file, ``[columns.NAME]``. ``foreign.py`` reads a recording through one; ``mapped_text.py`` and
-``mapped_matlab.py`` take out of a file what a map asks for.
+A map is part of a TOML file, ``[columns.NAME]``. ``foreign.py`` reads a recording through a map; ``mapped_text.py``
+extracts the mapped columns of a text file.
 """
 
 from collections.abc import Collection, Sequence
@@ -66,7 +66,7 @@ class MappedChannel(StrictTable):
 
 
 class MappedDirection(StrictTable):
-    """Direction (1 or -1, 0 for neither) from how fast a channel moves; sweeps one way are counted as repetitions."""
+    """Direction of motion from the rate of a channel: 1, -1, or 0 if too slow; sweeps are numbered as repetitions."""
 
     of: Annotated[Text, Field(description="channel whose rate decides")]
     threshold: Annotated[Text, Field(description="slowest rate that counts, such as '2 mm/s'")]
@@ -99,7 +99,7 @@ class ColumnMap(StrictTable):
 
 
 class ColumnMaps(BaseModel):
-    """Column maps by name, as a file has them; a problem file of ``ppafo identify`` has more beside them."""
+    """Column maps of a file, by name; a problem file of ``ppafo identify`` has further tables."""
 
     model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
 
@@ -110,9 +110,9 @@ _FILE = TomlKind("file of column maps", "columns", resources.files("ppafo.storag
 
 
 def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
-    """Return a column map of a TOML file by its name; without a name the file's only one.
+    """Return the column map with this name from a TOML file, or the only one in the file if no name is given.
 
-    DataError where it has no such map, or several and no name is given.
+    Raises DataError if there is no such map, or if there are several and no name is given.
     """
     parsed, file = read_model(_FILE, ColumnMaps, path)
     maps = parsed.columns
@@ -130,9 +130,9 @@ def json_schema() -> dict[str, Any]:
 
 
 def column_map_of(columns: ColumnMap | str | Path) -> tuple[ColumnMap, str]:
-    """Return a map and what messages call it: one given as a file, ``logger.toml:bench``, has that name, others none.
+    """Return a column map and its name in messages: ``logger.toml:bench`` for a map from a file, empty for an object.
 
-    DataError where the file has no such map.
+    Raises DataError if the file has no such map.
     """
     if isinstance(columns, ColumnMap):
         return columns, ""
@@ -142,7 +142,7 @@ def column_map_of(columns: ColumnMap | str | Path) -> tuple[ColumnMap, str]:
 
 
 def in_map(map_name: str) -> AbstractContextManager[None]:
-    """Name the map in the DataErrors of a ``with`` block, if it has a name."""
+    """Return a context manager that prepends the name of the map, if any, to each DataError raised within."""
     return refused_as(DataError, f"column map {one_line(map_name)}", DataError) if map_name else nullcontext()
 
 
@@ -150,10 +150,7 @@ _KEYS_OF_TIME = ("rate", "date", "date_order", "clock")
 
 
 def check_sources(columns: ColumnMap) -> None:
-    """Refuse a map without a time, a channel that comes from nowhere or from two places, and keys that mean nothing.
-
-    DataError names the key.
-    """
+    """Raise DataError, naming the key, for a missing time, a channel without exactly one source, or a misplaced key."""
     if TIME not in columns.channels:
         raise DataError(f'has no channels.{TIME}; give a column, or {TIME} = {{ rate = "100 Hz" }}')
     for name, mapped in columns.channels.items():
@@ -170,11 +167,11 @@ def check_sources(columns: ColumnMap) -> None:
 
 
 class MappedTable(NamedTuple):
-    """Content of a file that a map selects.
+    """Content of a file selected by a column map.
 
-    ``numbers`` are the columns by channel, as the file has them. A time of day has its cells in ``clock``, and in
-    ``dates`` those of a column beside it. ``rows`` say where each sample stands in the file, as a number of what
-    ``noun`` calls it; ``kind`` is what the file says of its origin.
+    ``size``: number of samples. ``numbers``: columns by channel, in the units of the file. ``clock``: cells of a time
+    of day, if time is given so; ``dates``: cells of a separate date column. ``rows``: number of each sample in the
+    file, counted in ``noun`` ("line", "sample"). ``kind``: kind of recording stated in the file.
     """
 
     size: int
@@ -187,10 +184,10 @@ class MappedTable(NamedTuple):
 
 
 _MOST_SHOWN = 20
-"""Names that a message lists."""
+"""Largest number of names listed in a message."""
 
 
 def shown_names(names: Collection[str]) -> str:
-    """Return names as a message lists them: the first twenty, each in one short line."""
+    """Return names as a list for a message: at most twenty, each shortened to one line."""
     shown = ", ".join(one_line(name)[:LONGEST_SHOWN] for name in islice(names, _MOST_SHOWN))
     return f"{shown}, ..." if len(names) > _MOST_SHOWN else shown

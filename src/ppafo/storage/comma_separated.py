@@ -1,9 +1,10 @@
-"""Recordings as CSV: one header line ``time [s],angle [rad],...``, then one line a sample, exact to the last bit.
+"""Recordings as CSV: one header line ``time [s],angle [rad],...``, then one line per sample, exact to the last bit.
 
-A column whose channel is held where such channels usually run straight says so: ``supply_pressure [Pa] hold``; the
-other way round it is ``linear``.
+A channel with an unusual interpolation between samples states it in its header, ``supply_pressure [Pa] hold`` or
+``linear``.
 
-Files from elsewhere may use other units (``angle [deg]``, ``pressure_1 [psi_g]``) and begin with lines of comment (#).
+Files from other sources may use other units (``angle [deg]``, ``pressure_1 [psi_g]``) and may start with comment lines
+(#).
 """
 
 import csv
@@ -38,7 +39,7 @@ _ONLY_SIMULATED = "supplied_mass"
 
 @dataclass(frozen=True, slots=True)
 class HeaderColumn:
-    """Column as its header declares it: channel (or time), the unit of its numbers, interpolation between samples."""
+    """Column as declared in a header: channel name (or time), unit of the numbers, interpolation between samples."""
 
     name: str
     unit: str
@@ -46,7 +47,7 @@ class HeaderColumn:
 
     @property
     def si_unit(self) -> str:
-        """The unit in which the recording keeps it; a channel that is not known by name stays as it is."""
+        """Unit in which the recording stores the channel; unknown channels keep their own unit."""
         if self.name == TIME:
             return TIME_UNIT
         return CHANNELS[self.name].unit if self.name in CHANNELS else self.unit
@@ -55,7 +56,7 @@ class HeaderColumn:
 def parse_header(cells: list[str]) -> list[HeaderColumn]:
     """Return the columns of a header such as ``time [s]``, ``pressure_1 [psi_g]``; time comes first.
 
-    DataError for one that cannot be read.
+    Raises DataError for an invalid header.
     """
     if not cells:
         raise DataError("the header must come first, line 1 is empty")
@@ -96,19 +97,19 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
 
 
 def is_of_frame(cells: Sequence[str]) -> bool:
-    """Tell whether a header is of a result's ``to_dataframe().to_csv()``: channels of a simulation, bare and in SI.
+    """Return whether a header was written by ``to_dataframe().to_csv()`` of a result: bare channel names, in SI units.
 
-    Bare names alone do not say so: a logger may call a column in degrees ``angle``.
+    Bare names alone are not enough: a logger may call a column in degrees ``angle``.
     """
     names = {cell.strip() for cell in cells}
     return _ONLY_SIMULATED in names and names <= {TIME, *CHANNELS}
 
 
 def check_clock(time: Floats, lines: Sequence[int], noun: str = "line", may_have_trials: bool = True) -> None:
-    """Refuse a clock [s] that goes backwards or stands still; ``lines`` are the lines of the rows in the file.
+    """Raise DataError for times [s] that do not increase; ``lines`` are the line numbers of the rows in the file.
 
-    DataError names the line, or what ``noun`` calls it, and where the clock restarts the remedy of a column map, which
-    ``may_have_trials`` one after another.
+    The message names the line, or the row in units of ``noun``. If the clock restarts, the message suggests a column
+    map for several trials, provided that the format ``may_have_trials``.
     """
     stalled = np.flatnonzero(np.diff(time) <= 0.0)
     if stalled.size:
@@ -127,9 +128,9 @@ def check_clock(time: Floats, lines: Sequence[int], noun: str = "line", may_have
 
 
 def in_si(column: HeaderColumn, values: Floats, atmosphere: float) -> Floats:
-    """Return the values in the unit in which a recording keeps them; gauge counts from ``atmosphere`` [Pa absolute].
+    """Return values converted to the unit of the recording; gauge pressure is relative to ``atmosphere`` [Pa absolute].
 
-    UnitError for a unit that does not fit.
+    Raises UnitError for a unit that does not fit.
     """
     from ppafo.units import check_unit, to_si
 
@@ -142,12 +143,12 @@ def in_si(column: HeaderColumn, values: Floats, atmosphere: float) -> Floats:
 
 
 _SPELT = {"Pa": _LEVEL, PLAIN_NUMBER: ""}
-"""Units as ``ppafo.units`` spells them: there a pressure says its kind and a plain number has no unit."""
+"""Unit names for ``ppafo.units``, which needs the kind of a pressure and no unit for a plain number."""
 _MARKS: dict[RecordingKind, str] = {
     "simulated": "# simulated: a model's own output, not measured",
     "synthetic": "# synthetic: made by a model to stand for a measurement",
 }
-"""Lines of comment; when read, the word before the colon counts."""
+"""Comment lines that mark the kind of a recording; when read, only the word before the colon counts."""
 
 _MARK = re.compile(r"#\s*(\w+):.*")
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
@@ -156,29 +157,29 @@ SPLIT_NUMBERS = (
     "commas seem to separate columns and decimals alike: write the file with decimal points, or with another delimiter "
     'and read it through a column map with decimal = "comma"'
 )
-"""Message about rows with twice as many cells as there are columns."""
+"""Message for rows with twice as many cells as columns."""
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*", re.ASCII)
 _SIMILAR = 0.8
-"""Similarity above which a word is a misspelt kind; 'measurement: run 3' is a remark like any other."""
+"""Similarity [-] above which a word is a misspelt kind; a comment such as 'measurement: run 3' stays below."""
 
 
 def write_csv(path: str | Path, recording: Recording) -> Path:
-    """Write a recording as CSV in SI units; one that no one measured says so in a line of comment. Returns the path."""
+    """Write a recording as CSV in SI units, with a comment line on its kind unless measured. Returns the path."""
     return write_file(path, marked_csv_bytes(recording))
 
 
 def marked_csv_bytes(recording: Recording) -> bytes:
-    """Return the table of a recording for a file that stands alone; it begins with its kind unless it was measured."""
+    """Return the CSV table of a recording for use as a separate file, with its kind in a comment unless measured."""
     return mark_of(recording.kind).encode() + csv_bytes(recording)
 
 
 def mark_of(kind: RecordingKind) -> str:
-    """Return the line of comment with which a file begins whose recording was not measured; empty for the others."""
+    """Return the comment line that marks simulated or synthetic data; empty for measured data."""
     return f"{_MARKS[kind]}\n" if kind in _MARKS else ""
 
 
 def csv_bytes(recording: Recording) -> bytes:
-    """Return the bare table of a recording; its label and its kind are not in it."""
+    """Return the CSV table of a recording without its label and kind."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     named = recording.channels.items()
@@ -191,9 +192,9 @@ def csv_bytes(recording: Recording) -> bytes:
 
 
 def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
-    """Return the recording in a CSV file, in SI units; its label is the file's name unless one is given.
+    """Return the recording in a CSV file, in SI units, labelled with the file name by default.
 
-    Gauge pressure counts from ``atmosphere`` [Pa absolute]. DataError for a file that is not usable.
+    Gauge pressure is relative to ``atmosphere`` [Pa absolute]. Raises DataError for an invalid file.
     """
     content = read_bytes(path)
     try:
@@ -248,9 +249,10 @@ def recording_of_columns(
     atmosphere: float,
     noun: str = "line",
 ) -> Recording:
-    """Recording of columns in the units of their headers, time first; ``rows`` say where each row stands in the file.
+    """Return the recording of columns in the units of their headers, time first; ``rows`` are row numbers in the file.
 
-    DataError, which calls a row what ``noun`` says, for a unit that does not fit and a clock that does not grow.
+    Raises DataError for a unit that does not fit, and for times that do not increase, naming the row in units of
+    ``noun``.
     """
     from ppafo.storage.clock import counted_on  # a run reads no clocks of loggers
 
@@ -270,9 +272,10 @@ def recording_of_columns(
 
 
 def kind_of_comments(comments: Iterable[str]) -> RecordingKind:
-    """Return the kind that a comment names; a misspelt one must not let a simulation pass for a measurement.
+    """Return the kind of recording stated in a comment, measured by default.
 
-    DataError for a misspelt one or two of them.
+    Raises DataError for a misspelt kind, so that a simulation cannot pass as a measurement, and for two different
+    kinds.
     """
     named: list[RecordingKind] = []
     for match in filter(None, map(_MARK.fullmatch, comments)):
@@ -286,7 +289,7 @@ def kind_of_comments(comments: Iterable[str]) -> RecordingKind:
 
 
 def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats:
-    """Return the numbers below the header, row by row: the texts of a large file take many times its room."""
+    """Return the numbers below the header, parsed row by row, since all cells as text would need far more memory."""
     # Blank lines may only follow the last row: one between rows is a sample that was lost.
     numbers, blank = array("d"), None
     for line, row in enumerate(rows, start=skipped + 2):
@@ -316,6 +319,6 @@ def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats
 
 
 def finite_number(text: str) -> float | None:
-    """Return the number that a cell of a table has, None where it is none or not a finite one."""
+    """Return the number in a table cell, None if the cell is no finite number."""
     value = float(text) if NUMBER.fullmatch(text) else math.nan
     return value if math.isfinite(value) else None

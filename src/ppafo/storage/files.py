@@ -1,4 +1,4 @@
-"""Bytes to and from disk: a file or a folder is written whole beside its place, then renamed, or not at all."""
+"""Atomic reading and writing of files: a file or folder is written completely beside its target, then renamed."""
 
 import contextlib
 import errno
@@ -15,17 +15,17 @@ from ppafo.errors import DataError
 from ppafo.wording import reason
 
 LEFT_ASIDE = ".writing-"
-"""Part of the name of a file that is being written; one that is still there was left by a process that was killed."""
+"""Part of the name of a file being written; such a file remains only if the process was killed."""
 
 _CURRENT_FOLDER, _EXCHANGE = -100, 2
 """``AT_FDCWD`` and ``RENAME_EXCHANGE`` of Linux."""
 
 MAXIMUM_BYTES_RECORDED = 2_000_000_000
-"""More than this is no recording that is read: an hour at 1 kHz with twenty channels stays below it, as text too."""
+"""Largest size of a recording file [bytes]; an hour at 1 kHz with twenty channels is smaller, even as text."""
 
 
 def read_bytes(path: str | Path, maximum: int = MAXIMUM_BYTES_RECORDED) -> bytes:
-    """Return the content of a regular file; DataError where it is absent, empty or above ``maximum`` bytes."""
+    """Return the content of a regular file. Raises DataError if absent, empty or larger than ``maximum`` bytes."""
     try:
         content = read_regular_file(Path(path), maximum)
     except (OSError, ValueError) as error:
@@ -36,7 +36,7 @@ def read_bytes(path: str | Path, maximum: int = MAXIMUM_BYTES_RECORDED) -> bytes
 
 
 def text_of(content: bytes, encoding: str = "utf-8", remedy: str = "") -> str:
-    """Return the text in the bytes of a file; DataError, with a remedy, where it is none in this encoding."""
+    """Return the content of a file as text. Raises DataError, ending in ``remedy``, if it is not in this encoding."""
     try:
         text = decoded(content) if encoding == "utf-8" else content.decode(encoding)
     except UnicodeDecodeError as error:
@@ -51,7 +51,7 @@ def text_of(content: bytes, encoding: str = "utf-8", remedy: str = "") -> str:
 
 
 def write_file(path: str | Path, content: bytes) -> Path:
-    """Write a file, replacing an earlier one; folders are made if need be. Returns the path."""
+    """Write a file, replacing an earlier one and creating missing folders. Returns the path."""
     target = Path(path)
     with _write_errors(target), _make_folder(target.parent):
         aside = _sibling(target, "writing")
@@ -64,7 +64,7 @@ def write_file(path: str | Path, content: bytes) -> Path:
 
 
 def add_files(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Write files into a folder, replacing files of the same names: all of them aside first, then renamed."""
+    """Write files into a folder, replacing files with the same names; all are written aside first, then renamed."""
     with _write_errors(folder), _make_folder(folder):
         _check_no_folder(folder, contents)
         aside = _sibling(folder / "files", "writing")
@@ -79,10 +79,10 @@ def add_files(folder: Path, contents: Mapping[str, bytes]) -> None:
 
 
 def temporary_folder(purpose: str, contents: Mapping[str, bytes] | None = None) -> "tempfile.TemporaryDirectory[str]":
-    """Return a folder for temporary files, named for its ``purpose``, that holds these files, by path.
+    """Return a temporary folder, named for its ``purpose``, with the given files by path.
 
-    It goes away at the end of a ``with`` block, or with the last reference to it. DataError, and nothing is left, where
-    the folder cannot be made or a file not be written.
+    The folder is removed at the end of a ``with`` block, or with the last reference to it. Raises DataError, leaving
+    nothing behind, if the folder or a file cannot be written.
     """
     try:
         made = tempfile.TemporaryDirectory(prefix=f"{purpose}-", ignore_cleanup_errors=True)
@@ -101,7 +101,7 @@ def temporary_folder(purpose: str, contents: Mapping[str, bytes] | None = None) 
 
 
 def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Make ``folder`` hold exactly these files, by path; an earlier one stays as it was until the new one is whole."""
+    """Replace ``folder`` by one with exactly these files, by path; the old one stays until the new one is complete."""
     target = _real(folder)
     with _write_errors(folder), _make_folder(target.parent):
         aside = _sibling(target, "writing")
@@ -118,7 +118,7 @@ def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
 
 
 def check_folder_can_be_replaced(folder: Path) -> None:
-    """Refuse a folder beside which nothing can be written, by trying; nothing is left of the trial."""
+    """Raise DataError if a folder cannot be replaced, by a trial that leaves nothing behind."""
     target = _real(folder)
     with _write_errors(folder), _make_folder(target.parent):
         trial = _sibling(target, "trial")
@@ -128,7 +128,7 @@ def check_folder_can_be_replaced(folder: Path) -> None:
 
 
 def check_files_can_be_added(folder: Path, names: Iterable[str]) -> None:
-    """Refuse a folder into which files of these names cannot be written, by trying; nothing is left of the trial."""
+    """Raise DataError if these files cannot be written into a folder, by a trial that leaves nothing behind."""
     with _write_errors(folder), _make_folder(folder):
         _check_no_folder(folder, names)
         _try_folder(_sibling(folder / "files", "trial"))
@@ -143,9 +143,9 @@ def _try_folder(trial: Path) -> None:
 
 
 def _try_renaming(folder: Path, trial: Path) -> None:
-    """Refuse a folder that cannot be renamed: a mount point, another user's in a sticky folder, one of a lower layer.
+    """Raise OSError if a folder cannot be renamed: mount point, another user's in a sticky folder, or in a lower layer.
 
-    Nothing is renamed onto a folder that holds a file; what else stands in the way is reported before that.
+    The trial target contains a file, so that nothing is renamed; other obstacles are reported first.
     """
     try:
         trial.mkdir()
@@ -162,7 +162,7 @@ def _try_renaming(folder: Path, trial: Path) -> None:
 
 
 def _real(folder: Path) -> Path:
-    """Return the path without links; ``Path.resolve`` raises an error that is no OSError where links go in a circle."""
+    """Return the path with links resolved; for circular links ``Path.resolve`` raises an error that is no OSError."""
     try:
         return Path(os.path.realpath(folder))
     except ValueError as error:
@@ -171,7 +171,7 @@ def _real(folder: Path) -> Path:
 
 @contextlib.contextmanager
 def _make_folder(folder: Path) -> Iterator[None]:
-    """Make a folder and those above it; at the end the new ones that hold nothing go away again."""
+    """Create a folder and its parents for a ``with`` block; at the end, new folders that are empty are removed."""
     new = [ancestor for ancestor in (folder, *folder.parents) if not ancestor.exists()]
     nearest = folder if folder.exists() else new[-1].parent
     if not nearest.is_dir():
@@ -186,16 +186,16 @@ def _make_folder(folder: Path) -> Iterator[None]:
 
 
 def _check_no_folder(folder: Path, names: Iterable[str]) -> None:
-    """Refuse a folder in the place of a file before the first file is written, not when its turn comes."""
+    """Raise IsADirectoryError if a folder has the name of a file to be written, before any file is written."""
     for name in names:
         if (folder / name).is_dir():
             raise IsADirectoryError(None, f"there is a folder '{name}' in it, in the place of a file")
 
 
 def _swap(new: Path, target: Path) -> None:
-    """Rename ``new`` to ``target``; a folder that was there is ``new`` afterwards, or is removed.
+    """Rename ``new`` to ``target``; an existing ``target`` becomes ``new`` or is removed.
 
-    Where both cannot change places in one step the old one goes aside first, and comes back if the second step fails.
+    If both cannot be exchanged in one step, the old folder is moved aside first, and back if the second step fails.
     """
     if not target.exists():
         new.rename(target)
@@ -213,7 +213,7 @@ def _swap(new: Path, target: Path) -> None:
 
 
 def _exchange(one: Path, other: Path) -> bool:
-    """Tell whether two folders have changed places in one step: Linux can that, on most of its file systems."""
+    """Exchange two folders in one step and return whether this succeeded; supported by Linux on most file systems."""
     import ctypes
 
     try:
@@ -224,7 +224,7 @@ def _exchange(one: Path, other: Path) -> bool:
 
 
 def _sibling(target: Path, purpose: str) -> Path:
-    """Return a path beside ``target``, on the same disk, that nothing has yet."""
+    """Return an unused path in the same folder as ``target``, and so on the same disk."""
     # Beside it, as a rename is one step on one disk only; with a random part, as two commands may write at once.
     return target.with_name(f".{target.name}.{purpose}-{secrets.token_hex(4)}")
 

@@ -1,6 +1,6 @@
-"""Tables from elsewhere, with their own columns, units and signs, read through a column map as recordings.
+"""Foreign tables, with their own columns, units and signs, read as recordings through a column map.
 
-What cannot be read is named with file, line and column, and what is wrong in the map with its key.
+Error messages name file, line and column of an invalid cell, and the key of an error in the map.
 """
 
 import re
@@ -34,10 +34,9 @@ from ppafo.wording import nearest_name, one_line
 
 
 def read_mapped_matlab(file: MatlabFile, columns: ColumnMap, map_name: str) -> MappedTable:
-    """Return what a map takes of a MATLAB file, numbers in the file's own units.
+    """Return the columns of a MATLAB file that a map selects, in the units of the file.
 
-    DataError names the key of a channel whose variable is not there or not usable, and the map where ``map_name`` says
-    which.
+    Raises DataError with the key of a channel whose variable is absent or unusable, and with the map if it has a name.
     """
     numbers: dict[str, Floats] = {}
     clock: list[str] | None = None
@@ -72,7 +71,7 @@ def read_mapped_matlab(file: MatlabFile, columns: ColumnMap, map_name: str) -> M
 
 
 def _variable(key: str, column: int | str, file: MatlabFile) -> str:
-    """Return the name of the variable that a map has at ``key``; a number is a column of the file's only matrix."""
+    """Return the variable that a map names at ``key``; a number selects a column of the file's only matrix."""
     if isinstance(column, int):
         matrices = sorted({name.partition("(")[0] for name in file.columns if "(:," in name and "." not in name})
         if len(matrices) != 1:
@@ -91,14 +90,15 @@ def _variable(key: str, column: int | str, file: MatlabFile) -> str:
 # The direction of a movement, up or down, from how fast a recorded channel moves, as a column map asks for it.
 
 _SHORTEST = 1e-12
-"""Time [s] between two means of samples below which their slope is not asked for: rounding."""
+"""Least time [s] between two means of samples for their slope; a shorter time is rounding."""
 
 
 def with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
     """Return a recording with the channel ``direction``: 1 up, -1 down, 0 for slower than the threshold.
 
-    A channel ``repetition`` numbers the sweeps one way from 1, 0 where it is slower, unless the recording has its own.
-    DataError for a channel that is not there or never moves, a threshold or a window that cannot be read.
+    Unless the recording has a channel ``repetition``, one is added that numbers the sweeps from 1; it is 0 where the
+    motion is too slow. Raises DataError for a channel that is absent or never moves, and for an invalid threshold or
+    window.
     """
     from ppafo.units import parse_quantity
 
@@ -146,9 +146,9 @@ def read_foreign(
     map_name: str = "",
     gas: str = "",
 ) -> Recording:
-    """Return the recording in a table through a column map, in SI units; gauge counts from ``atmosphere`` [Pa abs].
+    """Return the recording in a table, read through a column map, in SI units; arguments and errors as ``read_trials``.
 
-    DataError where the map takes several trials. Otherwise as ``read_trials``.
+    Gauge pressure is relative to ``atmosphere`` [Pa absolute]. Raises DataError if the map selects several trials.
     """
     recordings = read_trials(path, columns, label, atmosphere, map_name, gas)
     if len(recordings) > 1:
@@ -168,10 +168,10 @@ def read_trials(
     map_name: str = "",
     gas: str = "",
 ) -> tuple[Recording, ...]:
-    """Return the recordings in a table through a column map: one, or one for each of the trials that the map names.
+    """Return the recordings in a table, read through a column map: one, or one for each trial that the map selects.
 
-    ``gas`` is the gas of a volume flow whose map does not say it. DataError names the file and the column; of a fault
-    in the map its key, and the map where ``map_name`` says which.
+    ``gas`` is the gas of volume flows if the map states none. Raises DataError with file and column or, for an error in
+    the map, with the key and the name of the map.
     """
     suffix = Path(path).suffix.lower()
     # Both name the file themselves where it cannot be read.
@@ -210,7 +210,7 @@ def read_trials(
 
 
 def _rows_of_trials(time: Floats, wanted: str | int | tuple[int, ...]) -> dict[str, slice]:
-    """Return the rows of trials, from 1, by what is added to their names: each begins where the time [s] falls."""
+    """Return the rows of each selected trial, by the suffix of its label; a trial starts where the time [s] falls."""
     starts = [0, *(np.flatnonzero(np.diff(time) < 0.0) + 1).tolist(), time.size]
     count = len(starts) - 1
     numbers = range(1, count + 1) if isinstance(wanted, str) else np.atleast_1d(wanted).tolist()
@@ -224,9 +224,9 @@ def _rows_of_trials(time: Floats, wanted: str | int | tuple[int, ...]) -> dict[s
 
 
 def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: float, gas: str = "") -> Channel:
-    """Return a channel in SI, a constant one too; the quantity that it is multiplied by brings its own unit.
+    """Return a channel in SI units, from a column or a constant; a multiplier ``times`` contributes its own unit.
 
-    The file does not state the ``atmosphere`` [Pa absolute], nor the gas of its volume flows, empty if unknown.
+    ``atmosphere`` [Pa absolute] and ``gas`` (empty if unknown) complete gauge pressures and volume flows.
     """
     from ppafo.units import split_number
 
@@ -250,7 +250,7 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: f
 
 
 def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
-    """Return the unit of a channel, with reference condition and gas where it is a volume flow for a mass flow."""
+    """Return the unit of a channel; a volume flow in place of a mass flow gets its reference condition and gas."""
     from ppafo.units import is_volume_flow, with_condition
 
     is_flow = HeaderColumn(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
@@ -262,7 +262,7 @@ def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
 
 
 def _time(mapped: MappedChannel, table: MappedTable, atmosphere: float) -> Floats:
-    """Return the time [s] of the rows: by their number and a rate, from a clock, or from numbers with a unit."""
+    """Return the time [s] of the rows: from a rate and row numbers, from times of day, or from numbers with a unit."""
     if mapped.rate is not None:
         from ppafo.units import parse_quantity
 

@@ -1,6 +1,6 @@
-"""Recordings in tables of other libraries: a pandas DataFrame, an xarray Dataset, a Parquet file.
+"""Recordings from tables of other libraries: pandas DataFrame, xarray Dataset, Parquet file.
 
-Channels are columns ``name [unit]``, or plain names whose unit stands in the attributes, as this package writes them.
+Channels are columns ``name [unit]``, or plain names with the unit in the attributes, as written by this package.
 """
 
 import json
@@ -27,23 +27,23 @@ PANDAS_READERS = {
     ".hdf5": "read_hdf({path!r})",
     ".pkl": "read_pickle({path!r})",
 }
-"""Call of pandas that reads a table, by its suffix."""
+"""Call of pandas that reads a table, by file suffix."""
 OTHER_READERS = {
     ".npz": "DataFrame(dict(numpy.load({path!r})))",
     ".tdms": "DataFrame(nptdms.TdmsFile({path!r}).as_dataframe())",
 }
-"""Call that reads a table into pandas with another library, by its suffix."""
+"""Call of another library that reads a table into pandas, by file suffix."""
 
 
 def remedy_for(path: str | Path) -> str:
-    """Advice to read a table of another format with pandas, as the end of a message; empty for an unknown suffix."""
+    """Return advice to read a table of another format with pandas, appended to messages; empty for unknown suffixes."""
     advice = written_as_csv(path)
     # The same advice, behind the one to do without a file.
     return f"; in Python give the table itself, {_call_of_pandas(path)}, or{advice[1:]}" if advice else ""
 
 
 def written_as_csv(path: str | Path) -> str:
-    """Advice to write a table of another format as CSV with pandas; empty for an unknown suffix."""
+    """Return advice to convert a table of another format to CSV with pandas; empty for an unknown suffix."""
     table = _call_of_pandas(path)
     return f"; write it as CSV: {table}.to_csv({f'{path}.csv'!r}, index=False)" if table else ""
 
@@ -126,7 +126,7 @@ def _is_time(name: str) -> bool:
 def _recording(
     names: Sequence[str], values: Sequence[Any], units: Mapping[str, str], label: str, kind: str, atmosphere: float
 ) -> Recording:
-    """Return the recording of columns, whose units stand in their names or in ``units``, in any order."""
+    """Return the recording of columns in any order, with units in their names or in ``units``."""
     pairs = sorted(zip(names, values, strict=True), key=lambda pair: not _is_time(pair[0]))
     heads, columns = [], []
     for name, column in pairs:

@@ -1,6 +1,6 @@
-"""Application of a column map to a table of text: cells become numbers, in the file's own units, row by row.
+"""Application of a column map to a text table: cells become numbers in the units of the file, row by row.
 
-Every refusal names line and column of the file, or the key of the map, and says how to go on.
+Error messages name line and column of the file, or the key of the map, and a remedy.
 """
 
 import csv
@@ -29,15 +29,15 @@ _GROUPED = {
     name: re.compile(rf"[+-]?\d{{1,3}}(?:{re.escape(mark)}\d{{3}})+(?![\d{mark}])", re.ASCII)
     for name, mark in _MARKS.items()
 }
-"""The whole part of a number with groups of three digits, by the name of the mark between them."""
+"""Regular expression for the integer part of a number with digit groups, by name of the separator."""
 
 _SERIAL_MONITOR = re.compile(r"(\d{1,2}:\d{2}:\d{2}[.,]\d{3}) -> ")
-"""Prefix of each line by the serial monitor of the Arduino IDE."""
+"""Time stamp at the start of each line, written by the serial monitor of the Arduino IDE."""
 _STAMP = "timestamp"
-"""Name of the column that its times become."""
+"""Name of the column of time stamps of the serial monitor."""
 _STAMP_OF_HEADER = re.compile(r"^\d{1,2}:\d{2}:\d{2}\.\d{3}")
 _HEADER_WITHIN = 200
-"""Lines in which a header is looked for that is not where the map has it."""
+"""Number of lines searched for a header that is not where the map expects it."""
 
 _DIRECTION = "direction"
 _UPWARDS = (
@@ -56,14 +56,14 @@ _WORDS_OF_DIRECTION = {
 """Words for directions; ``-`` alone and ``+`` too."""
 
 Rows = Iterator[tuple[int, list[str]]]
-"""Cells of a row, each with the line of the file in which it stands."""
+"""Iterator over rows: line number in the file and cells."""
 
 
 def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> MappedTable:
-    """Return what a map takes of a table of text, numbers in the file's own units.
+    """Return the columns of a text table that a map selects, in the units of the file.
 
-    DataError names line and column of a cell that is not usable; of a fault in the map its key, and the map where
-    ``map_name`` says which.
+    Raises DataError with line and column of an invalid cell or, for an error in the map, with the key and, if it has
+    one, the name of the map.
     """
     lines = text_of(content, columns.encoding, remedy='; give encoding = "latin-1" if it is that').splitlines()
     if any(map(_SERIAL_MONITOR.match, lines)):
@@ -114,7 +114,7 @@ def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> Mappe
 
 
 def _with_stamps_as_column(lines: list[str], columns: ColumnMap) -> list[str]:
-    """Return the lines of a serial monitor with the time before each as a first column, called ``timestamp``."""
+    """Return the lines of a serial monitor with the time stamps as a first column named ``timestamp``."""
     delimiter = _DELIMITERS.get(columns.delimiter, " ")
     # A time that has a comma must not be two cells.
     stamped = [_SERIAL_MONITOR.sub(lambda match: f"{match[1].replace(',', '.')}{delimiter}", line) for line in lines]
@@ -128,19 +128,19 @@ def _with_stamps_as_column(lines: list[str], columns: ColumnMap) -> list[str]:
 
 
 class _StartedTable(NamedTuple):
-    """A table that was begun: names of the columns (none without a header), first row of numbers, and all rows."""
+    """Table opened for reading: column names (empty without header), first row of numbers, iterator over all rows."""
 
     names: list[str]
     first_row: list[str]
     rows: Rows
 
     def title(self, index: int) -> str:
-        """Return what messages call a column: its name, or its number from 1."""
+        """Return the name of a column in messages: its header, or its number from 1."""
         return self.names[index] if self.names else str(index + 1)
 
 
 def _begin(lines: list[str], columns: ColumnMap) -> _StartedTable:
-    """Return the table in the lines of a file; DataError where it has no header or no row of numbers."""
+    """Return the table in the lines of a file, opened for reading. Raises DataError if there is no header or no row."""
     rows = _split(lines, columns)
     head = next(rows, None)
     if head is None:
@@ -156,7 +156,7 @@ def _begin(lines: list[str], columns: ColumnMap) -> _StartedTable:
 
 
 def _split(lines: list[str], columns: ColumnMap) -> Rows:
-    """Yield the cells of every line behind ``skip_lines`` that is neither blank nor a comment."""
+    """Yield line number and cells of every line after ``skip_lines`` that is neither blank nor a comment."""
     for number, line in islice(enumerate(lines, start=1), columns.skip_lines, None):
         if not line.strip() or line.startswith(_COMMENT):
             continue
@@ -170,7 +170,7 @@ def _split(lines: list[str], columns: ColumnMap) -> Rows:
 
 
 def _index_of(key: str, column: int | str, table: _StartedTable, lines: list[str]) -> int:
-    """Return the index of a column, from 0, that the map has at ``key`` as a number from 1 or as a name."""
+    """Return the index, from 0, of the column that the map gives at ``key`` as a number from 1 or as a name."""
     names = table.names
     if isinstance(column, int):
         count = len(names or table.first_row)
@@ -204,7 +204,7 @@ def _index_of(key: str, column: int | str, table: _StartedTable, lines: list[str
 
 
 def _other_delimiter(cells: list[str], is_there: Callable[[list[str]], bool]) -> str:
-    """Return the remedy where the first line with another delimiter would have what is missing, else nothing."""
+    """Return the advice to use another delimiter if ``is_there`` accepts the cells split by it, else an empty text."""
     for name, mark in _DELIMITERS.items():
         split_again = [part.strip() for cell in cells for part in cell.split(mark)]
         if split_again != cells and is_there(split_again):
@@ -213,7 +213,7 @@ def _other_delimiter(cells: list[str], is_there: Callable[[list[str]], bool]) ->
 
 
 def _check_width(row: list[str], line: int, table: _StartedTable, last_index: int, columns: ColumnMap) -> None:
-    """Refuse a row that has not as many cells as the header or the first row, beside empty ones at its end."""
+    """Raise DataError for a row with a wrong number of cells; empty cells at the end do not count."""
     width, first_width = len(row), len(table.first_row)
     expected = len(table.names) or first_width
     while width > expected and not row[width - 1].strip():
@@ -230,7 +230,11 @@ def _check_width(row: list[str], line: int, table: _StartedTable, last_index: in
 
 @dataclass(frozen=True, slots=True)
 class _Numbers:
-    """A column of numbers: its channel, its index, what messages call it, how its cells are written, and the values."""
+    """Column of numbers while it is read.
+
+    ``channel``: name of the channel. ``index``: index of the column. ``title``: its name in messages. ``decimal`` and
+    ``thousands``: marks in its numbers. ``words``: numbers for words. ``values``: numbers read so far.
+    """
 
     channel: str
     index: int
@@ -241,7 +245,7 @@ class _Numbers:
     values: "array[float]" = field(default_factory=lambda: array("d"))
 
     def number_in(self, cell: str, line: int) -> float:
-        """Return the number in a cell, or the one for a word that the channel knows; DataError for anything else."""
+        """Return the number in a cell, or the number for a known word. Raises DataError for any other text."""
         text = cell.strip()
         for word, value in self.words.items():
             if word.lower() == text.lower():

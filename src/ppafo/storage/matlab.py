@@ -1,9 +1,9 @@
-"""Variables of MATLAB files: version 4 to 7 by SciPy, 7.3 (HDF5) by h5py. Nothing in them is run.
+"""Variables of MATLAB files: version 4 to 7 by SciPy, 7.3 (HDF5) by h5py. No code in a file is run.
 
-A field of a structure is ``a.b``, one of an array of structures ``a(2).b``, a column of a matrix ``M(:,3)`` and a row
-``M(3,:)``. A structure with ``data`` and ``colheaders``, as ``importdata`` makes it, has a column by each of its
-labels. Objects (timeseries, timetable, table, datetime) are in a form that is not published: they are named, with the
-line of MATLAB that saves them as plain arrays.
+A field of a structure is named ``a.b``, a field in an array of structures ``a(2).b``, a column of a matrix ``M(:,3)``
+and a row ``M(3,:)``. In a structure with ``data`` and ``colheaders``, as made by ``importdata``, each column is also
+available under its label. The format of objects (timeseries, timetable, table, datetime) is not published; messages
+name them together with the MATLAB code that saves them as plain arrays.
 """
 
 from collections.abc import Iterator
@@ -23,13 +23,13 @@ from ppafo.wording import one_line
 MATLAB_SUFFIX = ".mat"
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HDF5_AT = 512
-"""Byte at which HDF5 begins, behind the header of MATLAB."""
+"""Offset of the HDF5 content [bytes], after the header of MATLAB."""
 _MOST_COLUMNS = 300
-"""Columns, or else rows, of a matrix that get a name each; one with more of both has none."""
+"""Largest number of columns, or of rows, of a matrix that are named one by one."""
 _DEEPEST = 8
-"""Structures within structures that are looked into."""
+"""Largest nesting depth of structures that is searched."""
 _MOST_ELEMENTS = 300
-"""Elements of an array of structures or a cell array that are looked into."""
+"""Largest number of elements of an array of structures or cell array that are read."""
 _OF_DAMAGE = (
     OSError,
     ValueError,
@@ -41,14 +41,18 @@ _OF_DAMAGE = (
     NameError,
     EOFError,
 )
-"""Exceptions of the libraries on damaged files."""
+"""Exceptions that the libraries raise for damaged files."""
 _LABELS = ("colheaders", "labels", "names")
-"""Fields of a structure that may have the names of the columns of another."""
+"""Fields of a structure that may contain the column names of its field ``data``."""
 
 
 @dataclass(slots=True, eq=False)
 class MatlabFile:
-    """Columns of numbers and of texts by name, every other text in the file, and the objects in it, name and class."""
+    """Content of a MATLAB file.
+
+    ``columns``: numeric vectors by name. ``texts``: text arrays by name. ``words``: all texts in the file. ``objects``:
+    name and class of each object.
+    """
 
     columns: dict[str, Floats] = field(default_factory=dict)
     texts: dict[str, list[str]] = field(default_factory=dict)
@@ -56,7 +60,7 @@ class MatlabFile:
     objects: list[tuple[str, str]] = field(default_factory=list)
 
     def said_of_objects(self) -> str:
-        """Return what to do with the objects of the file, as the end of a message; nothing where there are none."""
+        """Return advice on saving the objects of the file as arrays, to append to a message; empty without objects."""
         said = ""
         for name, kind in self.objects:
             save = "its numbers are saved as arrays of their own, such as t = ts.Time; y = ts.Data; save plain.mat t y"
@@ -74,11 +78,11 @@ _PLAIN = {
     "datetime": "t = seconds({name} - {name}(1)); save('plain.mat', 't')",
     "duration": "t = seconds({name}); save('plain.mat', 't')",
 }
-"""Line of MATLAB by the class of an object: it saves the numbers in it, and times in seconds, as plain arrays."""
+"""MATLAB code, by class of an object, that saves its numbers as plain arrays and its times in seconds."""
 
 
 def read_matlab(path: str | Path) -> MatlabFile:
-    """Return the variables in a ``.mat`` file of any version. DataError for a file that is none."""
+    """Return the variables of a ``.mat`` file of any version. Raises DataError for an invalid file."""
     is_hdf5 = read_bytes(path)[_HDF5_AT : _HDF5_AT + len(_HDF5)] == _HDF5
     # A damaged file can end a library of C code; another process tries it first.
     check_can_be_read(Path(path), open_matlab, "h5py" if is_hdf5 else "scipy.io")
@@ -86,7 +90,7 @@ def read_matlab(path: str | Path) -> MatlabFile:
 
 
 def open_matlab(path: str | Path) -> MatlabFile:
-    """Return what ``read_matlab`` does; damage can end the process."""
+    """Return the variables of a ``.mat`` file without a trial in another process; a damaged file may crash this one."""
     content = read_bytes(path)
     contents = MatlabFile()
     try:
@@ -107,17 +111,17 @@ def open_matlab(path: str | Path) -> MatlabFile:
 
 
 class _Object(NamedTuple):
-    """A variable that is an object of MATLAB, by its class where the file says it."""
+    """MATLAB object, with its class if the file states it."""
 
     kind: str = ""
 
 
 Tree = dict[str, Any] | list[Any] | NDArray[Any] | str | _Object
-"""A variable as plain data: a structure, a cell array or an array of structures, numbers, a text, or an object."""
+"""Variable as plain data: structure, cell array or array of structures, numbers, text, or object."""
 
 
 def _read_older(path: str | Path, contents: MatlabFile) -> None:
-    """Add the variables of a file of version 4 to 7 to the contents."""
+    """Add the variables of a file of version 4 to 7 to ``contents``."""
     import zlib
 
     from scipy.io import loadmat
@@ -145,7 +149,7 @@ def _read_older(path: str | Path, contents: MatlabFile) -> None:
 
 
 def _tree_of(value: Any) -> Tree:
-    """Return a variable of SciPy as plain data."""
+    """Return a variable read by SciPy as plain data."""
     from scipy.io.matlab import mat_struct
 
     if isinstance(value, mat_struct):
@@ -164,7 +168,7 @@ def _tree_of(value: Any) -> Tree:
 
 
 def _own_items(group: Any) -> Iterator[tuple[str, Any]]:
-    """Give name and content of each item; none is opened before it is known to lie in this file."""
+    """Yield name and content of each item. Raises ValueError for links and external data, before they are opened."""
     import h5py
 
     for name in group:
@@ -177,7 +181,7 @@ def _own_items(group: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _tree_of_hdf5(node: Any, file: Any, depth: int) -> Tree:
-    """Return a variable of h5py as plain data; arrays lie the other way round than in MATLAB."""
+    """Return a variable read by h5py as plain data; arrays are transposed with respect to HDF5."""
     import h5py
 
     stated = node.attrs.get("MATLAB_class", b"")
@@ -206,7 +210,7 @@ def _tree_of_hdf5(node: Any, file: Any, depth: int) -> Tree:
 
 
 def _add(name: str, tree: Tree, depth: int, contents: MatlabFile) -> None:
-    """Add what is below a name to what was found."""
+    """Add a variable and everything nested in it to ``contents``, with dotted names."""
     if depth > _DEEPEST:
         return
     if isinstance(tree, dict):
@@ -234,7 +238,7 @@ def _add(name: str, tree: Tree, depth: int, contents: MatlabFile) -> None:
 
 
 def _add_numbers(name: str, array: NDArray[Any], contents: MatlabFile) -> None:
-    """Add a vector by its name, and of a matrix every column and every row, as far as there are not too many."""
+    """Add a vector, or the columns and rows of a matrix unless there are too many, to ``contents``."""
     if array.dtype.kind not in "iufb" or array.size == 0:
         return
     numbers = np.squeeze(np.asarray(array, dtype=np.float64))

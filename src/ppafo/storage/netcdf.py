@@ -1,6 +1,6 @@
-"""Recordings written as NetCDF files, and as the Dataset of xarray that opens them too.
+"""Recordings written as NetCDF files, and the equivalent xarray Dataset.
 
-Both are made here and not by one another: loading xarray takes longer than a run.
+The two are made independently, because loading xarray takes longer than a simulation.
 """
 
 import io
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 PLAIN_NUMBER_IN_NETCDF = "1"
 """Unit of a plain number, as the NetCDF conventions write it."""
 BETWEEN = "between_samples"
-"""Attribute of a channel that does not run between its samples as such channels usually do."""
+"""Attribute of a channel with an unusual interpolation between its samples."""
 _TIME_ATTRIBUTES = {"units": TIME_UNIT, "long_name": "time"}
 
 
@@ -31,10 +31,10 @@ def dataset_of(
     units: Mapping[str, str] | None = None,
     atmosphere: float = STANDARD_ATMOSPHERE,
 ) -> "xarray.Dataset":
-    """Return the recording as a Dataset over time [s]; ``scenario`` goes into an attribute as JSON.
+    """Return the recording as a Dataset over time [s], with ``scenario`` as a JSON attribute.
 
-    ``units`` are other units than those of SI by the name of a channel, in which gauge pressure counts from
-    ``atmosphere`` [Pa absolute]. DataError for a channel that is not there, UnitError for a unit that does not fit it.
+    ``units`` maps channels to units other than SI; gauge pressures in them are relative to ``atmosphere`` [Pa
+    absolute]. Raises DataError for an unknown channel, UnitError for a unit that does not fit.
     """
     import xarray
 
@@ -48,7 +48,7 @@ def dataset_of(
 
 
 def global_attributes(recording: Recording, scenario: Mapping[str, Any] | None) -> dict[str, str]:
-    """Return what a NetCDF file says of the whole recording: label, kind, and the scenario's document as JSON."""
+    """Return the global attributes of a NetCDF file: label, kind, and the scenario document as JSON."""
     attributes = {"title": recording.label, "kind": recording.kind}
     if scenario is not None:
         attributes["scenario"] = json.dumps(scenario, ensure_ascii=False, allow_nan=False)
@@ -56,14 +56,14 @@ def global_attributes(recording: Recording, scenario: Mapping[str, Any] | None) 
 
 
 def joint_of(scenario: Mapping[str, Any] | None) -> JointNames:
-    """Return the joint that the device of a scenario's document turns; the ankle where it does not say."""
+    """Return the joint that the device of a scenario document acts on, the ankle by default."""
     device = (scenario or {}).get("device")
     joint = device.get("joint") if isinstance(device, Mapping) else None
     return JointNames(**joint) if isinstance(joint, Mapping) else ANKLE
 
 
 def channel_attributes(recording: Recording, name: str, joint: JointNames = ANKLE) -> dict[str, str]:
-    """Return unit and long name of a channel, about a joint; a plain number has the unit 1, as NetCDF asks."""
+    """Return unit and long name of a channel at a joint; a plain number has the unit 1 by the NetCDF conventions."""
     unit = recording.unit(name)
     summary = joint.said(CHANNELS[name].summary) if name in CHANNELS else name.replace("_", " ")
     between = recording.channels[name].between
@@ -72,12 +72,12 @@ def channel_attributes(recording: Recording, name: str, joint: JointNames = ANKL
 
 
 def write_netcdf(path: str | Path, recording: Recording, scenario: Mapping[str, Any] | None = None) -> Path:
-    """Write a recording as NetCDF; returns the path."""
+    """Write a recording as NetCDF. Returns the path."""
     return write_file(path, netcdf_bytes(recording, scenario))
 
 
 def netcdf_bytes(recording: Recording, scenario: Mapping[str, Any] | None = None) -> bytes:
-    """Return the content of the NetCDF file of a recording; the same recording gives the same bytes."""
+    """Return the NetCDF file of a recording as bytes; equal recordings give equal bytes."""
     import h5netcdf
 
     buffer = io.BytesIO()

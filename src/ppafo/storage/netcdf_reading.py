@@ -1,7 +1,7 @@
-"""Recordings out of NetCDF files, read as the HDF5 files that they are; what could harm the reader is refused.
+"""Recordings read from NetCDF files, as HDF5, with protection against damaged and malicious files.
 
-h5netcdf would print a traceback of its own where it meets a damaged file. Before a number is unpacked, all of them must
-lie in this file, in a common form, and in no more memory than such a file can need.
+With h5netcdf a damaged file would print a traceback. Before any number is decompressed, all data must be inside the
+file, in a common format, and need no more memory than is plausible for the file.
 """
 
 import contextlib
@@ -22,35 +22,35 @@ from ppafo.storage.netcdf import BETWEEN, PLAIN_NUMBER_IN_NETCDF
 from ppafo.wording import one_line
 
 _DAMAGED = (OSError, KeyError, RuntimeError, TypeError, ValueError, OverflowError, MemoryError)
-"""Exceptions of h5py on a truncated or damaged file."""
+"""Exceptions that h5py raises for a truncated or damaged file."""
 _KINDS_OF_NUMBERS = frozenset("fiu")
-"""NumPy's letters for floats, integers and integers without sign."""
+"""NumPy kind codes of floats, signed and unsigned integers."""
 _GZIP, _SHUFFLE, _FLETCHER = 1, 2, 3
-"""Numbers that HDF5 gives to gzip, to the shuffling of bytes and to the Fletcher checksum."""
+"""HDF5 filter numbers of gzip, byte shuffling and the Fletcher checksum."""
 _SUPPORTED_FILTERS = frozenset({_GZIP, _SHUFFLE, _FLETCHER})
 
 _BYTES_OF_A_FLOAT = 8
-"""Bytes of a number as a recording keeps it, whatever its file has."""
+"""Bytes per number in a recording, independent of the type in the file."""
 _ALWAYS_ALLOWED = 32_000_000
-"""Bytes of memory that any file may ask for."""
+"""Memory [bytes] that any file may need."""
 _MAXIMUM_GROWTH = 100
-"""Largest size of the content over the size of a larger file [-]."""
+"""Largest ratio of memory needed to file size for larger files [-]."""
 _CHECKSUM_BYTES = 64
-"""Bytes by which a chunk may be larger than its numbers; a Fletcher checksum takes four."""
+"""Bytes by which a chunk may exceed its numbers; a Fletcher checksum takes four."""
 
 _PACKING = ("scale_factor", "add_offset")
-"""Attributes of the NetCDF conventions by which the numbers of a file are not those that were recorded."""
+"""NetCDF attributes of packed variables, whose stored numbers are not the recorded values."""
 _GAPS = ("_FillValue", "missing_value")
-"""Attributes that name a number that stands for none."""
+"""NetCDF attributes that state the number used for missing values."""
 _LIMITS = {"valid_range": 2, "valid_min": 1, "valid_max": 1}
-"""Attributes by which a number outside is none, and how many limits each has."""
+"""NetCDF attributes of the valid range, each with its number of limits; values outside are missing."""
 
 
 def read_netcdf(path: str | Path) -> Recording:
     """Return the recording in a NetCDF file.
 
-    DataError says what is wrong: a file that is damaged, points outside itself, unpacks to far more than it has, or
-    whose numbers are packed, have gaps or are outside what the file calls valid.
+    Raises DataError for a file that is damaged, refers to other files, or decompresses to far more than its size, and
+    for numbers that are packed, have gaps or are outside the stated valid range.
     """
     import h5py
 
@@ -74,7 +74,7 @@ def read_netcdf(path: str | Path) -> Recording:
 
 
 def _own_variables(file: Any) -> dict[str, Any]:
-    """Return the variables by name; none is opened before it is known to lie in this file."""
+    """Return the variables by name. Raises DataError for links and external data, before they are opened."""
     import h5py
 
     names = [str(name) for name in file]
@@ -104,7 +104,7 @@ def _own_variables(file: Any) -> dict[str, Any]:
 
 
 def _check_memory(variables: Mapping[str, Any], file_bytes: int) -> None:
-    """Refuse, before memory is taken, numbers that grow out of all proportion to the file."""
+    """Raise DataError, before memory is allocated, for numbers that need far more memory than the size of the file."""
     required = 0
     for variable in variables.values():
         required += variable.size * _BYTES_OF_A_FLOAT
@@ -118,7 +118,7 @@ def _check_memory(variables: Mapping[str, Any], file_bytes: int) -> None:
 
 
 def _check_is_whole(name: str, variable: Any) -> None:
-    """Refuse values that nobody wrote, and chunks that unpack to more than they say."""
+    """Raise DataError for values that were never written, and for chunks that decompress to more than they state."""
     size, chunks = variable.size, variable.chunks
     if chunks is None:
         if variable.id.get_storage_size() < size * variable.dtype.itemsize:
@@ -142,7 +142,7 @@ def _check_is_whole(name: str, variable: Any) -> None:
 
 
 def _channel(name: str, variable: Any) -> Channel:
-    """Return a variable as a channel; DataError where its attributes say that some numbers are none."""
+    """Return a variable as a channel. Raises DataError if its attributes mark numbers as missing or packed."""
     for key in _PACKING:
         if key in variable.attrs:
             raise DataError(f"'{name}' is packed by its attribute '{key}'; save it as plain numbers")
@@ -174,6 +174,6 @@ def _channel(name: str, variable: Any) -> Channel:
 
 
 def _attribute(owner: Any, name: str) -> str:
-    """Return an attribute of a file or variable as text, empty where there is none; others write texts as bytes."""
+    """Return an attribute of a file or variable as text, whether stored as text or bytes; empty if absent."""
     value = owner.attrs.get(name, "")
     return value.decode("utf-8") if isinstance(value, bytes) else str(value)

@@ -1,7 +1,7 @@
-"""Tables of OpenSim, ``.mot`` and ``.sto``, read and written as it does.
+"""Tables of OpenSim (``.mot``, ``.sto``): reading and writing.
 
-A header is lines until ``endheader``: ``nRows=211`` and ``inDegrees=yes`` (or the sentence "Angles are in degrees."),
-or in the older style ``datarows 9009``. Then come one line of labels and the rows.
+The header ends with the line ``endheader``; it has ``nRows=211`` and ``inDegrees=yes`` (or the sentence "Angles are in
+degrees."), or ``datarows 9009`` in the older style. One line of labels and the rows follow.
 """
 
 import re
@@ -27,7 +27,7 @@ _SENTENCE = re.compile(r"angles are in (degrees|radians)", re.IGNORECASE)
 _KIND = "kind="
 """Header word for a recording that was not measured, in a file written by this package."""
 _MOST_DIGITS = 11
-"""Digits of a count in a header; no file has more rows."""
+"""Largest number of digits of a count in a header."""
 GAPS = ("nan",)
 """Cells that mean a gap in a table."""
 _KINDS: tuple[RecordingKind, ...] = ("simulated", "synthetic")
@@ -35,11 +35,12 @@ _KINDS: tuple[RecordingKind, ...] = ("simulated", "synthetic")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenSimTable:
-    """A table: time [s] and columns by label; ``in_degrees`` is None where the header does not say.
+    """OpenSim table.
 
-    ``is_old`` tells a header of the older style, SIMM's, whose angles are in degrees.
-    ``kind`` is the kind of a recording that nobody measured, where this package wrote it.
-    ``first_line`` is the line of the file in which the first row stands, ``remarks`` say what was mended.
+    ``time``: times [s]. ``columns``: values by label. ``in_degrees``: None if the header does not state the unit of
+    angles. ``is_old``: the header is in the older style of SIMM, with angles in degrees. ``kind``: kind of the
+    recording, if this package wrote the file. ``first_line``: line number of the first row. ``remarks``: sentences on
+    repairs.
     """
 
     name: str
@@ -53,9 +54,9 @@ class OpenSimTable:
 
 
 class _Header(NamedTuple):
-    """Header of a table; counts of rows and columns are None if it has none.
+    """Header of a table; the counts of rows and columns are None if not stated.
 
-    ``end`` is the index, from 0, of the line that ends it.
+    ``end`` is the index, from 0, of the last header line.
     """
 
     name: str
@@ -68,10 +69,10 @@ class _Header(NamedTuple):
 
 
 def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> OpenSimTable:
-    """Return the table in a ``.mot`` or ``.sto`` file; DataError names file, line and column of what is wrong.
+    """Return the table in a ``.mot`` or ``.sto`` file. Raises DataError with file, line and column of an error.
 
-    A count of columns in the header that all rows contradict, and last rows that repeat a time, are mended; remarks say
-    so. A cell with one of the texts in ``gaps`` is NaN, to fill or to refuse; without them it is refused here.
+    A column count in the header that contradicts all rows, and last rows that repeat a time, are repaired with a
+    remark. A cell with one of the texts in ``gaps`` becomes NaN; without ``gaps`` such a cell is an error.
     """
     try:
         lines = text_lines(path)
@@ -123,7 +124,7 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> OpenSimTable:
 
 
 def _numbers(lines: list[str], row_lines: range, labels: list[str], gaps: Sequence[str]) -> Floats:
-    """Return the numbers (rows, columns), time first."""
+    """Return the numbers of all rows (rows, columns), time first."""
     table = np.empty((len(row_lines), len(labels)))
     for row, number in enumerate(row_lines):
         cells = lines[number - 1].split()
@@ -136,7 +137,7 @@ def _numbers(lines: list[str], row_lines: range, labels: list[str], gaps: Sequen
 
 
 def _header(lines: list[str]) -> _Header:
-    """Return what the lines until ``endheader`` say; DataError names the line of what is not usable."""
+    """Return the header, up to ``endheader``. Raises DataError with the line of an error."""
     end = next((index for index, line in enumerate(lines) if line.strip().lower() == _END), None)
     if end is None:
         raise DataError(f"has no line '{_END}': it is cut off in its header, or is no .mot or .sto file")
@@ -174,7 +175,7 @@ def _header(lines: list[str]) -> _Header:
 
 
 def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
-    """Return the number of the line of labels (from 1) and the labels."""
+    """Return the line number of the labels (from 1) and the labels."""
     for number in range(header.end + 2, len(lines) + 1):
         if lines[number - 1].strip():
             # Labels may hold blanks where tabs separate them.
@@ -200,9 +201,9 @@ _SIGNS = {
 
 
 def opensim_bytes(recording: Recording) -> bytes:
-    """Return a recording as a ``.sto`` file: SI units, angles in radians, labels ``time`` and the channels' names.
+    """Return a recording as a ``.sto`` file: SI units, angles in radians, labels ``time`` and channel names.
 
-    Units and signs stand in the header, where OpenSim keeps them as text; so does the kind of a recording that nobody
+    The header states units and signs as text, which OpenSim preserves, and the kind of a recording that was not
     measured.
     """
     units = ", ".join(f"{name} [{recording.unit(name)}]" for name in recording.names)
@@ -226,5 +227,5 @@ def opensim_bytes(recording: Recording) -> bytes:
 
 
 def write_opensim(path: str | Path, recording: Recording) -> Path:
-    """Write a recording as a ``.sto`` file that OpenSim reads; returns the path."""
+    """Write a recording as a ``.sto`` file for OpenSim. Returns the path."""
     return write_file(path, opensim_bytes(recording))

@@ -1,9 +1,10 @@
-"""A recording of a walk in the names, zero and signs of OpenSim.
+"""Conversion of a walking recording to the names, zeros and signs of OpenSim.
 
-``ankle_angle_r`` is 0 with the foot square to the shank and grows in dorsiflexion [rad]. ``ankle_angle_r_moment`` is
-the moment along it [N m], below 0 in push-off, and ``ankle_angle_r_device_moment`` what a device adds.
-``ground_force_r_vy`` is the vertical force [N]. ``shank_angle_r`` is no coordinate of OpenSim's models, whose legs have
-hip and knee: it stays as the package has it, as do channels without a counterpart.
+``ankle_angle_r`` [rad] is 0 with the foot at a right angle to the shank, positive in dorsiflexion.
+``ankle_angle_r_moment`` is the ankle moment in this direction [N m], negative in push-off;
+``ankle_angle_r_device_moment`` is the contribution of a device. ``ground_force_r_vy`` is the vertical force [N].
+``shank_angle_r`` is no coordinate of OpenSim models, whose legs have hip and knee; it keeps the definition of this
+package, as do all channels without a counterpart.
 """
 
 import math
@@ -12,21 +13,21 @@ from ppafo.constants import STANDARD_GRAVITY
 from ppafo.signals import Channel, Recording
 
 _ANGLES = {"ankle_angle": "{}", "angle": "{}", "healthy_angle": "healthy_{}"}
-"""Names of angles [rad], with the coordinate of the ankle in them; OpenSim counts them from the square foot."""
+"""Pattern of the OpenSim name by angle channel [rad]; in OpenSim 0 is the foot at a right angle to the shank."""
 _REVERSED = {"angular_velocity": "{}_speed", "ankle_moment": "{}_moment", "external_torque": "{}_device_moment"}
-"""Names of what OpenSim counts above 0 in dorsiflexion, and the package in plantarflexion."""
+"""Pattern of the OpenSim name by channel whose sign is reversed: positive in dorsiflexion instead of plantarflexion."""
 _OF_A_SIDE = ("shank_angle",)
-"""Channels that only get the letter of their side."""
+"""Channels whose name only gets the letter of the side."""
 _PER_MASS = ("ankle_moment", "vertical_force")
-"""Channels that may be per mass of the body: [N m/kg], and [N/kg] or multiples of the body's weight [-]."""
+"""Channels that may be normalised by body mass [N m/kg], [N/kg] or by body weight [-]."""
 
 
 def opensim_recording(
     recording: Recording, side: str = "right", body_mass: float | None = None
 ) -> tuple[Recording, tuple[str, ...]]:
-    """Return a recording of a walk in OpenSim's names, zero and signs, and the channels that need ``body_mass`` [kg].
+    """Return a walking recording in OpenSim's names, zeros and signs, and the channels omitted for lack of a body mass.
 
-    Moment and force per mass become the body's; without a body mass they are left out and named.
+    Moment and force per mass are multiplied by ``body_mass`` [kg]; without a body mass they are omitted and named.
     """
     foot, coordinate, mass = side[0], f"ankle_angle_{side[0]}", body_mass or 0.0
     units = {name: recording.unit(name) for name in recording.names}

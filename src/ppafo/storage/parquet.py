@@ -1,4 +1,4 @@
-"""Tables as Parquet files: columns with unit and meaning, the same table giving the same bytes, damage found."""
+"""Tables as Parquet files: columns with unit and description, reproducible bytes, and detection of damage."""
 
 import contextlib
 import io
@@ -16,18 +16,18 @@ if TYPE_CHECKING:
     import pyarrow.parquet as pq
 
 _COMPRESSION_LEVEL = 1
-"""Compression level of zstd: the fastest."""
+"""Compression level of zstd, the fastest."""
 _MAXIMUM_VALUES = 200_000_000
-"""Values of a table that is read; a chunk with channels over time has some millions."""
+"""Largest number of values of a table to read; a chunk with channels over time has some millions."""
 _FLOATING_TYPES = ("double", "float")
-"""Arrow's names for the types of floats."""
+"""Arrow names of floating-point types."""
 _LONGEST_SHOWN = 120
-"""Characters of a message of the library that one of ours repeats."""
+"""Largest number of characters of a library's error message that are repeated in a message."""
 
 
 @dataclass(frozen=True, slots=True)
 class TableColumn:
-    """Values of a column, a NumPy or Arrow array of one value a row, with their unit and what they mean."""
+    """Column of a table: values as NumPy or Arrow array, one per row, with unit and description."""
 
     values: Any
     unit: str
@@ -35,7 +35,7 @@ class TableColumn:
 
 
 def table_of(columns: Mapping[str, TableColumn], described: Mapping[str, str]) -> "pa.Table":
-    """Return a table whose columns say their unit and meaning; ``described`` is what the table says of itself."""
+    """Return a table with units and descriptions of columns as metadata; ``described`` is the metadata of the table."""
     import pyarrow as pa
 
     arrays = [
@@ -50,9 +50,9 @@ def table_of(columns: Mapping[str, TableColumn], described: Mapping[str, str]) -
 
 
 def parquet_bytes(table: "pa.Table") -> bytes:
-    """Return the content of a Parquet file; the same table gives the same bytes with the same release of pyarrow.
+    """Return the Parquet file of a table as bytes; equal tables give equal bytes with the same release of pyarrow.
 
-    Floats are split by bytes and compressed, which makes them a tenth to a third smaller; pages carry checksums.
+    Floats are byte-split and compressed, which saves a tenth to a third; pages have checksums.
     """
     import pyarrow.parquet as pq
 
@@ -73,9 +73,9 @@ def parquet_bytes(table: "pa.Table") -> bytes:
 
 
 def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | None = None) -> "pa.Table":
-    """Return a table, or some of its columns, of a file that messages call ``name``; the file is closed.
+    """Return a table, or some of its columns, and close the file; ``name`` is the name of the file in messages.
 
-    DataError where it is damaged, checksums included, has far too many values, or has no such column.
+    Raises DataError for a damaged file (checksums included), for far too many values, and for a missing column.
     """
     with _opened(file, name) as parquet:
         # Counted before memory is taken: a column of one constant takes no room in the file.
@@ -90,9 +90,9 @@ def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | No
 
 
 def column_names(file: io.BufferedIOBase, name: str) -> list[str]:
-    """Return the names of the columns in a file that messages call ``name``; the file is closed.
+    """Return the column names of a file and close the file; ``name`` is the name of the file in messages.
 
-    DataError where it is damaged.
+    Raises DataError for a damaged file.
     """
     with _opened(file, name) as parquet:
         return list(parquet.schema_arrow.names)
@@ -100,7 +100,7 @@ def column_names(file: io.BufferedIOBase, name: str) -> list[str]:
 
 @contextlib.contextmanager
 def _opened(file: io.BufferedIOBase, name: str) -> "Iterator[pq.ParquetFile]":
-    """Open a Parquet file, checksums checked, and close it behind the block; damage met within is a DataError."""
+    """Open a Parquet file for a ``with`` block, verifying checksums; damage found within is raised as DataError."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -112,25 +112,25 @@ def _opened(file: io.BufferedIOBase, name: str) -> "Iterator[pq.ParquetFile]":
 
 
 def matrix_of(column: "pa.ChunkedArray") -> "np.ndarray[Any, Any]":
-    """Return a column of lists of one length as a matrix, a row for each list."""
+    """Return a column of lists of equal length as a matrix, one row per list."""
     values = column.combine_chunks().flatten().to_numpy(zero_copy_only=False)
     return np.asarray(values.reshape(len(column), -1))
 
 
 def as_numpy(table: "pa.Table") -> dict[str, "np.ndarray[Any, Any]"]:
-    """Return the columns as arrays; texts become objects."""
+    """Return the columns as NumPy arrays; texts become object arrays."""
     return {name: table.column(name).to_numpy() for name in table.column_names}
 
 
 def encode_texts(codes: "np.ndarray[Any, Any]", texts: Sequence[str]) -> "pa.DictionaryArray":
-    """Return a column of texts, each given by its number, from 0, in ``texts``: at most 128 different ones."""
+    """Return a dictionary-encoded column of texts: ``codes`` are indices, from 0, in ``texts``, at most 128 of them."""
     import pyarrow as pa
 
     return pa.DictionaryArray.from_arrays(pa.array(codes, type=pa.int8()), pa.array(list(texts), type=pa.string()))
 
 
 def texts_of_some(texts: Mapping[int, str], length: int) -> "pa.Array":
-    """Return a column of ``length`` texts, empty but for the rows whose number, from 0, is in ``texts``."""
+    """Return a column of ``length`` texts, empty except for the rows (index from 0) given in ``texts``."""
     import pyarrow as pa
 
     column: list[str | None] = [None] * length
@@ -140,7 +140,7 @@ def texts_of_some(texts: Mapping[int, str], length: int) -> "pa.Array":
 
 
 def lists_of(values: "np.ndarray[Any, Any]") -> "pa.ListArray":
-    """Return a column whose rows are the rows of a matrix (rows, values), as lists."""
+    """Return a column of lists, one list per row of a matrix (rows, values)."""
     import pyarrow as pa
 
     offsets = np.arange(values.shape[0] + 1, dtype=np.int32) * values.shape[1]

@@ -1,9 +1,9 @@
-"""Recordings from wherever they are, and result folders: NetCDF, CSV, and ``run.json`` with all that led to them.
+"""Result folders (NetCDF, CSV, and ``run.json`` with everything that led to them), and reading of recordings.
 
-A folder is complete or not there: a command takes one that is absent, empty or its own from earlier, and no other. It
-ends up with exactly the new files; until they are all written it stays as it was. Its mark states the hash of each
-file, and only files that still have theirs are replaced: neither what somebody changed nor what a mark from elsewhere
-lists is ever removed.
+Result folders are written atomically. A command only replaces a folder that is absent, empty or an earlier result of
+its own; the folder then has exactly the new files, and stays unchanged until all of these are written. The mark of a
+folder states the hash of each file, and only unchanged files are replaced: no file that a user changed, and no file
+listed by a foreign mark, is ever removed.
 """
 
 import os
@@ -34,16 +34,20 @@ if TYPE_CHECKING:
     from ppafo.storage.column_map import ColumnMap
 
 _MAXIMUM_BYTES_WRITTEN = 16_000_000
-"""No document of ours comes near; one repeats what a scenario file of at most 1 MB says, but not sixteen times."""
+"""Largest size of a JSON document of this package [bytes], far above any that is written.
+
+A document repeats the content of a scenario file, at most 1 MB, less than sixteen times.
+"""
 _NAMED = 3
-"""Files that a message names."""
+"""Largest number of files named in a message."""
 
 
 @dataclass(frozen=True, slots=True)
 class FolderKind:
-    """Kind of output folder: its name in messages, the file by which it is recognised, the hashes of all others.
+    """Kind of output folder: ``noun`` is its name in messages, ``mark`` the file by which it is recognised.
 
-    ``document_of(folder)`` reads the mark, which states the hashes by name; DataError where it is somebody else's.
+    ``document_of(folder)`` reads the mark, which states the hashes of all other files by name; it raises DataError for
+    a foreign mark.
     """
 
     noun: str
@@ -52,7 +56,7 @@ class FolderKind:
 
 
 MARK = "ppafo.json"
-"""The file by which the folder of a command is recognised that has no document of its own kind."""
+"""Mark of an output folder of a command that writes no document of its own kind."""
 
 _FORMAT = "ppafo files"
 _HASHES = "sha256"
@@ -60,7 +64,7 @@ _NOTHING_KEPT: Mapping[str, bytes] = MappingProxyType({})
 
 
 def marked_folder(command: str) -> FolderKind:
-    """Return the kind of folder that a command writes which marks it by ``MARK``."""
+    """Return the folder kind of a command that marks its folders by ``MARK``."""
 
     def document_of(folder: Path) -> Any:
         if marking_command(folder) != command:
@@ -71,14 +75,14 @@ def marked_folder(command: str) -> FolderKind:
 
 
 def marking_command(folder: Path) -> str:
-    """Return the command that ``MARK`` in a folder names, empty where it is not one of ours."""
+    """Return the command named by ``MARK`` in a folder, empty if this package did not write it."""
     document = read_json(folder / MARK)
     is_own = isinstance(document, dict) and document.get("format") == _FORMAT
     return str(document.get("command", "")) if is_own else ""
 
 
 def add_to_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Write files into a folder, replacing files of the same names; the mark of a command states them from then on."""
+    """Write files into a folder, replacing files with the same names, and add them to the mark of the folder."""
     marks = {}
     for name in (MARK, RUN_FILE):
         document = read_json(folder / name) if (folder / name).is_file() else None
@@ -97,7 +101,7 @@ def _hashes(contents: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def write_marked_folder(folder: Path, contents: Mapping[str, bytes], command: str) -> None:
-    """Make a folder hold exactly these files and ``MARK``, where it is absent, empty or that command's own."""
+    """Write a folder with exactly these files and ``MARK`` if it is absent, empty or the command's own."""
     mark = {
         "format": _FORMAT,
         "schema_version": 1,
@@ -110,9 +114,9 @@ def write_marked_folder(folder: Path, contents: Mapping[str, bytes], command: st
 
 
 def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes] = _NOTHING_KEPT) -> None:
-    """Refuse a folder that holds anything of somebody else's, or that cannot be made. It is a DataError.
+    """Raise DataError for a folder that contains foreign or changed files, or that cannot be written.
 
-    Files that are ``kept`` as they are, such as one that grows from run to run, may have been changed.
+    Files in ``kept``, such as one that grows from run to run, may have been changed if they have the given content.
     """
     is_folder = os.path.isdir(folder)  # noqa: PTH112  # Path.is_dir raises where no file can have the name
     # A link to nowhere is there too, and would be replaced by a folder.
@@ -153,13 +157,13 @@ def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes]
 
 
 def write_owned_folder(folder: Path, contents: Mapping[str, bytes], kind: FolderKind) -> None:
-    """Make a folder hold exactly these files, where ``check_owned_folder`` lets it be taken."""
+    """Write a folder with exactly these files, after ``check_owned_folder``."""
     check_owned_folder(folder, kind, contents)
     replace_folder(folder, contents)
 
 
 def read_json(path: Path) -> Any:
-    """Return what a JSON file of ours holds, as plain data. DataError where it is none."""
+    """Return the content of a JSON file as plain data. Raises DataError for an invalid file."""
     try:
         return json_document(read_bytes(path, _MAXIMUM_BYTES_WRITTEN))
     except ValueError as error:
@@ -178,7 +182,7 @@ def _listed(folder: Path) -> list[Path]:
 
 
 def _foreign(folder: Path, own: Collection[str], above: str = "") -> Iterator[str]:
-    """Names in a folder, with the names of its own folders ``above``, that are none of the result's own files."""
+    """Yield the names of entries in a folder that are not files of the result; ``above`` is the prefix of the names."""
     for entry in _listed(folder):
         name = f"{above}{entry.name}"
         if entry.is_dir() and not entry.is_symlink() and any(file.startswith(f"{name}/") for file in own):
@@ -198,7 +202,7 @@ SCHEMA_VERSION = 1
 class StoredResult:
     """Content of a result folder: the recording, and ``run.json`` as plain data.
 
-    ``drawn_by`` makes its figure, which no file needs to be read.
+    ``drawn_by`` is the function that draws the figure.
     """
 
     folder: Path
@@ -210,7 +214,7 @@ class StoredResult:
         return f"StoredResult in {self.folder}: {', '.join(self.document)}\n{self.recording!r}"
 
     def plot(self) -> "Figure":
-        """Return the figure that ``Result.plot`` gave; ``.savefig(...)`` writes it."""
+        """Return the same figure as ``Result.plot``; ``.savefig(...)`` writes it to a file."""
         assert self.drawn_by is not None, "read by ppafo.read_result"
         return self.drawn_by(self)
 
@@ -218,7 +222,7 @@ class StoredResult:
 def write_result(
     folder: str | Path, recording: Recording, document: Mapping[str, Any], attachments: Mapping[str, bytes]
 ) -> Path:
-    """Write a result folder with ``document`` in ``run.json`` and attachments by file name; returns the folder."""
+    """Write a result folder with ``document`` in ``run.json`` and attachments by file name. Returns the folder."""
     folder_path = Path(folder)
     netcdf = netcdf_bytes(recording, document.get("scenario"))
     contents = {NETCDF_FILE: netcdf, CSV_FILE: csv_bytes(recording), **attachments}
@@ -242,12 +246,12 @@ def write_result(
 
 
 def check_result_folder(folder: str | Path) -> None:
-    """Refuse a folder that holds anything but an earlier result, or that cannot be made."""
+    """Raise DataError for a folder that contains anything but an earlier result, or that cannot be written."""
     check_owned_folder(Path(folder), _RESULT)
 
 
 def read_stored(folder: str | Path) -> StoredResult:
-    """Return what a result folder holds, which nothing draws. DataError for a folder that holds none."""
+    """Return the content of a result folder, without a function to draw it. Raises DataError for any other folder."""
     from ppafo.storage.netcdf_reading import read_netcdf
 
     folder_path = Path(folder)
@@ -263,7 +267,7 @@ def read_stored(folder: str | Path) -> StoredResult:
 
 
 def read_document(folder: str | Path) -> dict[str, Any]:
-    """Return ``run.json`` of a result folder as plain data, or refuse what is not one. DataError says why."""
+    """Return ``run.json`` of a result folder as plain data. Raises DataError if it is not a document of a result."""
     path = Path(folder) / RUN_FILE
     document = read_json(path)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
@@ -283,7 +287,7 @@ _RESULT = FolderKind("ppafo result", RUN_FILE, read_document)
 
 
 ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
-"""A column map, or the name of one: a file, and the name in it where it has several."""
+"""Column map, or the name of one: file, and the name of the map if the file has several."""
 
 TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log", ".asc")
 """Suffixes of text tables."""

@@ -1,4 +1,4 @@
-"""Common reading of the tables of motion analysis (``.mot``, ``.sto``, ``.trc``): lines, numbers, doubled names."""
+"""Reading of tables of motion analysis (``.mot``, ``.sto``, ``.trc``): lines, numbers, duplicated names."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -13,13 +13,13 @@ from ppafo.storage.files import read_bytes, text_of
 from ppafo.wording import LONGEST_SHOWN, one_line
 
 _MOST_SAID = 3
-"""Doubled names of which each has a remark."""
+"""Largest number of duplicated names with a remark of their own."""
 
 
 def text_lines(path: str | Path) -> list[str]:
-    """Return the lines of a text file, with any line ends; DataError where it is none.
+    """Return the lines of a text file, with any line ends. Raises DataError for a file that is not text.
 
-    A table whose tabs a spreadsheet has saved as commas, and every line as wide as the widest, has its tabs again.
+    If a spreadsheet replaced the tabs of a table by commas and padded all lines to equal width, the tabs are restored.
     """
     lines = text_of(read_bytes(path)).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     last = next((line.strip() for line in reversed(lines) if line.strip()), "")
@@ -29,7 +29,7 @@ def text_lines(path: str | Path) -> list[str]:
 
 
 def number_in(cell: str, line: int, label: str, gaps: Sequence[str] = ()) -> float:
-    """Return the number in a cell, NaN for one of the texts in ``gaps``; DataError names line and column."""
+    """Return the number in a cell, NaN for a text in ``gaps``. Raises DataError, with line and column, for others."""
     if cell.lower() in gaps:
         return float("nan")
     value = finite_number(cell)
@@ -42,9 +42,9 @@ def number_in(cell: str, line: int, label: str, gaps: Sequence[str] = ()) -> flo
 
 
 def told_apart(names: Sequence[str], descriptions: Sequence[str] = ()) -> list[str]:
-    """Return names of which none is there twice: those of a doubled name are its descriptions, or ``NAME#2``.
+    """Return unique names: duplicated names are replaced by their descriptions, or numbered ``NAME#2``.
 
-    A description is taken where all of that name have one, and nothing else is called so.
+    Descriptions are used only if all columns of a name have one and none equals another name.
     """
     counts = Counter(names)
     twins = {name: [index for index, other in enumerate(names) if other == name] for name in counts if counts[name] > 1}
@@ -58,7 +58,7 @@ def told_apart(names: Sequence[str], descriptions: Sequence[str] = ()) -> list[s
 
 
 def doubled(names: Sequence[str], apart: Sequence[str]) -> dict[str, list[str]]:
-    """Return by each doubled name those that stand for it."""
+    """Return the unique replacements of each duplicated name; ``apart`` are the unique names from ``told_apart``."""
     twins: dict[str, list[str]] = {}
     for name, own in zip(names, apart, strict=True):
         if name != own:
@@ -67,7 +67,7 @@ def doubled(names: Sequence[str], apart: Sequence[str]) -> dict[str, list[str]]:
 
 
 def without_copies(columns: Mapping[str, Floats], twins: Mapping[str, Sequence[str]]) -> dict[str, Floats]:
-    """Return columns in which one stands by the doubled name for all of that name, where these are the same."""
+    """Return columns without copies: columns of a duplicated name with equal values become one, under that name."""
     same = {
         name: own
         for name, own in twins.items()
@@ -79,7 +79,7 @@ def without_copies(columns: Mapping[str, Floats], twins: Mapping[str, Sequence[s
 
 
 def said_of_doubled(twins: Mapping[str, Sequence[str]], left: Mapping[str, object], noun: str) -> list[str]:
-    """Return a remark on each doubled name of which more than one is left; beyond a few their number alone."""
+    """Return a remark on each duplicated name whose columns all remain in ``left``; beyond a few, only their number."""
     said = [
         f"{noun} of one name, {one_line(name)[:LONGEST_SHOWN]!r}: they are {', '.join(map(repr, own))} here"
         for name, own in twins.items()

@@ -1,8 +1,8 @@
-"""Tables of markers over time, ``.trc``, as systems of motion capture and OpenSim write them.
+"""Tables of marker positions over time (``.trc``), as written by motion capture systems and OpenSim.
 
-Lines 1 to 3 are ``PathFileType 4 (X/Y/Z) NAME``, names of the header's values, and these. Line 4 has ``Frame#``,
-``Time`` and a name for every three columns, line 5 ``X1 Y1 Z1 ...``; then come the rows. A marker that was not seen
-leaves its cells empty, or has ``nan``.
+Line 1 is ``PathFileType 4 (X/Y/Z) NAME``; lines 2 and 3 have names and values of the header. Line 4 has ``Frame#``,
+``Time`` and a marker name for every three columns, line 5 ``X1 Y1 Z1 ...``; the rows follow. The cells of an unseen
+marker are empty or ``nan``.
 """
 
 from collections.abc import Mapping
@@ -19,17 +19,17 @@ from ppafo.wording import LONGEST_SHOWN, one_line
 
 _FIRST_WORD = "PathFileType"
 _HEAD_LINES = 5
-"""Lines before the first row."""
+"""Number of lines before the first row."""
 _UNITS = ("mm", "cm", "m")
 _UNSEEN = ("", "nan")
-"""Cells that mean an unseen marker."""
+"""Cell texts of an unseen marker."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MarkerTable:
-    """Markers over time [s]: coordinates (3, frames) by name in ``unit``; NaN where a marker was not seen.
+    """Marker positions over time [s]: coordinates (3, frames) by name, in ``unit``; NaN if a marker was not seen.
 
-    ``remarks`` say which have the names of others in the file.
+    ``remarks`` name markers that were renamed because of duplicated names.
     """
 
     time: Floats
@@ -39,7 +39,7 @@ class MarkerTable:
 
 
 def read_trc(path: str | Path) -> MarkerTable:
-    """Return the markers in a ``.trc`` file; DataError names file, line and what is wrong."""
+    """Return the markers in a ``.trc`` file. Raises DataError with file, line and error."""
     try:
         lines = text_lines(path)
         if not lines[0].startswith(_FIRST_WORD) or len(lines) <= _HEAD_LINES:
@@ -66,7 +66,7 @@ def read_trc(path: str | Path) -> MarkerTable:
 
 
 def _rows(lines: list[str], names: list[str]) -> tuple[Floats, list[Floats]]:
-    """Return the time [s] of the frames, and the coordinates (3, frames) of each marker in the file's unit."""
+    """Return the times of the frames [s], and the coordinates (3, frames) of each marker in the unit of the file."""
     labels = [f"{axis} of {name}" for name in names for axis in "XYZ"]
     width = 2 + len(labels)
     numbers = [number for number, line in enumerate(lines, 1) if number > _HEAD_LINES and line.strip()]

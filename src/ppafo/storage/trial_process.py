@@ -1,7 +1,7 @@
-"""The process that reads a file first, with little memory; ``trial_reading.py`` starts it.
+"""Trial reading of a file in a process with limited memory, started by ``trial_reading.py``.
 
-It is ``python -m ppafo.storage.trial_process READER LIBRARY PATH``. READER is a function of the package,
-``MODULE:NAME``, and LIBRARY the module of C code that it uses.
+The command is ``python -m ppafo.storage.trial_process READER LIBRARY PATH``. READER is a function of the package,
+``MODULE:NAME``, and LIBRARY is the C extension module that it uses.
 """
 
 import os
@@ -13,15 +13,15 @@ from pathlib import Path
 from ppafo.errors import DataError
 
 REFUSED, OUT_OF_MEMORY = 76, 77
-"""Exit codes: the file is refused in one line on the output; reading it needs more memory than allowed."""
+"""Exit codes: the file is invalid, with one line of explanation on the output; or reading needs too much memory."""
 _ALWAYS_ALLOWED = 400_000_000
-"""Bytes of memory that reading any file may take."""
+"""Memory [bytes] that reading any file may take."""
 _MAXIMUM_GROWTH = 100
-"""Largest memory for reading over the size of a larger file [-]."""
+"""Largest ratio of memory for reading to file size for larger files [-]."""
 
 
 def read_on_trial(reader: str, library: str, path: str) -> int:
-    """Return the exit code of reading a file: 0, ``REFUSED`` with the reason on the output, or ``OUT_OF_MEMORY``."""
+    """Return the exit code of a trial reading: 0, ``REFUSED`` with the reason on the output, or ``OUT_OF_MEMORY``."""
     # What the libraries take themselves does not count.
     import_module(library)
     read = pkgutil.resolve_name(reader)
@@ -37,7 +37,7 @@ def read_on_trial(reader: str, library: str, path: str) -> int:
 
 
 def _limit_memory(file_bytes: int) -> None:
-    """Let this process take no more memory than a file of a size may need, beside what it has; only Linux can that."""
+    """Limit the additional memory of this process to a multiple of the file size (only on Linux)."""
     sizes = Path("/proc/self/statm")
     if not sizes.exists():
         return

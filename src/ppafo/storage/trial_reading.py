@@ -1,4 +1,4 @@
-"""Files read first by another process: a library of C code can crash on a damaged file, hang, or take all memory."""
+"""Trial reading of files in a separate process: a C library may crash or hang on a damaged file, or exhaust memory."""
 
 import os
 import subprocess
@@ -11,19 +11,19 @@ from ppafo.storage import trial_process
 from ppafo.storage.trial_process import OUT_OF_MEMORY, REFUSED
 
 TRIAL = ("-P", "-m", trial_process.__name__)
-"""Arguments of Python for the other process; by ``-P`` nothing of the working folder is imported."""
+"""Arguments of Python for the separate process; ``-P`` prevents imports from the working folder."""
 
 _MAXIMUM_SECONDS = 30.0
-"""Time [s] that reading any file may take: what the start of a process takes on a busy computer."""
+"""Time [s] that reading any file may take, including the start of a process on a busy computer."""
 _BYTES_PER_SECOND = 5e6
-"""Bytes per second of a slow disk, which give a large file more time."""
+"""Reading rate of a slow disk [bytes/s], by which large files get more time."""
 
 
 def check_can_be_read(path: Path, read: Callable[[str], object], library: str) -> None:
-    """Refuse a file that ``read`` refuses, or on which it crashes, hangs or takes far more memory than the file has.
+    """Raise DataError for a file on which ``read`` fails, crashes, hangs or takes far more memory than the file has.
 
-    ``read`` is a public function of a module, called in another process with the path alone; ``library`` is the module
-    of C code that it uses, loaded before memory is limited, where the system can limit it. DataError says why.
+    ``read`` is a public function of a module, called in a separate process with the path alone. ``library`` is the C
+    extension module that it uses, loaded before memory is limited (if the system can limit memory).
     """
     if not sys.executable or not path.is_file():
         return

@@ -36,10 +36,9 @@ class ConfigurationResult:
     """Result of a configuration on a task.
 
     ``status``: end of the nominal run
-    ``metrics``: metrics of the nominal run [SI]
+    ``metrics``: metrics of the nominal run
     ``tracking``: verdict on a nominal run that does not follow its reference
-    ``failed_draws``: number of draws whose run failed
-    ``reason``: reason of the first failure
+    ``failed_draws``, ``reason``: number of draws whose run failed, and reason of the first failure
     ``rows``: runs over the draws; None without draws
     ``renoised``: first runs of ``rows`` repeated with other sensor noise; None without noise
     """
@@ -298,7 +297,7 @@ _MARKS = "osD^vP"
 _MAXIMUM_DOTS = 1500
 _BINS = 40
 _SHOWN = (0.5, 99.5)
-"""Percentiles between which changes are drawn: a few far ones would make all others one bar."""
+"""Percentiles between which changes are plotted; a few distant ones would squeeze all others into one bar."""
 
 
 def _pareto_panels(comparison: ComparisonResult) -> list[Panel]:

@@ -19,7 +19,7 @@ from ppafo.studies.draws import REPLICATES
 
 Masks = NDArray[np.bool_]
 OUTER_QUANTILES = (0.05, 0.95)
-"""The quantiles over the draws that tables show beside a median."""
+"""Quantiles over the draws that tables show beside a median."""
 COMPARED: dict[str, int] = {
     **{name: -1 for name in TRACKING if name not in ONE_INSTANT},
     "gas_supplied": -1,
@@ -35,7 +35,7 @@ COMPARED: dict[str, int] = {
     "torque_error": -1,
     "toe_clearance": 1,
 }
-"""Metrics of the table: -1 where less is better, 1 where more is, 0 where neither is better as such."""
+"""Metrics of the table: -1 if smaller is better, 1 if larger is better, 0 if neither."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ def compare_pairs(
 
 
 def best_probabilities(values: Sequence[Floats], better: int, confidence: float) -> list[ConfidenceInterval]:
-    """Return the probability of each configuration to be the best in a draw; ties count for all of them."""
+    """Return the probability of each configuration to be the best in a draw; equally good ones all count."""
     table = better * np.stack(values)
     known = np.all(np.isfinite(table), axis=0)
     if not known.any():

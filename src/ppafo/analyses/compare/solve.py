@@ -24,11 +24,11 @@ from ppafo.study.runs import Rows, RunCounter, Runs, failures_of, unvaried
 from ppafo.wording import first_twice, nearest_name
 
 AS_WRITTEN = "as written"
-"""Name of a configuration's task where no other task is requested."""
+"""Name of the task of configurations that run as written."""
 DEFAULT_DRAWS = 4096
-"""Draws of the uncertain values unless given."""
+"""Default number of draws of the uncertain values."""
 _SAME = 1.0e-9
-"""Values that differ by less than this fraction are one."""
+"""Relative difference up to which two values count as equal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ Scenarios = Mapping[tuple[str, str], Scenario]
 
 
 _DrawnRuns = Mapping[tuple[str, str], tuple[Rows, Rows | None, str]]
-"""Runs of each case over the draws, the first of them again with other noise if any is noisy, why the first failed."""
+"""Runs of each case over the draws, first runs repeated with other noise or None, reason of the first failure."""
 
 
 def compared(
@@ -207,7 +207,7 @@ def _on_task(
     metrics: Sequence[str],
     confidence: float,
 ) -> OnTask:
-    """Return the results of a task; with draws, also paired statistics against the baseline and the best one."""
+    """Return the results of a task; with draws, also paired statistics and probabilities of being the best."""
     first = next(case for case in cases if case.configuration == baseline)
     pairs: dict[str, list[Paired]] = {}
     for case in cases:

@@ -1,1 +1,1 @@
-"""Discharge of a gas bottle: duration, temperature, and the reason why it ends."""
+"""Discharge of a gas bottle: duration, temperature, and the reason of the end."""

@@ -1,4 +1,4 @@
-"""Report of a bottle's duration and its end, of the values with their sources, and of several gas uses side by side."""
+"""Report of a bottle's duration and end, of its values with their sources, and of several gas demands compared."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -30,12 +30,13 @@ _WARMTH = Kind("Temperature of the bottle", "K", "temperature", ".1f")
 
 @dataclass(frozen=True, slots=True)
 class Endurance:
-    """The request and its result.
+    """Request for the duration of a bottle, and its result.
 
-    ``discharge`` is the requested course. ``strides_when_warm`` is the number of strides that a bottle which stays at
-    room temperature gives: what cooling costs. ``is_of_task_sequence`` is true where a stride is a task sequence,
-    ``is_of_recording`` where it is a whole recording, walked or not. ``device_units`` are the units of the device that
-    takes the gas, by unit in SI, where it is known.
+    ``draw`` is the gas demand, ``schedule`` the times of walking and rest, and ``discharge`` the bottle over time.
+    ``strides_when_warm`` is the number of strides from a bottle at constant room temperature, so the difference to the
+    result is the effect of cooling. ``is_of_task_sequence`` is True if a repetition is a task sequence,
+    ``is_of_recording`` if it is a whole recording. ``device_units`` are the display units of the device, by SI unit, if
+    it is known.
     """
 
     bottle: Bottle
@@ -49,11 +50,11 @@ class Endurance:
 
     @property
     def shown(self) -> dict[str, str]:
-        """Units in which this is said and drawn, by unit in SI: those of the device, else of the bottle's file."""
+        """Display units by SI unit: from the device if it is known, otherwise from the bottle's file."""
         return pressure_units(self.bottle.entries["regulator.set_pressure"].unit) | dict(self.device_units)
 
     def json_document(self) -> dict[str, Any]:
-        """Return the course, its ending and the bottle as plain data in SI."""
+        """Return time series, ending and bottle as plain data in SI units."""
         course, bottle = self.discharge, self.bottle
         recording = course.recording
         return {
@@ -87,12 +88,12 @@ class Endurance:
 
 @dataclass(frozen=True, slots=True)
 class Endurances:
-    """Several gas uses on the same bottle, by name."""
+    """Durations of the same bottle for several gas demands, by name."""
 
     uses: Mapping[str, Endurance]
 
     def json_document(self) -> dict[str, Any]:
-        """Return each as plain data in SI."""
+        """Return the results of all gas demands as plain data in SI units."""
         return {"recordings": {name: use.json_document() for name, use in self.uses.items()}}
 
 
@@ -106,7 +107,7 @@ _CAPTION = "Temperature, pressure and gas in the bottle from full to the end."
 
 @in_units(lambda endurance: endurance.shown)
 def finding_of(endurance: Endurance) -> Finding[Endurance]:
-    """Report of a bottle's duration for one gas use, in words, tables and panels."""
+    """Return the report of a bottle's duration for one gas demand: text, tables and panels."""
     values = [
         (path, format_quantity(entry.value, entry.unit), entry.origin, entry.source)
         for path, entry in endurance.bottle.entries.items()
@@ -145,7 +146,7 @@ def finding_of(endurance: Endurance) -> Finding[Endurance]:
 
 @in_units(lambda several: next(iter(several.uses.values())).shown)
 def finding_of_several(several: Endurances) -> Finding[Endurances]:
-    """Report of a bottle's durations for several gas uses, side by side."""
+    """Return the report of a bottle's durations for several gas demands, compared in one table."""
     are_strides = all(_counted(use) == "stride" for use in several.uses.values())
     counted, time = ("stride", "walking") if are_strides else ("repetition", "run time")
     titles = ("gas use", (f"gas per {counted}", _MASS), (time, _DURATION), f"{counted}s", "ended")
@@ -180,7 +181,7 @@ _TITLE = "How long the bottle lasts"
 
 
 def endurance_panels(endurance: Endurance) -> list[Panel]:
-    """Return temperature, pressure and gas of the bottle over the requested course."""
+    """Return the panels of temperature, pressure and gas of the bottle over time."""
     recording, bottle = endurance.discharge.recording, endurance.bottle
     time, needed = recording.time, bottle.regulator.set_pressure + bottle.regulator.pressure_margin
     dotted, dashed = ({"linestyle": style, "linewidth": 1.2} for style in (":", "--"))
@@ -207,7 +208,7 @@ def endurance_panels(endurance: Endurance) -> list[Panel]:
 
 
 def _facts(endurance: Endurance) -> list[tuple[str, str]]:
-    """Return name and value of everything that a reader wants first."""
+    """Return the most important results as pairs of name and value."""
     course, draw = endurance.discharge, endurance.draw
     recording, bottle, room = course.recording, endurance.bottle, endurance.bottle.room_temperature
     # What warms the gas of the full bottle to the room's temperature behind the regulator.

@@ -1,4 +1,4 @@
-"""The course of a bottle from full to the moment at which it no longer holds the supply pressure."""
+"""Simulation of a bottle from full until the supply pressure is no longer maintained."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -31,14 +31,14 @@ from ppafo.walking.bottle.course import WALKED, SupplyBalance
 
 TIME_IS_UP = "time is up"
 Stop = Literal["supply", "frozen", "time"]
-"""Reason for the end of a run: supply pressure not maintained, fluid table left in the cold, time limit reached."""
+"""Reason for the end of a run: supply pressure not maintained, cold end of the property table, or time limit."""
 _NEXT_TO_NOTHING = 0.01
-"""Fraction of a full bottle: less than this left to be had from a warm bottle is called empty."""
+"""Usable gas at room temperature, as a fraction of a full bottle, below which the bottle is called empty."""
 
 
 @dataclass(frozen=True, slots=True)
 class DischargeEnd:
-    """End of a run: kind, sentence, mass left [kg], and the part of it [kg] that a warm bottle would still deliver."""
+    """End of a discharge: kind, explanation, remaining mass [kg], and usable part of it at room temperature [kg]."""
 
     kind: str
     message: str
@@ -47,22 +47,23 @@ class DischargeEnd:
 
 
 def reserves(bottle: Bottle, draw: GasDemand, pressure: float, temperature: float) -> tuple[float, float]:
-    """Return the margins of a bottle at its largest flow, as fractions: below 0 the supply pressure is lost.
+    """Return the relative margins of pressure and flow [-] at the largest flow; below 0 the supply pressure is lost.
 
-    First the pressure above what the regulator needs, then the flow that it would pass above the largest one.
+    The first is the pressure in excess of the regulator's need divided by the set pressure, the second is the flow
+    limit of the regulator divided by the largest flow, minus 1.
     """
     to_spare = pressure_reserve(bottle.regulator, pressure, draw.peak_flow) / bottle.regulator.set_pressure
     return to_spare, flow_limit(bottle, pressure, temperature) / draw.peak_flow - 1.0
 
 
 def flow_limit(bottle: Bottle, pressure: float, temperature: float) -> float:
-    """Return the largest flow [kg/s] that the regulator passes at a pressure [Pa] and temperature [K] in the bottle."""
+    """Return the largest flow [kg/s] of the regulator at a pressure [Pa] and a temperature [K] in the bottle."""
     gas_constant = bottle.fluid.table.gas_constant
     return regulator_flow_limit(bottle.regulator, pressure, temperature, bottle.heat_capacity_ratio, gas_constant)
 
 
 def smallest_mass_when_warm(bottle: Bottle, draw: GasDemand) -> float:
-    """Return the mass of gas [kg] with which the bottle, at room temperature, just holds the supply pressure."""
+    """Return the smallest mass of gas [kg] with which the bottle maintains the supply pressure at room temperature."""
     table, room = bottle.fluid.table, bottle.room_temperature
     low, high = 0.0, min(bottle.mass, bottle.volume * densest_gas(table, room))
     # Halved until nothing is left to halve: the reserve grows with the mass, though not smoothly where liquid begins.
@@ -77,9 +78,10 @@ def smallest_mass_when_warm(bottle: Bottle, draw: GasDemand) -> float:
 
 
 def ending(bottle: Bottle, draw: GasDemand, mass: float, content: BottleContent, stopped_by: Stop) -> DischargeEnd:
-    """Return the ending for what stopped a run: the supply pressure, the cold end of the table, or the time.
+    """Return the ending for a cause: loss of supply pressure, cold end of the property table, or time limit.
 
-    A bottle that would still do at room temperature is too cold, any other is empty.
+    After a loss of pressure, the bottle is "too cold" if it could still deliver at room temperature, and "empty"
+    otherwise.
     """
     usable = max(0.0, mass - smallest_mass_when_warm(bottle, draw))
     left = f"{mass * GRAMS_PER_KILOGRAM:.3g} g are left"
@@ -103,21 +105,22 @@ def ending(bottle: Bottle, draw: GasDemand, mass: float, content: BottleContent,
 
 
 MAXIMUM_STRETCHES = 2000
-"""Walks and rests of a schedule at most: each is a solution of its own."""
+"""Largest number of walking and resting intervals of a schedule; each is integrated separately."""
 SAMPLES = 1001
-"""Samples of a course."""
+"""Number of samples of the recording."""
 _RELATIVE, _ABSOLUTE = 1e-7, (1e-10, 1e-4, 1e-6, 1e-10, 1e-4, 1e-4)
-"""Tolerances of the solver: relative [-], and absolute ones of each part of the state, in its SI unit."""
+"""Tolerances of the solver: relative [-], and absolute for each component of the state, in its SI unit."""
 _ABOVE_FREEZING = 0.02
-"""Kelvin above the cold end of the table at which a run stops, so that the end is approached and not sat on."""
+"""Temperature [K] above the cold end of the property table at which a run stops, to stay within the table."""
 
 
 @dataclass(frozen=True, slots=True)
 class DischargeInterval:
-    """A time [s] of one draw [kg/s], the solution in it and at its end, and what stopped it before its time.
+    """Interval with a constant draw [kg/s], from ``start`` to ``end`` [s].
 
-    The solution is mass [kg] and energy [J] of the content, temperature of the wall [K], and the sums of gas [kg], its
-    enthalpy [J] and heat from the room [J] that crossed the border.
+    ``solution`` is the state as a function of time and ``last`` the state at the end; ``stopped_by`` is the reason of
+    an early end, or None. The state consists of mass [kg] and energy [J] of the content, temperature of the wall [K],
+    and the cumulative gas [kg], enthalpy [J] and heat from the room [J] across the boundary.
     """
 
     start: float
@@ -129,9 +132,10 @@ class DischargeInterval:
 
 
 class Balance(NamedTuple):
-    """Mass and energy that crossed the border of bottle and wall during the run, and the change inside.
+    """Mass and energy balance of bottle and wall over a run.
 
-    Crossed: gas [kg], its enthalpy [J], heat from the room [J]. Inside: mass [kg], energy of content and wall [J].
+    Across the boundary: gas drawn [kg], its enthalpy [J], heat from the room [J]. Changes inside: mass of the content
+    [kg], energy of the content [J], energy of the wall [J].
     """
 
     drawn_mass: float
@@ -144,7 +148,7 @@ class Balance(NamedTuple):
 
 @dataclass(frozen=True)
 class Discharge:
-    """The course of a bottle: time of walking and of all [s], strides, how it ended, the balance, and its recording."""
+    """Discharge of a bottle: walking time and total time [s], strides, ending, balance, and recording."""
 
     walking_time: float
     total_time: float
@@ -155,12 +159,12 @@ class Discharge:
 
     @cached_property
     def recording(self) -> Recording:
-        """The course of the bottle: made when it is first read, which takes as long as following it."""
+        """Recording of the discharge, computed at the first access, which takes about as long as the simulation."""
         return self.record()
 
 
 def check_schedule(schedule: Schedule) -> None:
-    """Refuse times of walking and resting that a bottle cannot be followed over."""
+    """Raise ParameterError for a schedule of walking and rest that cannot be simulated."""
     for name, value, least in (("walk", schedule.walk, 1.0), ("longest", schedule.longest, 1.0)):
         if not least <= value < float("inf"):
             raise ParameterError(f"{name} must be at least {least:g} s and finite, it is {value:g} s")
@@ -174,10 +178,10 @@ def check_schedule(schedule: Schedule) -> None:
 
 
 def discharge(bottle: Bottle, draw: GasDemand, schedule: Schedule) -> Discharge:
-    """Return the course of a full bottle under a draw; walking takes the mean flow of a stride.
+    """Return the discharge of a full bottle for a gas demand; while walking, the draw is the mean flow of a stride.
 
-    Strides are a second long and bottles cool in minutes, so the mean stands for the pulses; the regulator is judged by
-    the largest flow. SimulationError where the solver fails.
+    The mean replaces the pulses because strides take about a second and bottles cool in minutes. The regulator is
+    checked against the largest flow. Raises SimulationError if the solver fails.
     """
     check_schedule(schedule)
     content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
@@ -222,7 +226,7 @@ def discharge(bottle: Bottle, draw: GasDemand, schedule: Schedule) -> Discharge:
 
 
 def discharge_of_life(life: BottleLife, draw: GasDemand) -> Discharge:
-    """Return the course of a bottle on which somebody walked to its end."""
+    """Return the discharge of a bottle from the simulation of a walk that emptied it."""
     course = life.course
     ended, bottle = course.ending, course.supply.bottle
     usable = max(0.0, course.last.mass - smallest_mass_when_warm(bottle, draw))
@@ -240,7 +244,7 @@ def discharge_of_life(life: BottleLife, draw: GasDemand) -> Discharge:
 
 
 def _recording(bottle: Bottle, stretches: Sequence[DischargeInterval]) -> Recording:
-    """Return the course at evenly spaced times, and exactly at its end."""
+    """Return the recording of a discharge at uniformly spaced times, from the start to the exact end."""
     times = np.linspace(0.0, stretches[-1].end, SAMPLES)
     ends = np.array([stretch.end for stretch in stretches])
     # The last time may be beyond the last end by rounding.
@@ -267,7 +271,7 @@ def _recording(bottle: Bottle, stretches: Sequence[DischargeInterval]) -> Record
 
 
 def content_of(bottle: Bottle, mass: float, energy: float) -> BottleContent:
-    """State of the bottle's content with a mass [kg] of an energy [J]."""
+    """Return the state of the bottle's content for a mass [kg] and an internal energy [J]."""
     table = bottle.fluid.table
     return bottle_content(table, mass, bottle.volume, content_temperature(table, mass, bottle.volume, energy))
 
@@ -275,7 +279,7 @@ def content_of(bottle: Bottle, mass: float, energy: float) -> BottleContent:
 def solve_stretch(
     bottle: Bottle, draw: GasDemand, start: float, end: float, values: Floats, walking: bool
 ) -> DischargeInterval:
-    """Return one stretch; walking, it may end early where the supply pressure is no longer maintained."""
+    """Return one interval of walking or rest; walking ends early if the supply pressure is no longer maintained."""
     from scipy.integrate import solve_ivp
 
     flow = draw.mean_flow if walking else 0.0

@@ -1,4 +1,4 @@
-"""Gas demand of a device per stride and per time: from numbers, or from a recording."""
+"""Gas demand of a device per stride and per time, from given numbers or from a recording."""
 
 import math
 from dataclasses import dataclass
@@ -12,16 +12,16 @@ from ppafo.signals.recording import Floats
 from ppafo.units.shown import shown_text
 
 PEAK_WINDOW = 0.1
-"""Seconds over which the largest flow of a recording is averaged; lines and regulator even out what is shorter."""
+"""Averaging window [s] for the largest flow of a recording; lines and regulator smooth shorter peaks."""
 _MOST_RETURNED = 0.1
-"""Fraction of the gas used that may flow back: it waits in the line before the valve, and the next stride takes it."""
+"""Largest fraction of the gas that may flow back; it stays in the line upstream of the valve for the next stride."""
 
 
 @dataclass(frozen=True, slots=True)
 class GasDemand:
-    """Gas use: mass per stride [kg], time of a stride [s], largest flow [kg/s], and where the numbers come from.
+    """Gas demand: mass per stride [kg], stride time [s], largest flow [kg/s], and origin of the numbers.
 
-    A stride is one cycle of the device's leg, heel strike to heel strike of the same foot.
+    A stride is one cycle of the leg with the device, from heel strike to heel strike of the same foot.
     """
 
     mass_per_stride: float
@@ -36,7 +36,7 @@ class GasDemand:
 
 
 def demand_of_numbers(mass_per_stride: float, stride_time: float, peak_flow: float | None) -> GasDemand:
-    """Return the draw of given numbers [kg, s, kg/s]; without a largest flow the mean one is taken for it."""
+    """Return the gas demand for given numbers [kg], [s], [kg/s]; the default of the largest flow is the mean flow."""
     for name, value, unit in (("gas per stride", mass_per_stride, "kg"), ("stride time", stride_time, "s")):
         if not (math.isfinite(value) and value > 0.0):
             raise ParameterError(f"{name} must be above 0, it is {value:g} {unit}")
@@ -50,7 +50,7 @@ def demand_of_numbers(mass_per_stride: float, stride_time: float, peak_flow: flo
 
 
 def demand_of_recording(recording: Recording, stride_time: float | None) -> GasDemand:
-    """Return the draw of a recording with ``supplied_mass``, repeated for ever; all of it is one stride by default."""
+    """Return the gas demand of an endlessly repeated recording with ``supplied_mass``; it is one stride by default."""
     if "supplied_mass" not in recording:
         raise DataError(f"{recording.label}: has no channel 'supplied_mass'; available: {', '.join(recording.names)}")
     supplied = _gas_use(recording)
@@ -76,12 +76,12 @@ def demand_of_recording(recording: Recording, stride_time: float | None) -> GasD
 
 
 def _gas_use(recording: Recording) -> Floats:
-    """Return the gas [kg] that left the bottle: through its regulator, where there is a line between that and valve."""
+    """Return the gas [kg] drawn from the bottle: at the regulator of a simulated supply line, else at the valve."""
     return recording["regulated_mass" if "regulated_mass" in recording else "supplied_mass"]
 
 
 def largest_flow(recording: Recording) -> float:
-    """Return the largest flow [kg/s], averaged over the window or over a recording that is shorter."""
+    """Return the largest flow [kg/s], as moving average over the window, or over a shorter recording."""
     window = min(PEAK_WINDOW, recording.duration)
     starts = recording.time[recording.time <= recording.time[-1] - window]
     # The last window need not begin at a sample.

@@ -1,4 +1,4 @@
-"""The question how long a bottle lasts: its arguments."""
+"""Arguments of the analysis ``bottle``: duration of a gas bottle."""
 
 from __future__ import annotations
 

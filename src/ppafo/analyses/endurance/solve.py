@@ -1,4 +1,4 @@
-"""Duration of one bottle for one gas use, or for several side by side."""
+"""Duration of a bottle for one gas demand, or for several compared."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,21 +18,21 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import bottle_life
 
 BETWEEN_RESTS = 600.0
-"""Time of walking between two rests [s], unless it is given."""
+"""Default walking time between two rests [s]."""
 STRIDE_TIME = 1.1
-"""Time of one stride [s], unless it is given."""
+"""Default stride time [s]."""
 LONGEST = 24.0 * 3600.0
-"""Time that is simulated at most [s], unless it is given: a day."""
+"""Default of the longest simulated time [s]: one day."""
 WITHOUT_REST = Schedule(LONGEST, 0.0, LONGEST)
 
 
 @checked
 def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -> Endurance | None:
-    """Duration of a bottle when the walk continues without rest; None where the walk took no gas.
+    """Return the duration of a bottle when the walk continues without rest, or None if the walk took no gas.
 
-    The same device, without faults, walks on the bottle until that ends it, as ``ppafo walk --bottle`` does;
-    ``bottle`` is its own, or the paper's, unless given. A stride is one of the leg with the device, or a whole
-    task sequence.
+    The same device, without faults, walks on the bottle until the bottle is exhausted, as with ``ppafo walk --bottle``.
+    The default of ``bottle`` is the bottle of the walk, or else the paper's. A stride is one of the leg with the
+    device, or a whole task sequence.
 
     >>> import ppafo
     >>> endurance = ppafo.endurance_of_walk(ppafo.walk("solenoid", minutes=0.1))
@@ -47,7 +47,10 @@ def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -
 def endurance_of_walk_gas(
     gas: WalkGas, bottle: str | Path | None, schedule: Schedule, overrides: Iterable[str] = ()
 ) -> Endurance:
-    """Duration of a bottle when a walk continues; DataError where it took no gas, or is not known."""
+    """Return the duration of a bottle for a walk that continues.
+
+    Raises DataError if the walk took no gas or its scenario is unknown.
+    """
     at_set_pressure = demand_of_walk(gas)
     if gas.scenario is None:
         raise DataError(
@@ -78,7 +81,7 @@ def endurance_of_walk_gas(
 
 
 def follow_bottle(bottle: Bottle, draw: GasDemand, schedule: Schedule) -> Endurance:
-    """Duration of a full bottle at a gas demand, by the schedule of its use."""
+    """Return the duration of a full bottle for a gas demand, with a schedule of walking and rest."""
     usable = bottle.mass - smallest_mass_when_warm(bottle, draw)
     return Endurance(
         bottle=bottle,

@@ -1,4 +1,4 @@
-"""The gas that a walk takes: of a walk at hand, or read from the folder that one was written into."""
+"""Gas demand of a walk, from its result or from the folder in which the result was saved."""
 
 import sys
 from collections.abc import Mapping
@@ -20,18 +20,18 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WALK_FORMAT
 
 WALK_FILE = "walk.json"
-"""The file of a folder that a walk was written into, which says what was walked."""
+"""File in the result folder of a walk that describes the walk."""
 _LEAST_GAS = -1.0e-12
-"""Gas [kg] above which a walk that takes none may come out below 0: rounding of its totals."""
+"""Lower limit of the gas use [kg], slightly negative because of rounding."""
 
 
 @dataclass(frozen=True, slots=True)
 class WalkGas:
-    """A walk as far as its gas goes: name, recording, gas [kg] and time [s] of a stride.
+    """Gas demand of a walk: name, recording, gas per stride [kg] and stride time [s].
 
-    ``gas_per_stride`` is the mean of the strides with help at the set pressure, 0 where the walk took none. A walk on a
-    ``task_sequence``, "" without one, is repeated as a whole: gas and time are then the whole's. ``scenario`` is what
-    was walked.
+    ``gas_per_stride`` is the mean of the assisted strides at the set pressure, 0 if the walk took no gas. For a walk on
+    a ``task_sequence`` ("" without one), a repetition is the whole sequence, and gas and time are its totals.
+    ``scenario`` is the scenario of the walk.
     """
 
     name: str
@@ -43,7 +43,7 @@ class WalkGas:
 
 
 def walk_gas(result: WalkResult) -> WalkGas:
-    """Return the gas that a walk takes in a stride, or in its task sequence, with the recording of it."""
+    """Return the gas demand of a walk per stride, or per task sequence, with the recording."""
     configuration, sequence = result.scenario, walk_of(result.scenario).task_sequence
     gas = result.metrics.get("gas" if sequence is None else "task_sequence_gas")
     time = None if sequence is None else result.metrics.get("task_sequence_time")
@@ -58,7 +58,7 @@ def walk_gas(result: WalkResult) -> WalkGas:
 
 
 def demand_of_walk(walk: WalkGas) -> GasDemand:
-    """Return the gas use of a walk that continues: a stride is one of the leg with the device."""
+    """Return the gas demand of a walk that continues; a stride is one of the leg with the device."""
     if walk.gas_per_stride <= 0.0:
         raise DataError(f"walk '{walk.name}': no gas was taken from the supply, so a bottle would never be empty")
     # An open valve may let gas back into the supply for moments, so the largest flow is a mean over 0.1 s.
@@ -69,7 +69,7 @@ def demand_of_walk(walk: WalkGas) -> GasDemand:
 
 
 def read_walk_gas(folder: Path) -> WalkGas:
-    """Return the gas of a walk from the folder that ``ppafo walk`` wrote; DataError where it says too little."""
+    """Return the gas demand of a walk from its result folder; raises DataError if the data are incomplete."""
     path = folder / WALK_FILE
     document = read_json(path)
     if not isinstance(document, dict) or document.get("format") != WALK_FORMAT:
@@ -107,7 +107,7 @@ class _WalkFile:
     content: Mapping[str, Any]
 
     def table(self, name: str) -> Mapping[str, Any]:
-        """Return a table, {} where there is none; DataError where there is something else."""
+        """Return a table by name, {} if it is missing; raises DataError for any other type of value."""
         node = self.content
         for part in name.split("."):
             node = node.get(part, {})
@@ -118,7 +118,7 @@ class _WalkFile:
         return node
 
     def number(self, name: str, above: float) -> float:
-        """Return a number [SI]; DataError where there is none, or where it is not above what a walk may have."""
+        """Return a number [SI]; raises DataError if it is missing, or not greater than ``above``."""
         node: Any = self.content
         for part in name.split("."):
             node = node.get(part) if isinstance(node, Mapping) else None
@@ -132,7 +132,7 @@ class _WalkFile:
 
 
 def _walked(configuration: Mapping[str, Any], file: Path) -> Scenario | None:
-    """Return the walk that a folder is of, by what its file says; None for a folder of an earlier version."""
+    """Return the scenario of a saved walk from its file, or None for a folder of an earlier version."""
     content, overrides = configuration.get("content"), configuration.get("overrides", [])
     if content is None:
         return None

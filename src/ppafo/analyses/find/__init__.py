@@ -1,1 +1,1 @@
-"""Search for the lowest or highest value of a setting at which a condition on a metric holds."""
+"""Search for the lowest or highest value that meets a condition on a metric."""

@@ -19,21 +19,21 @@ from ppafo.units import split_quantity
 from ppafo.wording import one_line
 
 FEWEST, MOST = 3, 100_000
-"""Values that may be tried first, from both ends with one between."""
+"""Range of the number of grid values: both ends and one between, up to the maximum."""
 _PARTS = 32
-"""Parts into which a bracket is divided: that many runs side by side take little longer than one."""
+"""Number of parts of a bracket: so many parallel runs take little longer than one."""
 _STREAMS = 16
-"""Noise streams over which every value is tried where sensors are noisy, the same for all."""
+"""Number of noise streams for every value if sensors are noisy, the same for all values."""
 ACCURACY = 1.0e-6
 """Width of the last bracket, as a fraction of the range."""
 _SEED = 1
-"""Seed of these streams."""
+"""Seed of the noise streams."""
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
 def range_of(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
-    """Return path, low and high end [SI] of a text ``PATH=LOW..HIGH``; StudyError for any other text."""
+    """Return path, lower and upper bound [SI] of a text ``PATH=LOW..HIGH``; StudyError for any other text."""
     parts = _RANGE.fullmatch(text)
     if parts is None:
         raise StudyError(
@@ -74,11 +74,13 @@ TRIED = np.dtype(
         *((name, np.intp) for name in ("unsettled", "oscillating")),
     ]
 )
-"""Value that was tried [SI], and its metric [SI], nan where the run failed, with its ``spread`` over the noise streams.
+"""Row of a tried value [SI] with its metric [SI], nan if the run failed, and the ``spread`` over the noise streams.
 
-``judged`` is what the condition is asked of: the metric, where the loop oscillates on the hold the larger one of it and
-of the RMS error there (``unsettled`` runs), and nan where it turns all the time (``oscillating`` runs). ``follows``:
-the reference is followed in all streams. ``is_of_grid``: of the first values, not of a bracket.
+``judged``: number compared with the limit: the metric, or the RMS error on the hold if that is larger and the loop
+    oscillates there; nan if the loop oscillates throughout
+``follows``: True if the reference is followed in all streams
+``is_of_grid``: True for values of the initial grid, False for values of a bracket
+``unsettled``, ``oscillating``: number of runs that oscillate on the hold, and throughout
 """
 
 

@@ -128,11 +128,11 @@ def trajectory_panels(measurement: Recording, model: Recording) -> list[Panel]:
 
 
 _FAR = 2.0
-"""Standard deviations from which a tolerance is said to be contradicted."""
+"""Number of standard deviations above which a tolerance counts as contradicted."""
 _SHOWN = 0.05
-"""Least share of a variance that is shown."""
+"""Smallest share of a variance that is shown."""
 _MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
-"""Digits of a value: more than the least only where its interval is narrow."""
+"""Range of the number of digits; more than the minimum only for narrow intervals."""
 
 
 @in_units(lambda found: counted_from(found.before.shown, atmospheric_pressure(found.before)))
@@ -173,7 +173,7 @@ def finding_of(identification: Identification) -> Finding[Identification]:
 
 
 def _toml_bytes(parameter_set: ParameterSet) -> bytes:
-    """Return the file of a parameter set."""
+    """Return a parameter set as the content of a TOML file."""
     return parameter_set_toml(parameter_set).encode()
 
 
@@ -184,7 +184,7 @@ def _table(heading: str, estimates: Iterable[Estimate], before: ParameterSet, re
 
 
 _FAR_FROM_SET = 5.0
-"""Ratio to the value of the set before from which a unit is suspected: 6.89 is psi read as kPa, 8.85 N m as lbf in."""
+"""Ratio to the previous value above which a wrong unit is suspected: 6.89 is psi read as kPa, 8.85 N m as lbf in."""
 
 
 def _far_from(before: ParameterSet, estimates: Iterable[Estimate]) -> Iterator[str]:
@@ -236,7 +236,7 @@ def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Sectio
 
 
 def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> list[str]:
-    """Return the tolerances that widen an interval or that the recordings contradict, largest first."""
+    """Return sentences on tolerances that widen an interval or contradict the recordings, largest first."""
     is_far = {number.name: abs(number.after - number.before) > _FAR * number.before_error for number in known}
     shown = sorted(
         (number for number in known if number.share >= _SHOWN or is_far[number.name]), key=lambda number: -number.share
@@ -319,7 +319,7 @@ def kind_of_fit(fit: TrajectoryFit) -> RecordingKind:
 
 
 def _trajectory_data(outcome: TrajectoryOutcome) -> dict[str, Any]:
-    """Return a trajectory fit as plain data in SI; matrices are in the order of estimates."""
+    """Return a trajectory fit as plain data in SI; rows and columns of matrices follow the estimates."""
     fit = outcome.fit
     recordings = [
         {

@@ -1,4 +1,4 @@
-"""Identification of a parameter set from a problem file: reading, procedures in order, insertion of the values."""
+"""Identification of a parameter set from a problem file: recordings, procedures in order, new parameter set."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -150,9 +150,9 @@ def _uses(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -
 
 
 _FILES_IN_TITLE = 4
-"""Recordings that the title of the new set names; its notes name all."""
+"""Number of recordings named in the title of the new set; its notes name all."""
 _REPORTED = "reported."
-"""Beginning of the paths of what others report of their device."""
+"""Prefix of the paths of values that others report of their device."""
 
 
 def _named_set(identification: Identification, problem: ProblemFile) -> ParameterSet:

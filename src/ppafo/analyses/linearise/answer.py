@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 # How far a linear model holds: steps of the command from the steady state, on the runs and of the model.
 
 DURATION, INTERVAL = 1.0, 1.0e-3
-"""Length of the run after a step of the command, and the time between two of its samples [s]."""
+"""Duration of a run after a step of the command, and its sample time [s]."""
 SHARES = tuple(np.geomspace(3.0e-4, 0.3, 13).tolist())
-"""Steps of the command over the command of the steady state [-]: three decades."""
+"""Step heights of the command divided by the steady command [-]: three decades."""
 _LARGEST_COMMAND = 0.7
-"""Command [-] of the steady state from which on the largest step comes too near to full opening, which is 1."""
+"""Steady command [-] above which the largest step comes too close to full opening, which is 1."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,13 +112,13 @@ def _torque(model: LinearModel, command: float) -> Floats:
 
 _POINTS = 400
 _LOWEST_SHARE = 0.1
-"""Lowest frequency shown, as a fraction of the slowest pole's [-]."""
+"""Lowest frequency of the plot divided by the frequency of the slowest pole [-]."""
 _HIGHEST_FREQUENCY = 100.0
-"""Highest frequency [Hz] that is shown."""
+"""Highest frequency of the plot [Hz]."""
 _DRAWN_STEPS = (-5, -1)
-"""Indices of the steps plotted over time: the middle of the three decades, and the largest."""
+"""Indices of the steps plotted over time: the middle of the three decades, and the largest step."""
 _REAL = 1.0e-6
-"""Imaginary part of a pole, over its size, up to which it is real."""
+"""Imaginary part of a pole divided by its magnitude, up to which the pole counts as real."""
 _FREQUENCY = Kind("Frequency", "Hz")
 _DASHED = {"linestyle": "--"}
 _FREQUENCY_CAPTION = (

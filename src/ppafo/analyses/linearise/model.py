@@ -16,7 +16,7 @@ from ppafo.wording import nearest_name, one_line
 
 MISSING_CONTROL = "a system for python-control needs the package control: pip install ppafo[control]"
 _SINGULAR = 1.0e13
-"""Condition number of a scaled matrix from which its solution has no correct digit left (64-bit floats: 1e16)."""
+"""Condition number of a scaled matrix above which its solution has no correct digit (64-bit floats: 1e16)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,12 @@ class SlopeKink:
 
 @dataclass(frozen=True, slots=True)
 class OmittedDelays:
-    """Delays that the linear model omits [s]: dead time of the valve, age of measurements, sample period."""
+    """Delays that the linear model omits [s].
+
+    ``command``: dead time of the valve
+    ``signals``: age of the measurements
+    ``period``: sample period of the controller
+    """
 
     command: float
     signals: float
@@ -77,7 +82,7 @@ class LinearModel:
 
     @property
     def is_steady(self) -> bool:
-        """True for a model about a steady state."""
+        """True if the operating point is a steady state."""
         return self.time is None
 
     @property

@@ -19,7 +19,7 @@ from ppafo.model.ports import at_valve
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
 
 VALVE = "valve_"
-"""Begins the names of the states of a valve."""
+"""Prefix of the names of valve states."""
 UNITS = {
     "angle": "rad",
     "angular_velocity": "rad/s",
@@ -38,9 +38,9 @@ UNITS = {
     "supplied_flow": "kg/s",
     "vented_flow": "kg/s",
 }
-"""Units of all that a linear model names, in SI."""
+"""SI units of all signals of a linear model."""
 _SIZES = {"Pa": 1.0e5, "K": 300.0}
-"""Size of a number of a unit [SI]; 1 of any other."""
+"""Reference size for values with a unit [SI]; 1 for any other unit."""
 
 
 def size_of(name: str) -> float:
@@ -107,7 +107,7 @@ class LinearisedPlant:
 
 
 DRIVEN = ("supply_pressure", "dorsiflexion_pressure", "external_torque")
-"""Numbers of the plant that a linear model has as inputs, by their names in ``PlantParameters``."""
+"""Inputs of a linear model that are fields of ``PlantParameters``."""
 
 
 def plant_of(run: Run, way: float | None, values: Mapping[str, float], time: float = 0.0) -> LinearisedPlant:
@@ -182,11 +182,11 @@ def opens_in_proportion(run: Run) -> bool:
 # Slopes by differences: towards one side of a point, where the model may have a kink.
 
 LONGEST = 1.0e-2
-"""Longest difference over the size of a number [-]."""
+"""Largest step of the finite differences divided by the reference size [-]."""
 SHORTER, LENGTHS = 4.0, 8
-"""Ratio of successive step lengths of the differences [-], and their number: the last is about 1e-6 of the size."""
+"""Ratio of successive steps of the finite differences [-], and their number: the last is about 1e-6 of the size."""
 ORDERS = 5
-"""Powers of the length of a difference that are taken out of its error."""
+"""Number of error orders eliminated by the extrapolation."""
 
 
 def one_sided_slopes(function: Callable[[float], Floats], at: float, side: float, size: float) -> tuple[Floats, Floats]:
@@ -213,8 +213,8 @@ def one_sided_slopes(function: Callable[[float], Floats], at: float, side: float
 def side_of(name: str, values: Mapping[str, float], way: float | None) -> float:
     """Side of a value (1 or -1) for which a linear model holds.
 
-    The command goes up, or back from full opening. The angle, the velocity, chamber 1 and its supply go up (a moving
-    vane faster); all other values, chamber 2 among them, go down.
+    The command and the valve opening increase, or decrease from full opening. Angle, pressure 1 and its supply
+    increase; the angular velocity changes in the direction of motion; all other values decrease.
     """
     if name == "command":
         return 1.0 if abs(values[name]) < 1.0 else -float(np.sign(values[name]))

@@ -33,9 +33,9 @@ from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Scenario
 
 STEADY = 1.0e-9
-"""Largest rate of a state [1/s], over the size of the state, that counts as none."""
+"""Largest time derivative divided by the size of the state [1/s] that counts as zero."""
 _FIRST_COMMANDS = (0.01, 0.1, 0.003, 0.03, 0.3, 1.0)
-"""Sizes of commands [-] from which the steady state is looked for."""
+"""Magnitudes of the command [-] from which the search for the steady state starts."""
 _MOST_STEPS = 60
 
 

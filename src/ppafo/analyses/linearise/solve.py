@@ -29,9 +29,9 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.units import parse_quantity
 
 ON_THE_EDGE = 1.0e-6
-"""Two slopes of one number, towards both sides, that differ by more than this, over the largest of their row, are two.
+"""Difference of the slopes on both sides, divided by the largest slope of the row, above which there is a kink.
 
-Slopes by differences agree to some 1e-9 where the plant has no kink.
+Without a kink, the finite differences agree to about 1e-9.
 """
 
 
@@ -67,7 +67,7 @@ def sides_of(run: Run, point: Point, joint: JointNames) -> dict[str, str]:
 
 
 def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: float) -> str:
-    """Flow regime between two pressures [Pa], in words."""
+    """Flow regime between two pressures [Pa] at an opening [-], in words."""
     if opening == 0.0:
         return "closed"
     ratio = min(pressure_a, pressure_b) / max(pressure_a, pressure_b)

@@ -1,1 +1,1 @@
-"""Catalogue of real parts, and the source of each figure."""
+"""Catalogue of real parts with the source of each figure."""

@@ -10,7 +10,7 @@ from ppafo.report.finding import Finding, columns_of
 from ppafo.report.kind import Kind
 
 _WIDTH = 110
-"""Characters of a line of the notes of a catalogue."""
+"""Line length of the notes of a catalogue, in characters."""
 
 
 @dataclass(frozen=True, slots=True)

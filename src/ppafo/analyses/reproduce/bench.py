@@ -97,9 +97,9 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
 PLANTED_SET = "ppafo2011"
 RIG_SEED = 1
 BENCH_PRESET = "paper-bench"
-"""The bench as it may have been, for figures 3 and 7."""
+"""Preset of a bench similar to the paper's, for figures 3 and 7."""
 TASK_PRESET = "ideal-laboratory"
-"""The paper's physics behind noisy sensors: on ``paper-bench`` the proportional valve's task alone takes 6 s."""
+"""Preset with the paper's physics and noisy sensors: on ``paper-bench`` the proportional valve's task takes 6 s."""
 
 
 @dataclass(frozen=True, slots=True)

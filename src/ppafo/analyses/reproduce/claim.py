@@ -25,7 +25,7 @@ Verdict = Literal[
     "not_testable",
 ]
 VERDICTS: dict[Verdict, str] = {verdict: verdict.replace("_", " ") for verdict in get_args(Verdict)}
-"""Every verdict in words. Only the first two follow from reported numbers alone."""
+"""Verdicts in words. Only the first two follow from reported numbers alone."""
 MEANINGS: dict[Verdict, str] = {
     "consistent": "the reported numbers agree with each other",
     "inconsistent_as_reported": "the reported numbers do not agree with each other",
@@ -194,11 +194,11 @@ class ReportedSet:
         return f"{entry.value:g} {entry.unit}".rstrip()
 
     def in_si(self, path: str) -> float:
-        """Return the value in SI units."""
+        """Return the reported value at a path in SI units."""
         return self._known(path, self.evidence.number(path))
 
     def in_reported_unit(self, path: str, value: float) -> float:
-        """Return an SI value in the unit in which the paper prints the quantity at a path (a unit without offset)."""
+        """Return an SI value converted to the paper's unit for the quantity at a path (a unit without offset)."""
         return value * self.entry(path).value / self.in_si(path)
 
     def text(self, path: str, value: float, digits: int = 4) -> str:
@@ -266,7 +266,7 @@ def _orifice_constants(reported: ReportedSet) -> Claim:
 
 
 STEP_ERRORS = {"position": 110.0, "pressure_1": 55.0, "pressure_2": 55.0, "pressure_difference": 110.0}
-"""Reported errors of the step response, and the full ranges [deg, psi] that the paper takes them over."""
+"""Reported errors of the step response, and the full ranges [deg, psi] by which the paper divides them."""
 
 
 def _step_percentages() -> Claim:
@@ -297,7 +297,7 @@ _RATES = {
     "friction.viscous_damping": "reported.velocity_over_acceleration",
     "friction.dynamic_torque": "reported.stopping_deceleration",
 }
-"""Products of the inertia, and what it is multiplied by; a rate in 1/s is one, whatever it is called."""
+"""Reported rate [1/s] or [1/s^2] by which the inertia is multiplied, for each product."""
 
 
 def _damping_and_friction(reported: ReportedSet) -> Claim:
@@ -393,7 +393,7 @@ NOT_PUBLISHED = (
     "unmodelled_dynamics",
     "temperature_would_help",
 )
-"""Statements that only recordings or masses could test, neither of which is published."""
+"""Statements that could be tested only with recordings or masses, neither of which is published."""
 
 
 NOT_PUBLISHED_CLAIM = Claim(
@@ -406,4 +406,4 @@ NOT_PUBLISHED_CLAIM = Claim(
     "in tests/, on synthetic recordings; it says nothing about the paper's device.",
     words=f"{len(NOT_PUBLISHED)} statements",
 )
-"""The claim on everything that nothing published can test."""
+"""Claim that summarises all statements that no published data can test."""

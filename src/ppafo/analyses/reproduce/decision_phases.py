@@ -15,11 +15,11 @@ from ppafo.simulation.scenario import Initial, PrescribedMotion, Scenario
 from ppafo.simulation.simulate import Result, simulate
 
 PHASES = 20
-"""Phases of the decisions, evenly over one period; each with valve A and with valve B first."""
+"""Number of phases of the decisions, evenly spaced over one period; each with valve A and with valve B first."""
 _TIE = 1.0e-3
-"""A reference [N m] this far from 0 decides the tie at the start."""
+"""Reference [N m] that is large enough to determine the first decision."""
 _STEP = 0.5e-3
-"""Step of the engine and time between two samples [s], which divide every phase."""
+"""Time step and output interval [s], which divide every phase."""
 
 
 @dataclass(frozen=True, slots=True)

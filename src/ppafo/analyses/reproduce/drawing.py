@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SIZE = (9.2, 4.85)
-"""Inches; the drawing is in the same units, with the origin at the lower left."""
+"""Size of the drawing [inches]; its coordinates have the same unit, with the origin at the lower left."""
 _MIDDLE = 2.4
 """Height of the proportional valve and of the shaft."""
 _UPPER, _LOWER = 3.9, 0.9
@@ -23,7 +23,7 @@ _BRANCHES = (
 )
 """Direction, its solenoid valve, colour and height of the two branches of the circuit."""
 _BOX, _HALF = 0.42, 0.21
-"""Side of a square of a symbol."""
+"""Side length of the square of a symbol."""
 _REGULATED, _TO_ACTUATOR = 2.25, 4.75
 """Horizontal positions of the couplings between regulators and valves, and between valves and actuator."""
 

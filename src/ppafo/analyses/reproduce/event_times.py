@@ -16,11 +16,11 @@ from ppafo.walking.stride_events import EVENTS, event_errors, known_events, true
 from ppafo.walking.task_sequence import TaskSegment, TaskSequence
 
 WEARERS = {"healthy": ("wearer.keeps_gait=1",), "impaired": ("wearer.keeps_gait=0",)}
-"""A wearer whose muscles keep the measured gait, and the one of the walk file, whose foot drops."""
+"""Overrides of a wearer whose muscles keep the measured gait, and of the walk file's wearer, who has drop foot."""
 LONGEST = 60.0
-"""Time [s] of a walk at most."""
+"""Longest time [s] of a walk."""
 SETTLED = 6.0
-"""Time [s] from which events count: strides are learnt by then."""
+"""Time [s] after which events count, when the stride estimate has settled."""
 UNEVEN_STRIDES = 24
 VARIATION = 0.025
 """Standard deviation of stride times over their mean in steady walking, as published for healthy adults (Hausdorff

@@ -33,20 +33,20 @@ if TYPE_CHECKING:
 _MILLISECONDS = 1.0e3
 _AFTER_STEP = Kind("Time after the step", "ms")
 _SHOWN_BEFORE_STEP = 0.03
-"""Fraction of the time axis before the step, so that a rise within the first milliseconds does not hide in the axis."""
+"""Fraction of the time axis before the step, so that the rise within the first milliseconds stays visible."""
 _SHOWN_AFTER_STOP = 0.8
-"""Fraction of the time until the stop that is shown beyond it; what follows is rest."""
+"""Fraction of the time until the stop that is shown after the stop; the vane then rests."""
 _ENLARGED = 40.0
-"""First milliseconds after the step that are shown enlarged."""
+"""First milliseconds after the step, shown enlarged."""
 _BIN = 3.0
-"""Milliseconds over which the band of a measurement reaches from its least to its largest reading."""
+"""Interval [ms] over which the band of a measurement reaches from the smallest to the largest reading."""
 _CURVES = (
     ("Vane angle", "Angle", "deg", ACTUAL.colour, (0.66, 0.26, 0.31, 0.34)),
     ("Pressure difference, $P_1 - P_2$", "Difference", "psi", ACTUAL.colour, (0.69, 0.14, 0.29, 0.34)),
     ("Chamber 1 (plantarflexion), $P_1$", "Pressure", "psig", CHAMBER_1.colour, (0.22, 0.12, 0.3, 0.34)),
     ("Chamber 2 (dorsiflexion), $P_2$", "Pressure", "psig", CHAMBER_2.colour, (0.69, 0.3, 0.29, 0.4)),
 )
-"""Panels of figure 7: name, quantity, unit, colour, and the room for the first milliseconds (x, y, width, height)."""
+"""Panels of figure 7: name, quantity, unit, colour, and frame of the enlarged part (x, y, width, height)."""
 _EVENT: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (4, 3)), "alpha": 0.7, "zorder": 0.5}
 _LEVEL: dict[str, Any] = {"linewidth": 0.9, "linestyle": (0, (1, 2)), "zorder": 0.9}
 _WORDS: dict[str, Any] = {"fontsize": 8.5, "va": "center"}
@@ -58,8 +58,8 @@ def step_response_figure(
 ) -> "Figure":
     """Return figure 7: angle, pressure difference and both pressures over time, with ``events`` marked if known.
 
-    ``synthetic`` is a recording of the simulated bench, drawn as a thin line with the band of its resolution; below
-    each panel, the difference from the model is stated.
+    ``synthetic`` is a recording of the simulated bench, drawn as a thin line with a band from the smallest to the
+    largest readings; below each panel, the difference from the model is stated.
     """
     end, marked, named = _MILLISECONDS * float(recording.time[-1]), [], []
     if events is not None:
@@ -108,7 +108,7 @@ def _curves(recording: Recording, levels: SupplyLevels) -> tuple[Floats, ...]:
 
 
 def _measurement(times: Floats, values: Floats) -> list[Mark]:
-    """Return marks for a measurement over time [ms]: a line with the band of its resolution."""
+    """Return marks for a measurement over time [ms]: a line, and a band from smallest to largest readings."""
     first = np.flatnonzero(np.diff(np.floor(times / _BIN), prepend=-np.inf) > 0.0)
     ends = np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
     thin = {"linestyle": "-", "linewidth": 0.8, "zorder": 2}

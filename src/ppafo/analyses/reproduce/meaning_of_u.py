@@ -10,7 +10,7 @@ from ppafo.simulation.simulate import Result, simulate
 READINGS_OF_U = (("the opening, -1 to 1", 1.0), ("volts, 5 open the valve", 5.0), ("volts, 10 open the valve", 10.0))
 """Interpretations of U of equation (13), each with the U that opens the proportional valve fully."""
 WITHIN_REACH = 4.0
-"""A level [N m] that the supply can hold."""
+"""Reference level [N m] within the reach of the supply."""
 _GAINS = ("proportional_gain", "integral_gain", "derivative_gain")
 
 

@@ -27,11 +27,11 @@ from ppafo.wording import nearest_name
 
 DEVICE = "ppafo2011"
 MINUTES = 0.5
-"""A walk without noise repeats itself stride by stride, so that longer ones say the same."""
+"""Minutes of a walk; without noise the strides repeat, so that longer walks give the same result."""
 PAIR, RECYCLING = "solenoid", "solenoid-recycling"
-"""The walks that direct event control and recycling stand for."""
+"""Names of the walks with direct event control and with recycling."""
 KEEPS_GAIT = "wearer.keeps_gait=1"
-"""A nondisabled wearer: muscles keep the measured ankle."""
+"""Override for a nondisabled wearer, whose muscles keep the measured ankle angle."""
 Values = Mapping[str, str | float]
 
 
@@ -76,7 +76,7 @@ def share_of_healthy_moment(values: Values) -> float:
 
 
 def walking_torque(values: Values) -> float:
-    """Largest torque [N m] of the mean stride of the walk 'solenoid' at a supply pressure."""
+    """Peak torque [N m] of the mean stride of the walk 'solenoid' at a supply pressure."""
     # As repr, so that the walk has this very number. Nothing is published of a limit of the torque.
     overrides = (f"supply.pressure={float(values['pressure'])!r} SI", "controller.largest_torque=100 N m")
     return float(_walked(PAIR, overrides).averages["torque"].mean.max())
@@ -144,7 +144,7 @@ class PublishedClaim:
 
 @dataclass(frozen=True, slots=True)
 class Publication:
-    """A publication with its claims in the order of the file."""
+    """Publication with its claims in the order of the file."""
 
     name: str
     title: str
@@ -214,7 +214,7 @@ def _arguments(entry: ClaimEntry, computation: Computation, where: str) -> dict[
 
 
 SEED, ALL = PAPER, "all"
-"""The study of the paper that this package is made from, and all studies one after the other."""
+"""Name of the study of the paper behind this package, and name for all studies in turn."""
 
 
 @dataclass(frozen=True, slots=True)

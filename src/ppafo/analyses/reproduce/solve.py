@@ -41,7 +41,7 @@ from ppafo.wording import count_of
 # The torque task: what the paper claims of tracking error and gas, and what its text tells of both valves.
 
 FEWEST_REVERSALS = paper_entries()["solenoid_oscillates_on_ramp"].at_least or 0.0
-"""Reversals of the torque on the ramp from which on the text's oscillation shows."""
+"""Smallest number of torque reversals on the ramp that counts as the oscillation of the text."""
 
 
 def torque_task_claims(runs: PhasedRuns, proportional: Result, rests_on: tuple[str, ...]) -> list[Claim]:
@@ -146,7 +146,7 @@ TUNED = (
     "controller.derivative_filter=3.1 ms",
     "controller.anti_windup=4.8 1/s",
 )
-"""Gains of a PID that were searched for the least error and gas, on an ideal and on a slow, late and noisy valve."""
+"""PID gains found by a search for the least error and gas, on an ideal valve and on a slow, late and noisy one."""
 DEAD_ZONE = (
     "controller.kind=on_off_dead_zone",
     "controller.rate=20 Hz",
@@ -154,9 +154,9 @@ DEAD_ZONE = (
     "controller.release=0.05 N m",
     "controller.opening=1",
 )
-"""An on-off law with a dead zone narrower than what the solenoid pair can hold within one sample."""
+"""On-off law with a dead zone narrower than the torque resolution of the solenoid pair within one sample."""
 FASTER = ("controller.rate=100 Hz", "valve.switching_interval=10 ms")
-"""Five times the switching rate: the set has the printed 20 Hz of the component as its shortest time between two."""
+"""Five times the switching rate; in the set, the printed 20 Hz of the component limits the switching interval."""
 _RESTS_ON = ("the torque task as completed here",)
 
 
@@ -208,7 +208,7 @@ def _undetermined(identifier: str, run: Result, overrides: tuple[str, ...]) -> C
 
 
 EXPERIMENTS = (STEP, SOLENOID, PROPORTIONAL)
-"""Shipped scenarios that stand for the paper's experiments."""
+"""Shipped scenarios of the paper's experiments."""
 ORDER = (
     "orifice_constants",
     "step_percentages",
@@ -227,7 +227,7 @@ ORDER = (
     "beyond_improved_control",
     "not_published",
 )
-"""Every claim: what the reported numbers decide, what is simulated, what is left."""
+"""All claims in order: decided by reported numbers, simulated, and remaining."""
 
 
 def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothing) -> Reproduction:

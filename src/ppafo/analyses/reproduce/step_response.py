@@ -16,20 +16,20 @@ from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
 RESOLUTION = 1.0e-6
-"""Smallest part of the travel that counts as motion in a simulated recording; a measured one needs more."""
+"""Smallest fraction of the travel that counts as motion in a simulated recording; a measured one needs more."""
 _SMALLEST_TRAVEL = 1.0e-3
 _FIRST_ANGLE, _LAST_ANGLE, _SAME_ANGLE = 20.0, 130.0, 0.5
 """First and last angle of figure 7, and the tolerance for the same angle [deg]."""
 _CLEAR = 0.05
 _SAME = 0.01
 _NOTABLE_TIME = 2.0e-3
-"""Fractions of the pressure range: a change has to be clear, a level reached or kept may be off by the second."""
+"""Fractions of the pressure range: smallest clear change, and tolerance for a level that is reached or kept."""
 _SLOWED = 0.5
-"""The fall has slowed where its rate is at most this fraction of the steepest before and after."""
+"""Ratio of a slow rate of fall to the steepest rates before and after, up to which the fall has slowed."""
 _LARGEST_RISE = 1.0 * PASCALS_PER_PSI
-"""A fall that slows may turn into a rise of this much [Pa]; the text tells of none."""
+"""Largest rise [Pa] that still counts as a slowed fall; the text mentions no rise."""
 _SETS_OFF = 0.02
-"""Pressure 1 peaks before the vane has gone this fraction of its travel: it still fills while the vane sets off."""
+"""Fraction of the travel within which pressure 1 peaks, since the chamber still fills while the vane starts."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,15 +16,15 @@ from ppafo.studies.distributions import Floats, jackknife_reach
 from ppafo.studies.draws import Uncertainty, replicate_seed
 
 SCRAMBLES = 8
-"""Independent scrambles of the Sobol sequence, to which the base points are dealt out in turn."""
+"""Number of independent scrambles of the Sobol sequence, to which base points are assigned in turn."""
 _INNER = 3
-"""Draws of some values with the others held, for the variance that they leave (Song, Nelson and Staum, 2016)."""
+"""Number of draws of the free values for a conditional variance (Song, Nelson and Staum, 2016)."""
 _SMALLEST = 2.0**-53
-"""Smallest fraction of a draw: its normal score is finite, as is the score of 1 less it."""
+"""Smallest fraction of a draw, for which the normal scores of it and of 1 minus it are finite."""
 _ONE = 0.6827
-"""Confidence of one standard deviation."""
+"""Confidence level of one standard deviation."""
 _NEAREST = 0.2
-"""Fraction of the runs, nearest to an end of a value, that say what the metric is there."""
+"""Fraction of the runs, nearest to an end of a value, to which the parabola is fitted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,9 +113,9 @@ def _sobol_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
 
 
 def _sobol_total_and_first(table: Floats) -> Floats:
-    """Return total and first-order indices (2, paths) from blocks (blocks, paths + 2): a point, its copies, another.
+    """Return total and first-order Sobol indices (2, paths) from values (blocks, paths + 2).
 
-    With f(A) at the first point, f(B) at the last, f(AB_i) where value i comes from B, and V the variance of f(A) and
+    The columns are f(A), then f(AB_i) with value i from B for each path, then f(B). With V the variance of f(A) and
     f(B): total_i = mean (f(A) - f(AB_i))^2 / 2 V (Jansen, 1999), first_i = mean f(B) (f(AB_i) - f(A)) / V (Saltelli et
     al., 2010).
     """
@@ -139,7 +139,7 @@ SOBOL = Method(
     design=_sobol_design,
     indices=_sobol_indices,
 )
-"""Fractions of the variance: first-order (each value alone) and total (with all its interactions).
+"""Sobol indices, fractions of the variance: first-order (a value alone) and total (with all interactions).
 
 Saltelli's design on independent scrambles of the Sobol sequence; estimators of Saltelli et al.
 (2010) and Jansen (1999). The bands come from the spread between the scrambles, because the points of one sequence
@@ -148,7 +148,10 @@ are not independent and resampling them gives bands that are several times too w
 
 
 def _shapley_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
-    """Return fractions in (0, 1): in each block, for ever more values of its order, draws with the rest held."""
+    """Return fractions in (0, 1) of a design for Shapley effects.
+
+    For each block and each prefix of its order of values, there are draws with the remaining values fixed.
+    """
     from scipy.special import ndtr
 
     count = len(uncertainty.drawn)
@@ -211,14 +214,14 @@ SHAPLEY = Method(
     design=_shapley_design,
     indices=_shapley_indices,
 )
-"""Fractions of the variance that add up to 1 whether the values depend on each other or not.
+"""Shapley effects: fractions of the variance that add up to 1, for independent and for correlated values.
 
-What two values explain together, because they act together or because they are correlated, is divided between
-them (Owen, 2014). By random orders: each value gets what it adds to the variance that the values before it leave
-when all after it are held (Song, Nelson and Staum, 2016). Held values are drawn from the Gaussian copula.
+Variance that two values explain together, by interaction or by correlation, is divided between them (Owen, 2014).
+The values are added in random orders: each value gets its increase of the variance that remains when all later
+values of the order are fixed (Song, Nelson and Staum, 2016). Fixed values are drawn from the Gaussian copula.
 """
 METHODS = {method.name: method for method in (SOBOL, SHAPLEY)}
-"""Methods by name. To add a method: its design, its indices, and its value here."""
+"""Methods by name. To add a method: its design, its indices, and its entry here."""
 
 
 def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floats]:

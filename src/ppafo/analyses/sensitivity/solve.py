@@ -22,13 +22,13 @@ from ppafo.studies.sampling import NOISE
 from ppafo.study.runs import Runs, tracking_violation
 
 _ENDS = (0.05, 0.95)
-"""Fractions between which a value goes for the change of a metric."""
+"""Quantile fractions of a value between which the change of a metric is taken."""
 DEFAULT_SAMPLES = {"sobol": 8192, "shapley": 2048}
-"""Blocks by the name of the method: tens of thousands of runs of a few values."""
+"""Default number of blocks by method: tens of thousands of runs for a few values."""
 _FEWEST_WHOLE = 4
-"""Whole blocks from which indices are estimated."""
+"""Smallest number of complete blocks for an estimate."""
 _SIZES = 6
-"""Sizes at which the indices are shown: all blocks, and halved again and again."""
+"""Number of sample sizes at which the indices are shown: all blocks, and repeated halves."""
 
 
 @dataclass(frozen=True, slots=True)

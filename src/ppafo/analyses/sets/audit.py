@@ -58,9 +58,9 @@ def audit(
 ) -> Finding[AuditedSet]:
     """Audit of a parameter set: contradictions and values that deserve attention, errors first.
 
-    An error that the set accepts with a reason becomes a warning that shows the reason. A reason that stands in its
-    ``parent`` too, the set that the file names unless given, lapses where the set changes a value of the finding. A
-    reason for something that is not found is a warning, so that it does not outlive what it excuses.
+    An error that the set accepts with a reason becomes a warning that states the reason. A reason inherited from the
+    ``parent`` is void if the set changes a value of the finding. A reason without a matching finding is a warning, so
+    that obsolete reasons are removed.
 
     Arguments:
         parameter_set: the set, its name or its file

@@ -191,7 +191,7 @@ def write_report(results: StudyResults) -> None:
 
 @checked
 def load_study_results(folder: str | Path) -> Finding[StudyResults]:
-    """Return the finished results of a study in a folder; DataError where there are none.
+    """Return the finished results of a study in a folder; DataError if the folder contains none.
 
     >>> import ppafo
     >>> written = ppafo.sweep("torque-task-uncertainty", draws=4, out="four")

@@ -23,26 +23,26 @@ if TYPE_CHECKING:
 FIGURE = "figure"
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, GREY)
 MOST_CONFIGURATIONS = len(COLOURS)
-"""Configurations that are drawn: as many as colours that can be told apart."""
+"""Largest number of configurations in a figure: as many as distinguishable colours."""
 MOST_METRICS = 9
-"""Metrics that are drawn."""
+"""Largest number of metrics in a figure."""
 MAXIMUM_DRAWN = 4_000_000
-"""Runs from which a figure is drawn, spread evenly over all; the numbers beside it are from all of them."""
+"""Largest number of runs in a figure, spread evenly over all; printed statistics use all runs."""
 _COLUMNS = 2
-"""Panels side by side."""
+"""Number of panels side by side."""
 _PANEL, _COMPARED_PANEL = (2.9, 2.4), (2.7, 2.3)
-"""Width and height of a panel [inches], and of one of a row that compares configurations."""
+"""Width and height of a panel [inches], and of a panel in a row that compares configurations."""
 _HISTOGRAM_BINS = 60
-"""Bins of a histogram at most."""
+"""Largest number of bins of a histogram."""
 _MAXIMUM_POINTS = 3000
-"""Runs of which a curve or the points of a panel are made."""
+"""Largest number of runs in a curve or in the points of a panel."""
 _MEDIAN = 0.5
 _OPACITIES = (0.18, 0.32, 0.45)
 """Opacities of the bands of one channel, from the outermost to the innermost."""
 _GRIDDED = ("grid", "list")
 """Kinds of ``[[vary]]`` that are crossed with each other."""
 _NAMED = 3
-"""Varied values that a title names."""
+"""Number of varied values in a title."""
 _CAPTION = (
     "Distributions of the metrics, their dependence on the varied values, and quantiles over time where requested."
 )

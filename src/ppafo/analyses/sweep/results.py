@@ -63,7 +63,7 @@ class StudyResults:
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """The varied paths."""
+        """Paths of the varied values."""
         return tuple(self.document["varied"])
 
     @property

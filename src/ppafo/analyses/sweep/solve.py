@@ -59,9 +59,9 @@ QUANTILE_DEFINITION = (
     "value at place (n - 1) q of the n sorted values, on a line between neighbours (Hyndman and Fan 1996, definition 7)"
 )
 MAXIMUM_IN_MEMORY = 16_000_000
-"""Values of a channel over time from which bands are made at once."""
+"""Number of samples of a channel from which bands are computed at once."""
 Parts = Callable[[], Iterator[Floats]]
-"""Gives the finite values of a column anew each time, in parts whose order is always the same."""
+"""Function that yields the finite values of a column, in parts of constant order at every call."""
 
 
 def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
@@ -193,7 +193,7 @@ def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
 
 
 LOG = "log.jsonl"
-"""The only file that says when, where and how fast; all others are the same wherever they are made."""
+"""Log file, the only one with date, machine and speed; all other files are the same on any machine."""
 INTERRUPTED = "interrupted; finished chunks are kept, and the same command resumes the study"
 INTERRUPTED_AT_ONCE = "interrupted; nothing was kept yet, and the same command begins anew"
 
@@ -211,10 +211,10 @@ def sweep(
     plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[StudyResults]:
-    """Return the results of a study: a name, a TOML file, data laid out as one, or a Study.
+    """Run a study, given as a name, a TOML file, data with the layout of such a file, or a Study.
 
-    Columns of the results are arrays of shape (runs,), trajectories (runs, samples), in SI units, pressures absolute;
-    nan where a run failed, which is a row that says so.
+    Columns of the results are arrays of shape (runs,), trajectories (runs, samples), in SI units, pressures absolute.
+    A failed run has a row with its status and nan for all results.
 
     Arguments:
         study: name of a study, a .toml file, data laid out as one, or a Study

@@ -29,13 +29,13 @@ from ppafo.study.runs import RunCounter, Runs
 from ppafo.units.shown import shown_in
 
 DEFAULT_WIDTH = "1 %"
-"""Width of an interval, of the value, unless another is given."""
+"""Default width of an interval, as a fraction of the value."""
 PROBABILITY_WIDTH = "0.02"
-"""Width of the interval of a probability [-] unless another is given."""
+"""Default width of the interval of a probability [-]."""
 FIRST_DRAWS = 256
-"""Draws of the first look."""
+"""Number of draws before the first look."""
 MOST_DRAWS = 2**20
-"""Draws at most."""
+"""Default maximum number of draws."""
 
 
 @checked

@@ -14,11 +14,11 @@ from ppafo.report.style import GREY, VERMILION
 from ppafo.studies.distributions import Floats, fraction_text
 
 _RULE_OF_THREE = 3.0
-"""Over the draws: probability of an event that 95 of 100 such sets of draws show."""
+"""Numerator of the rule of three: 3 / n bounds the probability of an event missing in n draws (95 %)."""
 _ENDS = ("estimate", "low", "high")
-"""Heads of an estimate and the ends of its interval."""
+"""Column heads of an estimate and the ends of its interval."""
 _MAXIMUM_BINS = 80
-"""Bins of the histogram of the values at most."""
+"""Largest number of bins of the histogram."""
 _CAPTION = "Left: estimate and interval at each look; grey: the target width. Right: the values of all draws."
 
 

@@ -26,9 +26,9 @@ from ppafo.studies.draws import REPLICATES, Columns, Uncertainty
 from ppafo.studies.limits import level_of
 
 FEWEST_SEEN = 10_000
-"""Draws from which a mean is believed: one in 3,300 that differs would have come (95 %)."""
+"""Smallest number of draws for a trusted mean: an event of one run in 3,300 would have occurred (95 %)."""
 FURTHEST_UNSEEN = 100.0
-"""Distance from the mean, over the standard deviation [-], up to which values that were not drawn are allowed for."""
+"""Largest assumed distance from the mean of values not drawn, divided by the standard deviation [-]."""
 GRAMMAR = "'mean', 'quantile 0.95', 'probability above VALUE' or 'probability below VALUE'"
 _QUANTILE = re.compile(r"quantile\s+([0-9]*\.?[0-9]+)")
 _PROBABILITY = re.compile(r"probability\s+(above|below)\s+(\S.*)")

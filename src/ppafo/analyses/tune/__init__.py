@@ -1,1 +1,1 @@
-"""Tuning of gains: bounded search for a weighted objective with constraints, robust where requested."""
+"""Tuning of gains: bounded search for a weighted objective with constraints, robust if requested."""

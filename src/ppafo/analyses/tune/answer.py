@@ -1,4 +1,4 @@
-"""A tuning as a finding: gains and metrics before and after, how the search went, and lines to paste."""
+"""Report of a tuning: gains and metrics before and after, course of the search, and overrides to paste."""
 
 import json
 import math
@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 _COMMAND, _GAS = Kind("Valve command"), Kind("Gas supplied", "kg", "gas mass")
 _DECADE = 10.0
 _BEYOND = 0.05
-"""Fraction of the range between the bounds by which gains before the tuning are shown outside at most."""
+"""Fraction of the range by which previous gains outside the bounds are plotted beyond the bounds, at most."""
 
 
 def task_panels(before: GainResult, after: GainResult) -> list[Panel]:
-    """Return what is controlled, command and gas over time with the gains before and after, on the nominal device."""
+    """Return panels of controlled quantity, command and gas over time, before and after, for the nominal device."""
     recording = after.result.recording
     controlled = controlled_in(recording) or CONTROLLED[TORQUE]
     words, unit = controlled.words, controlled.level.unit
@@ -57,7 +57,7 @@ def task_panels(before: GainResult, after: GainResult) -> list[Panel]:
 
 
 def _courses(channel: str, before: GainResult, after: GainResult) -> list[Mark]:
-    """Return a channel over time, before and after."""
+    """Return the marks of a channel over time, before and after."""
     style = {"linewidth": 1.3, "drawstyle": "steps-post" if channel == "command" else "default"}
     marks = []
     for setting, colour, label in ((before, VERMILION, "before"), (after, BLUE, "after")):
@@ -69,7 +69,7 @@ def _courses(channel: str, before: GainResult, after: GainResult) -> list[Mark]:
 def search_panels(
     problem: Problem, before: GainResult, after: GainResult, starts: Sequence[SearchStart]
 ) -> list[Panel]:
-    """Return the best cost of each start over its generations, and where the gains lie between their bounds."""
+    """Return panels of the best cost of each start over its generations, and of the gains between their bounds."""
     costs_of_starts = []
     for number, start in enumerate(starts):
         costs = np.array(start.generations)
@@ -114,7 +114,7 @@ def search_panels(
 
 
 _DIFFERENT = 0.1
-"""Fraction of the way between the bounds from which on two starts are said to have ended in different places."""
+"""Difference as a fraction of the range above which two starts count as ended in different places."""
 _SEARCH_CAPTION = "Above: the best objective so far in each start. Below: where the gains lie between their bounds."
 
 
@@ -127,9 +127,10 @@ def finding_of(
     starts: list[SearchStart],
     runs: int,
 ) -> Finding[Tuned]:
-    """Return what a search came to; it has passed where the gains satisfy all constraints, over fresh draws too.
+    """Return the result of a tuning as a finding.
 
-    ``scales`` are those of the goals [SI], ``starts`` best first, ``runs`` all that were simulated.
+    It has passed if the gains satisfy all constraints, also over fresh draws. ``scales`` are the scales of the goals
+    [SI], ``starts`` are sorted with the best first, ``runs`` is the number of all simulated runs.
     """
     scenario, spread = problem.scenario, problem.spread
     bounds = {gain.path: gain.bound_reached(after.gains[gain.path]) for gain in problem.searched}
@@ -199,7 +200,7 @@ def finding_of(
 
 
 def verdict(problem: Problem, before: GainResult, after: GainResult) -> str:
-    """Return the result of a search for gains in a sentence."""
+    """Return the result of a tuning as a sentence."""
     name = problem.name
     if after.share_without_value:
         failing = percentage(after.share_without_value, 3)
@@ -224,7 +225,7 @@ def verdict(problem: Problem, before: GainResult, after: GainResult) -> str:
 
 
 def _change(before: GainResult, after: GainResult) -> str:
-    """Return by how much gains that satisfy all constraints are better than the ones before."""
+    """Return a sentence on the improvement by gains that satisfy all constraints."""
     if before.off:
         return f"the loop follows its reference, with the previous gains it did not; objective {after.objective:.4g}"
     if not before.is_feasible:
@@ -243,7 +244,7 @@ def _change(before: GainResult, after: GainResult) -> str:
 
 
 def _by_ceiling(problem: Problem, after: GainResult) -> str:
-    """Return that the torque ceiling is why, where the draws below it are what breaks the constraints."""
+    """Return a clause on the torque ceiling if it explains the violated constraints; empty otherwise."""
     ceiling = after.torque_ceiling
     if not ceiling.explains:
         return ""
@@ -255,7 +256,7 @@ def _by_ceiling(problem: Problem, after: GainResult) -> str:
 
 
 def _metric_columns(problem: Problem, before: GainResult, after: GainResult) -> list[Column]:
-    """Return a row for each metric of the goals and constraints."""
+    """Return the columns of a table with a row for each metric of the goals and constraints."""
     names, spread = problem.metrics, problem.spread
     limits = [
         ", ".join(constraint.words for constraint in problem.constraints if constraint.metric == name) for name in names
@@ -285,7 +286,7 @@ def _metric_columns(problem: Problem, before: GainResult, after: GainResult) -> 
 def _remarks(
     problem: Problem, after: GainResult, starts: Sequence[SearchStart], runs: int, reached: Mapping[str, str]
 ) -> list[str]:
-    """Return how the search went and what it leaves open."""
+    """Return remarks on the course of the search and on open points."""
     settled = sum(start.is_settled for start in starts)
     said = [
         f"{count_of(len(starts), 'start')}, {sum(start.candidates for start in starts):,} "

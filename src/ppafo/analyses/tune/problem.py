@@ -1,4 +1,4 @@
-"""A tuning: its file, and the way from a name, a file or plain data to frozen values in SI units."""
+"""Tuning problem: layout of its file, and loading from a name, a file or plain data into SI units."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -29,13 +29,13 @@ from ppafo.wording import first_twice
 
 LARGEST_SEED = 2**32 - 1
 MAXIMUM_DRAWS = 4096
-"""Draws over which each candidate may run at most."""
+"""Largest number of draws for each candidate."""
 _Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
 _Metric = Annotated[Text, Field(description="name of a metric, such as 'rms_error'")]
 
 
 class SearchRange(StrictTable):
-    """A number that is searched, with the bounds between which it may lie."""
+    """Searched parameter: path, bounds with units, and linear or logarithmic spacing."""
 
     path: Annotated[Text, Field(description="as for --set, such as 'controller.proportional_gain'")]
     minimum: _Value
@@ -44,7 +44,10 @@ class SearchRange(StrictTable):
 
 
 class GoalSection(StrictTable):
-    """A term of the objective: weight times metric over scale; less is better, with a weight below 0 more is."""
+    """Term of the objective, which is minimised: weight times metric divided by scale.
+
+    A metric with a negative weight is maximised.
+    """
 
     metric: _Metric
     weight: float = 1.0
@@ -54,7 +57,7 @@ class GoalSection(StrictTable):
 
 
 class Constraint(StrictTable):
-    """A metric that must not be above, or below, a value."""
+    """Upper or lower limit of a metric."""
 
     metric: _Metric
     at_most: Annotated[Text | None, Field(description="largest value with its unit")] = None
@@ -62,7 +65,7 @@ class Constraint(StrictTable):
 
 
 class Robust(StrictTable):
-    """Every candidate is run over the same draws from a study, and judged by the bad end of what comes from it."""
+    """Robust tuning: all candidates run over the same draws from a study and are judged by their unfavourable end."""
 
     study: Annotated[Text, Field(description="name of a study, or a path relative to this file")]
     measure: Annotated[
@@ -75,7 +78,13 @@ class Robust(StrictTable):
 
 
 class SearchEffort(StrictTable):
-    """Effort of the search: independent starts, most generations of each, candidates of a generation per gain."""
+    """Effort of the search.
+
+    ``starts``: number of independent starts
+    ``generations``: maximum number of generations of each start
+    ``candidates_per_gain``: candidates of a generation for each gain
+    ``seed``: random seed
+    """
 
     starts: Annotated[int, Field(ge=1, le=100)] = 3
     generations: Annotated[int, Field(ge=1, le=100_000)] = 100
@@ -106,13 +115,20 @@ def json_schema() -> dict[str, Any]:
 
 
 AT_BOUND = 0.01
-"""A gain has ended at a bound where it is nearer to it than this fraction of the way between the two."""
+"""Fraction of the range from a bound within which a gain counts as ended at the bound."""
 Gains = Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True)
 class SearchedParameter:
-    """A path, its bounds [SI], whether its logarithm is searched, its value before [SI], and how it is written."""
+    """Searched parameter of a tuning problem.
+
+    ``path``: dotted path
+    ``minimum``, ``maximum``: bounds [SI]
+    ``is_logarithmic``: True if the logarithm of the value is searched
+    ``before``: value before tuning [SI]
+    ``place``: conversion between values and text
+    """
 
     path: str
     minimum: float
@@ -122,18 +138,18 @@ class SearchedParameter:
     place: VariedPath
 
     def value(self, fraction: Floats) -> Floats:
-        """Return values [SI] at fractions of the way from the minimum to the maximum."""
+        """Return values [SI] at fractions of the range from minimum to maximum."""
         between = LogUniformBetween if self.is_logarithmic else UniformBetween
         return between(self.minimum, self.maximum).values(fraction)
 
     def fraction(self, value: float) -> float:
-        """Return the fraction of the way at which a value lies; outside 0 to 1 beyond the bounds."""
+        """Return the fraction of the range at which a value lies; below 0 or above 1 beyond the bounds."""
         if self.is_logarithmic:
             return math.log(value / self.minimum) / math.log(self.maximum / self.minimum) if value > 0.0 else -math.inf
         return (value - self.minimum) / (self.maximum - self.minimum)
 
     def bound_reached(self, value: float) -> Literal["minimum", "maximum"] | None:
-        """Return the bound at which a value lies, None where it is between them."""
+        """Return the bound at which a value lies; None for a value between the bounds."""
         fraction = self.fraction(value)
         if fraction <= AT_BOUND:
             return "minimum"
@@ -142,7 +158,7 @@ class SearchedParameter:
 
 @dataclass(frozen=True, slots=True)
 class ObjectiveTerm:
-    """A term of the objective: weight times metric over scale [SI]; by default the value before tuning."""
+    """Term of the objective: weight times metric divided by scale [SI]; scale None is the value before tuning."""
 
     metric: str
     weight: float
@@ -151,10 +167,13 @@ class ObjectiveTerm:
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Draws over which a candidate is judged: distributions, how many, their seed, and the bad end of the result.
+    """Draws over which candidates are judged, and the statistic of the result.
 
-    The bad end is the quantile at ``fraction``, or where that is None the mean and ``deviations`` standard deviations.
-    ``study`` is empty where the noise of the sensors is all that is drawn.
+    ``uncertainty``: distributions of the uncertain values
+    ``study``: name of the study; empty if only sensor noise is drawn
+    ``draws``, ``seed``: number of draws, and random seed
+    ``deviations``: number of standard deviations added to the mean, if ``fraction`` is None
+    ``fraction``: fraction of the quantile that judges a candidate; None for mean and standard deviations
     """
 
     uncertainty: Uncertainty
@@ -166,7 +185,7 @@ class Spread:
 
     @property
     def measure(self) -> str:
-        """The measure by which candidates are judged, in words."""
+        """Statistic by which candidates are judged, in words."""
         if self.fraction is not None:
             return f"{100.0 * self.fraction:g} % quantile"
         if self.deviations == 0.0:
@@ -175,7 +194,7 @@ class Spread:
         return f"mean and {self.deviations:g} {noun}"
 
     def bad_end(self, values: Floats, is_high: bool) -> Floats:
-        """Return the high, or low, end of values (candidates, draws) [SI], shape (candidates,)."""
+        """Return the unfavourable end of values (candidates, draws) [SI], high or low, as an array (candidates,)."""
         if self.fraction is not None:
             return np.asarray(np.quantile(values, self.fraction if is_high else 1.0 - self.fraction, axis=1))
         # Of a sample, hence n - 1; the draws are the same for all candidates, so that it ranks them fairly.
@@ -187,7 +206,7 @@ class Spread:
 class Problem:
     """Tuning problem: gains with bounds, objective, constraints and effort for one scenario.
 
-    ``spread`` is None for the device as it is said to be, with sensors without noise.
+    ``spread`` is None for the nominal device with noise-free sensors.
     """
 
     name: str
@@ -201,28 +220,31 @@ class Problem:
     effort: SearchEffort
 
     def __repr__(self) -> str:
-        """Return name, scenario and what is searched."""
+        """Return name, scenario and searched parameters."""
         return f"Tuning '{self.name}' of '{self.scenario.name}': {', '.join(gain.path for gain in self.searched)}"
 
     @property
     def metrics(self) -> tuple[str, ...]:
-        """Every metric that the goals and constraints need, each once."""
+        """Metrics of the goals and constraints, without duplicates."""
         wanted = [*(goal.metric for goal in self.goals), *(goal.metric for goal in self.constraints)]
         return tuple(dict.fromkeys(wanted))
 
     @property
     def before(self) -> Gains:
-        """The values before tuning [SI]."""
+        """Values of the gains before tuning [SI]."""
         return {gain.path: gain.before for gain in self.searched}
 
     @property
     def gauge(self) -> frozenset[str]:
-        """The paths, searched and drawn, whose values count from the atmosphere of their run."""
+        """Searched and drawn paths whose values are gauge pressures, relative to the atmosphere of their run."""
         drawn = frozenset[str]() if self.spread is None else self.spread.uncertainty.gauge
         return drawn | {gain.path for gain in self.searched if gain.place.is_gauge}
 
     def gains(self, fractions: Sequence[float]) -> Gains:
-        """Return the values [SI] at fractions of the way, rounded as written: what is pasted is what was run."""
+        """Return the gains [SI] at fractions of their ranges, rounded as in the overrides to paste.
+
+        The rounded values are also the simulated ones.
+        """
         # Through the text that is pasted: a run of that line gives these bits again.
         values = {
             gain.path: float(gain.value(np.asarray(fraction)))
@@ -237,11 +259,11 @@ class Problem:
 
 TUNING = TomlKind("tuning", "tuning", resources.files("ppafo") / "analyses" / "tune" / "library", StudyError)
 NOISE_DRAWS = 16
-"""Noise streams over which every candidate is judged where nothing else is uncertain."""
+"""Number of noise streams for every candidate if only the sensors are uncertain."""
 
 
 def list_tunings() -> tuple[str, ...]:
-    """Return the names of the tunings that come with the package.
+    """Return the names of the tunings of the package.
 
     >>> import ppafo
     >>> ppafo.list_tunings()
@@ -344,7 +366,7 @@ def _constraint(constraint: Constraint, atmosphere: float | None) -> MetricLimit
 
 
 def _spread(parsed: TuningFile, folder: Path, searched: Sequence[str], scenario: Scenario) -> Spread | None:
-    """Return what the candidates are judged over: draws of a study, of the noise, of both, or nothing."""
+    """Return the draws over which candidates are judged: of a study, of the noise, of both; None for neither."""
     robust = parsed.robust
     if robust is None:
         noise = Uncertainty(()).with_noise_of([scenario])

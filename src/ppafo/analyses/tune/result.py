@@ -1,4 +1,4 @@
-"""Result of a tuning: gains and metrics before and after, and the end of each start of the search."""
+"""Result of a tuning: gains and metrics before and after, and the result of each start of the search."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,16 +15,20 @@ from ppafo.studies.limits import MetricLimit
 INFEASIBLE = 1.0e6
 """Lowest cost of a candidate that violates a constraint."""
 FRESH_DRAWS = 1024
-"""Draws that the search never saw, over which the result is judged in the end."""
+"""Number of draws outside the search, over which the result is judged."""
 _AS_GOOD = 0.01
-"""Fraction of the best cost within which another start ended as well."""
+"""Relative excess over the best cost within which another start counts as equally good."""
 
 
 @dataclass(frozen=True, slots=True)
 class SearchStart:
-    """End of one start: fractions of the bounds (gains,), cost, candidates tried, best cost of each generation.
+    """Result of one start of the search.
 
-    ``is_settled`` says whether its candidates had come together, or whether it ran out of generations.
+    ``fractions`` (gains,): best candidate, as fractions of the ranges
+    ``cost``: cost of the best candidate
+    ``candidates``: number of candidates tried
+    ``generations``: best cost of each generation
+    ``is_settled``: True if the candidates converged, False if the generations ran out
     """
 
     fractions: tuple[float, ...]
@@ -35,10 +39,10 @@ class SearchStart:
 
 
 def agreement(starts: Sequence[SearchStart]) -> float:
-    """Return the largest difference of a fraction of the way between the best start and those as good as it.
+    """Return the largest difference in a fraction of the range between the best start and equally good starts.
 
-    As good is a cost within a hundredth; large where very different gains do as well, which the goal then leaves open.
-    ``starts`` are best first.
+    Equally good is a cost within a hundredth of the best. A large difference means that very different gains reach the
+    same cost, so the objective does not determine them. ``starts`` are sorted with the best first.
     """
     best = starts[0]
     # Of an infeasible cost only what the violation adds is compared: a hundredth of the offset would take in all.
@@ -49,10 +53,10 @@ def agreement(starts: Sequence[SearchStart]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class UnreachableDraws:
-    """Draws in which the reference needs more torque than the supply can hold, whatever the gains.
+    """Draws in which the reference requires more torque than the supply allows, for any gains.
 
-    ``fraction`` is theirs of all; ``explains`` are the metrics of the constraints that they alone break: no gains can
-    keep them, or the other draws do.
+    ``fraction``: fraction of all draws
+    ``explains``: metrics of violated constraints that no gains can satisfy, or that the other draws satisfy
     """
 
     fraction: float
@@ -61,15 +65,19 @@ class UnreachableDraws:
 
 @dataclass(frozen=True, slots=True)
 class GainResult:
-    """Gains [SI] and what they give.
+    """Gains [SI] with their metrics and the violation of constraints.
 
-    ``values`` are the metrics of the search [SI]: as the device is said to be, or at their bad end over the draws of
-    the search; ``fresh`` the same over draws that the search did not use (empty without draws). ``judged`` are those
-    by which constraints are judged there: of a loop that oscillates on the hold no single instant counts as its error.
-    ``off`` is the share by which the runs exceed the limits of tracking, 0 where they follow their reference.
-    ``objective`` belongs to the search; what is called fresh, to the fresh draws (the same again without draws).
-    ``share_of_noise`` is the fraction of the variance over the fresh draws that is due to sensor noise, by metric.
-    ``metrics`` belong to ``result``, one run of the nominal device.
+    ``values``: metrics of the search [SI]: of the nominal device, or at their unfavourable end over the draws
+    ``fresh``: the same over draws that the search did not use; empty without draws
+    ``judged``: metrics compared with the constraints over fresh draws; for a loop that oscillates on the hold, the
+        error at a single instant does not count
+    ``objective``, ``violation``, ``share_without_value``: objective, violation, and fraction of runs without a value,
+        in the search
+    ``fresh_violation``, ``fresh_share_without_value``: the same over fresh draws, or in the search without draws
+    ``off``: fraction by which the runs exceed the tracking limits; 0 if they follow their reference
+    ``torque_ceiling``: draws in which the reference is out of reach
+    ``share_of_noise``: fraction of the variance over fresh draws that is due to sensor noise, by metric
+    ``metrics``, ``result``: metrics and result of one run of the nominal device
     """
 
     gains: Gains
@@ -89,28 +97,31 @@ class GainResult:
 
     @property
     def is_feasible_in_search(self) -> bool:
-        """True where all constraints are kept and no run fails over what the search saw."""
+        """True if all constraints are satisfied and no run failed in the search."""
         return self.violation == 0.0 and self.share_without_value == 0.0
 
     @property
     def useless(self) -> str:
-        """Verdict on the nominal run where it does not follow its reference, "" where it does."""
+        """Verdict on a nominal run that does not follow its reference; empty if it does."""
         tracking = self.result.tracking
         return tracking.sentence if tracking is not None and tracking.is_useless else ""
 
     @property
     def is_feasible(self) -> bool:
-        """True where all constraints are kept, no run fails and the reference is followed, over fresh draws too."""
+        """True if all constraints are satisfied, no run failed and the reference is followed, also over fresh draws."""
         in_fresh = self.fresh_violation == 0.0 and self.fresh_share_without_value == 0.0
         return self.is_feasible_in_search and in_fresh and self.off == 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Tuned:
-    """Result of a search, in SI units. ``starts`` are best first; ``runs`` counts all simulated runs.
+    """Result of a tuning, in SI units.
 
-    ``overrides`` make the tuned scenario of its file; ``bounds_reached`` are the gains that ended at a bound, and at
-    which: a better one may lie beyond.
+    ``overrides``: overrides that turn the scenario of the tuning file into the tuned one
+    ``bounds_reached``: gains that ended at a bound, with the bound; a better value may lie beyond
+    ``scales``: scales of the goals
+    ``starts``: starts of the search, the best first
+    ``runs``: number of all simulated runs
     """
 
     tuning: str
@@ -133,5 +144,5 @@ class Tuned:
 
     @property
     def lines(self) -> list[str]:
-        """The gains found, as overrides ``PATH=VALUE`` to paste."""
+        """Gains found, as overrides ``PATH=VALUE`` to paste."""
         return self.problem.lines(self.after.gains)

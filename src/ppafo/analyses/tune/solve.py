@@ -1,7 +1,7 @@
-"""Tunes a scenario: cost and search, then both settings, before and after, over fresh draws and the nominal device.
+"""Tuning of a scenario: cost, search, and evaluation of the gains before and after over fresh draws.
 
-A candidate that satisfies all constraints is always better than one that does not; among those that do not, less
-violation is better; a candidate with a run that fails is worse than all (Deb's rules, 2000).
+A candidate that satisfies all constraints is always better than one that does not; among infeasible candidates, less
+violation is better; a candidate with a failed run is worse than all others (Deb's rules, 2000).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -34,10 +34,13 @@ UNUSABLE = 1.0e12
 
 @dataclass(frozen=True, slots=True)
 class CandidateMetrics:
-    """Runs of candidates, each field (candidates, draws); one draw without uncertainty.
+    """Metrics of candidates, each array (candidates, draws), with one draw if there is no uncertainty.
 
-    ``metrics`` are by name, and ``judged`` those by which candidates are ranked: where a loop oscillates on the hold no
-    single instant counts as its error. ``off`` is the share by which runs exceed the limits of tracking.
+    ``metrics``: metrics by name [SI]
+    ``judged``: metrics by which candidates are ranked; for a loop that oscillates on the hold, the error at a single
+        instant does not count
+    ``failed``: True for failed and oscillating runs
+    ``off``: fraction by which a run exceeds the tracking limits
     """
 
     metrics: Mapping[str, Floats]
@@ -54,7 +57,12 @@ class CandidateMetrics:
 
 @dataclass(frozen=True, slots=True)
 class _CandidateScores:
-    """Objective, violation of the constraints, share by which tracking exceeds its limits, failures: (candidates,)."""
+    """Scores of candidates, each (candidates,).
+
+    ``objective``, ``violation``: objective, and violation of the constraints
+    ``off``: fraction by which tracking exceeds its limits
+    ``without_value``: fraction of runs without a value
+    """
 
     objective: Floats
     violation: Floats
@@ -63,7 +71,7 @@ class _CandidateScores:
 
     @property
     def cost(self) -> Floats:
-        """Cost by which candidates are ranked."""
+        """Cost by which candidates are ranked, (candidates,)."""
         # Deb's rules in one number, since SciPy compares nothing else.
         broken = self.violation + self.off
         usual = np.where(broken > 0.0, INFEASIBLE + broken, self.objective)
@@ -71,12 +79,12 @@ class _CandidateScores:
 
 
 def bad_ends(values: Floats, spread: Spread | None, is_high: bool) -> Floats:
-    """Return the value of a metric by which candidates are judged (candidates,) from (candidates, draws) [SI]."""
+    """Return the value of a metric (candidates,) that judges each candidate, from (candidates, draws) [SI]."""
     return values[:, 0] if spread is None else spread.bad_end(values, is_high)
 
 
 def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float]) -> _CandidateScores:
-    """Return objective and violation of candidates; ``scales`` are the sizes of the goals by metric [SI]."""
+    """Return objective and violation of candidates; ``scales`` are the scales of the goals by metric [SI]."""
     failing = runs.without_value
     # Candidates with failed runs are ranked by how many fail: 0 keeps nan out of the sums meanwhile.
     known = {name: np.where(failing[:, None] > 0.0, 0.0, values) for name, values in runs.judged.items()}
@@ -94,22 +102,22 @@ def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float])
 
 
 Costs = Callable[[Floats], Floats]
-"""Fractions of the way (candidates, gains) in, costs (candidates,) out."""
+"""Function from fractions of the ranges (candidates, gains) to costs (candidates,)."""
 _TOLERANCE = 1.0e-3
-"""A start has ended where the costs of its candidates differ by no more than this fraction of their mean."""
+"""Relative spread of the candidates' costs below which a start has converged."""
 REFINEMENTS = 60
-"""Candidates of the simplex at most, for each gain."""
+"""Largest number of candidates of the simplex for each gain."""
 _REACH = (0.01, 0.1)
-"""Least and largest first reach of the simplex, as a fraction of the way between the bounds."""
+"""Smallest and largest initial size of the simplex, as a fraction of the range."""
 
 
 @on_one_thread
 def search(costs: Costs, before: Sequence[float], effort: SearchEffort) -> list[SearchStart]:
-    """Return what came of each start, the best first; the same every time for a seed.
+    """Return the result of each start of the search, the best first; equal seeds give equal results.
 
-    ``before`` are the fractions of the values before tuning; they are among the first candidates where they lie within
-    the bounds. Differential evolution (Storn and Price, 1997) as in SciPy, and from where it ends the simplex of Nelder
-    and Mead (1965), only ever compare costs.
+    ``before`` are the values before tuning as fractions of the ranges; they are among the first candidates if they lie
+    within the bounds. The search is differential evolution (Storn and Price, 1997) as in SciPy, followed by the simplex
+    method of Nelder and Mead (1965). Both use only comparisons of costs.
     """
     seeds = np.random.SeedSequence(effort.seed).spawn(effort.starts)
     finished = [_start(costs, before, effort, np.random.default_rng(seed)) for seed in seeds]
@@ -185,20 +193,23 @@ def _start(costs: Costs, before: Sequence[float], effort: SearchEffort, random: 
 
 
 MINIMUM_ERRORS = ("peak_error", "rms_error_hold")
-"""Metrics that are never below what the supply lacks of the largest reference."""
+"""Error metrics that cannot be smaller than the torque shortfall of the supply at the largest reference."""
 _NOISE_CONFIDENCE = 0.95
-"""Confidence of the interval of the share of sensor noise."""
+"""Confidence level of the interval of the noise share."""
 
 
 def rows_of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> CandidateMetrics:
-    """Run one setting of the gains over the draws."""
+    """Run one set of gains over the draws and return its metrics."""
     return crossed(runs, problem, {gain.path: np.array([gains[gain.path]]) for gain in problem.searched}, draws)
 
 
 def crossed(
     runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: Mapping[str, Floats]
 ) -> CandidateMetrics:
-    """Run every candidate (values, each (candidates,)) with every draw (columns, each (draws,))."""
+    """Run every candidate with every draw and return the metrics.
+
+    ``values`` are the gains by path, each (candidates,); ``draws`` are the uncertain values by path, each (draws,).
+    """
     candidates = len(next(iter(values.values())))
     count = len(next(iter(draws.values()))) if draws else 1
     columns = {path: np.repeat(column, count) for path, column in values.items()}
@@ -216,7 +227,7 @@ def crossed(
 
 
 def scales_of(problem: Problem, before: CandidateMetrics) -> dict[str, float]:
-    """Return the size of each goal: the given one, or its value before tuning."""
+    """Return the scale of each goal: the given one, or the value of the metric before tuning."""
     # By default each goal is 1 before tuning: goals in different units then weigh as much as their weights say.
     scales = {}
     for goal in problem.goals:
@@ -235,7 +246,7 @@ def scales_of(problem: Problem, before: CandidateMetrics) -> dict[str, float]:
 def setting_of(
     runs: Runs, problem: Problem, scales: Mapping[str, float], gains: Gains, draws: Mapping[str, Floats]
 ) -> GainResult:
-    """Return gains with what they come to over the draws."""
+    """Return the result of a set of gains over the draws of the search, over fresh draws and on the nominal device."""
     spread = problem.spread
     again = seen = rows_of_gains(runs, problem, gains, draws)
     fresh: dict[str, Floats] = {}
@@ -269,7 +280,7 @@ def setting_of(
 
 
 def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: CandidateMetrics) -> UnreachableDraws:
-    """Return in how many draws the supply cannot hold the reference, and which violated constraints that explains."""
+    """Return the draws in which the supply limits the torque, and the violated constraints that this explains."""
     base = scenario_with(problem, gains)
     columns = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
     scenario = with_numbers(base, columns)
@@ -294,7 +305,7 @@ def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: 
 
 
 def scenario_with(problem: Problem, gains: Gains) -> Scenario:
-    """Return the scenario of a problem with gains in it, as the pasted lines give it."""
+    """Return the scenario of a problem with given gains, rounded as in the overrides to paste."""
     # Gains that are unchanged are not written and read again, which would round them.
     if gains == problem.before:
         return problem.scenario
@@ -302,7 +313,10 @@ def scenario_with(problem: Problem, gains: Gains) -> Scenario:
 
 
 def _values(metrics: Mapping[str, Floats], problem: Problem) -> dict[str, float]:
-    """Return every metric of the problem of the first candidate, at its bad end; nan where a run has none."""
+    """Return the metrics of the first candidate by name, at the unfavourable end.
+
+    A metric is nan if a run does not have it.
+    """
     less = {goal.metric: goal.weight > 0.0 for goal in problem.goals}
     less |= {
         constraint.metric: constraint.is_most for constraint in problem.constraints if constraint.metric not in less

@@ -1,1 +1,1 @@
-"""Is the model good enough? A parameter set compared with recordings, channel by channel."""
+"""Validation of a parameter set: comparison of the model with recordings, channel by channel."""

@@ -1,4 +1,4 @@
-"""A validation as a finding: verdict, errors of each recording in a table, its panels, and the replayed recordings."""
+"""Report of a validation: verdict, table of errors and panels for each recording, replayed recordings."""
 
 import re
 from functools import partial
@@ -23,18 +23,18 @@ from ppafo.wording import count_of
 # Panels of a validation: each channel of a recording with the model, and its residual below.
 
 KIND_WORDS = {"measured": "measured", "synthetic": "synthetic measurement", "simulated": "simulated, not measured"}
-"""Name of the recording in the report: output of a model must not pass for a measurement."""
+"""Names of the kinds of recordings in the report: output of a model must not pass for a measurement."""
 MILLISECONDS = 1.0e3
-"""Milliseconds of a second."""
+"""Milliseconds per second."""
 _LOOKS = {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
 _NEAR_LIMIT = 0.25
-"""Largest residual over the limit of its RMS value from which the panel shows that limit: else it would be flat."""
+"""Ratio of the largest residual to the RMS limit above which the panel shows the limit; else it would be flat."""
 _SHORT = 3.0
-"""Recordings shorter than this [s] have an axis in milliseconds."""
+"""Duration [s] below which the time axis is in milliseconds."""
 
 
 def panels_across(agreement: RecordingAgreement) -> int:
-    """Return how many channels of a recording stand side by side: 2, or 1 where there is no other."""
+    """Return the number of channels side by side in a figure: 2, or 1 if there is only one channel."""
     return 1 if len(agreement.channels) == 1 else 2
 
 
@@ -49,7 +49,7 @@ def agreement_panels(agreement: RecordingAgreement) -> list[Panel]:
 
 
 def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement) -> list[Panel]:
-    """Return samples and model over time, and below them their residual."""
+    """Return two panels of a channel over time: samples with model, and below the residual."""
     name, measured, model = channel.channel, agreement.measured, agreement.model
     measurement = measured_values(measured, name)
     assert measurement is not None, "a channel that is compared was measured"
@@ -73,16 +73,16 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement) ->
 
 
 _HEAD = ("channel", "RMS error", "in noise", "variation", "of range", "limit", "bias", "largest", "at", "verdict")
-"""Titles of the table of errors, as ``channel_cells`` fills it."""
+"""Column heads of the table of errors, in the order of ``channel_cells``."""
 _UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
-"""Letters that the name of a file is better without."""
+"""Characters replaced in file names."""
 _WRITTEN_AS_ZERO = 5.0e-4
-"""Size of a number below which it is written as 0, for nobody measures that."""
+"""Absolute value below which a number is written as 0."""
 
 
 @in_units(lambda validation: validation.device.shown)
 def finding_of(validation: Validation) -> Finding[Validation]:
-    """Return a validation in words, tables and panels; it has passed where every error is within its limit."""
+    """Return a validation as a finding; passed if every error is within its limit."""
     stems = [
         _UNUSUAL.sub("-", Path(agreement.file).stem).strip("-.") or "recording" for agreement in validation.recordings
     ]
@@ -122,7 +122,7 @@ def finding_of(validation: Validation) -> Finding[Validation]:
 
 
 def _method(validation: Validation) -> str:
-    """Return how the errors were computed."""
+    """Return a text on the computation of the errors."""
     return (
         f"The model with the valve '{validation.device.valve_name}' was run with the inputs of each recording, from "
         "the state of its first samples. A residual is measured - model. Percentages are of the full range: the "
@@ -132,7 +132,7 @@ def _method(validation: Validation) -> str:
 
 
 def _part(name: str, agreement: RecordingAgreement) -> Section:
-    """Section with the errors of one recording in a table, and its panels; ``name`` is the stem of its files."""
+    """Return the section of one recording: table of errors, and panels. ``name`` is the stem of its files."""
     measured, kind = agreement.measured, KIND_WORDS[agreement.measured.kind]
     late = f"{MILLISECONDS * agreement.delay.correction:.3g} ms" if agreement.delay.correction else "none found"
     replayed = (
@@ -155,7 +155,11 @@ def _part(name: str, agreement: RecordingAgreement) -> Section:
 
 
 def channel_cells(channel: ChannelAgreement) -> tuple[str, ...]:
-    """Return the cells of a row: name, RMS error, over noise, variation, share, limit, bias, largest to verdict."""
+    """Return the cells of a channel's row in the table of errors.
+
+    The cells are name, RMS error, RMS error divided by noise, variation, RMS error and limit as percentages of full
+    range, bias, largest error, time of the largest error, and verdict.
+    """
     return (
         channel.channel,
         _error(channel, channel.rms),
@@ -171,11 +175,11 @@ def channel_cells(channel: ChannelAgreement) -> tuple[str, ...]:
 
 
 def _error(channel: ChannelAgreement, value: float) -> str:
-    """Return an error [SI] of a channel in the unit that people are shown."""
+    """Return an error [SI] of a channel as text in the display unit."""
     kind = kind_of_channel(channel)
     return f"{_number(display_value(value, kind.quantity))} {kind.shown_unit}"
 
 
 def _number(value: float) -> str:
-    """Return three digits, or 0."""
+    """Return a number as text with three digits, or 0."""
     return "0" if abs(value) < _WRITTEN_AS_ZERO else f"{value:.3g}"

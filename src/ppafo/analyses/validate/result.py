@@ -1,4 +1,4 @@
-"""Result of a validation: agreement of each recording, causes of the remaining error, and the verdict in a sentence."""
+"""Result of a validation: agreement of each recording, causes of the residual, and the verdict in a sentence."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,14 +14,17 @@ from ppafo.validation.compared import COMPARED
 from ppafo.version import __version__
 
 _EXPLAINS = 0.5
-"""Residual with the nearest cause over the residual without any, up to which that cause is worth naming."""
+"""Ratio of the residual with the nearest cause to the residual without any, up to which this cause is named."""
 
 
 @dataclass(frozen=True, slots=True)
 class Validation:
-    """A parameter set and what each recording reports of it.
+    """Validation of a parameter set against recordings.
 
-    ``overrides`` changed the set, ``causes`` are those of what is left.
+    ``device``: device of the set after the ``overrides``
+    ``settings``: settings of the replay
+    ``recordings``: agreement of each recording with the model
+    ``causes``: diagnosed causes of the residual
     """
 
     parameter_set: str
@@ -33,7 +36,7 @@ class Validation:
 
     @property
     def passes(self) -> bool:
-        """True where every error is within its limit: a cause says why, whether it passes or not."""
+        """True if every error is within its limit; causes do not affect the verdict."""
         return all(recording.passes for recording in self.recordings)
 
     def json_document(self) -> dict[str, Any]:
@@ -59,7 +62,7 @@ class Validation:
 
 
 def verdict(validation: Validation) -> str:
-    """Return in one sentence whether the set agrees and, if not, by what it is off and what would explain it."""
+    """Return a sentence on the agreement of the set, with the largest deviation and its probable cause, if any."""
     count, name = len(validation.recordings), validation.device.name
     pairs = [(channel, agreement) for agreement in validation.recordings for channel in agreement.channels]
     worst = max((channel for channel, _ in pairs), key=lambda channel: channel.in_noise)
@@ -78,10 +81,10 @@ def verdict(validation: Validation) -> str:
 
 
 def _why(causes: Diagnosis, without: float, passes: bool) -> str:
-    """Return what explains a disagreement, or what comes nearest; empty where nothing but noise is left.
+    """Return the cause of a residual, or the nearest one; empty if only noise is left.
 
-    ``without`` is the largest error over noise [-] without any cause: a nearest one is named that takes half of it, or
-    wrong samples, which are seen whatever else is wrong.
+    ``without`` is the largest error divided by noise [-] without any cause. A nearest cause is named if it at least
+    halves this error, or if it concerns wrong samples, which are detectable whatever else is wrong.
     """
     if causes.found is not None:
         verdict = in_words(causes.found)
@@ -100,12 +103,12 @@ def _why(causes: Diagnosis, without: float, passes: bool) -> str:
 
 
 def _times(size: float) -> str:
-    """Return how many times the noise, with two digits and without a power of ten."""
+    """Return a multiple of the noise as text with two digits and without a power of ten."""
     return f"{size:.2g}" if size < 100.0 else f"{size:.0f}"
 
 
 def in_words(cause: ResidualCause) -> str:
-    """Return a cause in words, numbers of the set in the unit in which people see them."""
+    """Return a cause in words, with values of the set in display units."""
     if len(cause.numbers) != 1:
         return cause.in_words
     ((value, unit),) = cause.numbers.values()
@@ -117,7 +120,7 @@ def in_words(cause: ResidualCause) -> str:
 
 
 def _cause_data(cause: ResidualCause | None) -> dict[str, Any] | None:
-    """Return a cause as plain data in SI, None for none."""
+    """Return a cause as plain data in SI; None without a cause."""
     if cause is None:
         return None
     return {
@@ -132,7 +135,7 @@ def _cause_data(cause: ResidualCause | None) -> dict[str, Any] | None:
 
 
 def kind_of_channel(channel: ChannelAgreement) -> Kind:
-    """Return the kind of the errors of a channel, which are differences."""
+    """Return unit and format of the errors of a channel, which are differences."""
     return Kind("", "", COMPARED[channel.channel].quantity)
 
 

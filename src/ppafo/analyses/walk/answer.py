@@ -1,4 +1,4 @@
-"""A walk of one wearer with and without the device, in words, tables and figures."""
+"""Report of a walk of one wearer with and without the device: text, tables and figures."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -50,12 +50,12 @@ _OVER_TIME = (
 )
 _TORQUE = Kind("", "N m", "torque", ".3g")
 _FAR_ABOVE = 2.0
-"""Largest pressure in a chamber over its supply, both absolute, above which it is said; healthy wearers stay below."""
+"""Ratio of absolute chamber pressure to supply pressure above which it is remarked; healthy wearers stay below."""
 
 
 @in_units(lambda worn: worn.scenario.device.shown)
 def safety_remarks(worn: WalkResult) -> list[str]:
-    """Remarks on the shut-off valve, torques above the limit, pressures far above the supply, and losses of help."""
+    """Return remarks on the shut-off valve, excessive torques or pressures, and reductions of assistance."""
     scenario, supply = worn.scenario, worn.scenario.device.supply
     remarks = []
     fitted = walk_of(scenario).shut_off
@@ -98,16 +98,17 @@ def safety_remarks(worn: WalkResult) -> list[str]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkPair:
-    """Result of a walk with the device beside one without it, in the form that is printed and kept.
+    """Result of a walk with the device and of the same walk without it, as printed and saved.
 
-    ``tracking`` is the verdict where the torque does not follow what the controller requests, with tried remedies.
+    ``tracking`` is the verdict on a torque that does not follow the controller's request, with the remedies tried; None
+    if the torque follows.
     """
 
     comparison: WalkComparison
     tracking: Tracking | None
 
     def json_document(self) -> dict[str, Any]:
-        """Return metrics with the device, without it and of a healthy ankle, and events, as plain data in SI."""
+        """Return the metrics (with the device, without it, healthy) and the events as plain data in SI units."""
         worn, verdict = self.comparison.with_device, self.tracking
         return {
             **walk_data(WALK_FORMAT, SCHEMA_VERSION, self.comparison),
@@ -147,7 +148,7 @@ _NUMBERS = (
     ),
     ShownNumber(name="counted_strides", title="Strides with these means", quantity="", digits=0),
 )
-"""Metrics as the table of a walk shows them."""
+"""Metrics in the table of a walk."""
 _EXPLAINED = (
     "'Without' is the same wearer without a device: no plate, torque or friction, and the ankle's own range of motion. "
     "'Healthy' is the gait itself. The swing has no ground: of toes that reach it only that they would drag is known. "
@@ -173,7 +174,10 @@ _LIMITS = (
 
 @in_units(lambda comparison: comparison.with_device.scenario.device.shown)
 def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
-    """Return a walk with and without the device; one that diverged has numbers, no pictures, and has not passed."""
+    """Return the report of a walk with and without the device.
+
+    A walk that diverged has numbers but no figures, and the report has not passed.
+    """
     worn, bare = comparison.with_device, comparison.without_device
     configuration, motion = worn.scenario, walk_of(worn.scenario)
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
@@ -227,7 +231,7 @@ def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
 
 
 def _remarks(comparison: WalkComparison) -> list[str]:
-    """Remarks on the wearer, the bottle, safety, the trusted range of speeds, and divergence."""
+    """Return remarks on wearer, bottle, safety, the trusted range of speeds, and divergence."""
     worn, bare = comparison.with_device, comparison.without_device
     bottle = "" if worn.supply is None else bottle_remark(worn)
     if worn.supply is None and "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
@@ -248,7 +252,7 @@ def _remarks(comparison: WalkComparison) -> list[str]:
 
 
 def _pictures(comparison: WalkComparison) -> Sequence[Section]:
-    """Return the figures of a task sequence, or of equal strides: over time, and the mean stride where there is one."""
+    """Return the figures of a task sequence, or of equal strides: over time, and the mean stride if there is one."""
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is not None:
         return task_sequence_pictures(comparison)
@@ -271,9 +275,9 @@ def _pictures(comparison: WalkComparison) -> Sequence[Section]:
 
 
 def comparison_table(comparison: WalkComparison) -> list[Column]:
-    """Return a row for each number: with the device, without it, and of a healthy ankle.
+    """Return the table of metrics by row, with columns for the device, without it, and a healthy ankle.
 
-    Strides with less help have a column of their own, where there are any.
+    Strides with reduced assistance have a separate column if there are any.
     """
     worn, bare = comparison.with_device, comparison.without_device
     walked = [("with", worn.metrics), ("less help", worn.vented_metrics), ("without", bare.metrics)]
@@ -294,7 +298,7 @@ def comparison_table(comparison: WalkComparison) -> list[Column]:
 
 
 def strides_csv(result: WalkResult) -> bytes:
-    """Return the numbers of each whole stride; the start of each is the sample right after its heel strike."""
+    """Return the numbers of each whole stride as CSV; the start of a stride is the sample after its heel strike."""
     # The last strike begins a stride that the end of the walk cuts off: it has no numbers.
     count = result.strides["gas"].size
     columns = {"stride [-]": np.arange(1.0, count + 1.0), "start [s]": result.recording.time[result.starts[:count]]}
@@ -304,7 +308,7 @@ def strides_csv(result: WalkResult) -> bytes:
 
 
 def mean_stride_csv(result: WalkResult) -> bytes:
-    """Return mean and standard deviation over strides of each channel, at every percent of the stride."""
+    """Return mean and standard deviation over strides of each channel as CSV, at every percent of the stride."""
     # Without a whole stride the file has its head alone.
     columns = {"phase [-]": PHASES} if result.averages else {"phase [-]": PHASES[:0]}
     for name, curves in result.averages.items():

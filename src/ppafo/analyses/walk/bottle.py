@@ -1,4 +1,4 @@
-"""Bottle in the report of a walk: facts, remark, data, file over time and figure."""
+"""Gas bottle in the report of a walk: facts, remark, data, time series and figure."""
 
 from collections.abc import Callable
 from functools import partial
@@ -31,7 +31,7 @@ _SHARE, _WARMTH, _PRESSURE = (Kind(quantity=name, form=".0f") for name in ("frac
 
 
 def bottle_parts(worn: WalkResult) -> tuple[Section, ...]:
-    """Return the facts of the bottle of a walk, its figure and how to read them; nothing without a bottle."""
+    """Return the facts of the bottle of a walk, its figure and an explanation; () for a walk without a bottle."""
     supply = worn.supply
     if supply is None:
         return ()
@@ -44,7 +44,7 @@ def bottle_parts(worn: WalkResult) -> tuple[Section, ...]:
 
 
 def bottle_remark(worn: WalkResult) -> str:
-    """Remark on the end of a walk on its bottle, with its time."""
+    """Return the remark on the end of a walk on a bottle, with the time that the bottle lasted."""
     supply = worn.supply
     assert supply is not None, "said of a walk on a bottle"
     time = lasted(supply)
@@ -53,7 +53,7 @@ def bottle_remark(worn: WalkResult) -> str:
 
 
 def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
-    """End of the walk and its time, gas used, and coldest places, each as name and value."""
+    """Return end of the walk and its time, gas used, and lowest temperatures, as pairs of name and value."""
     values, motion, peaks = supply.values, walk_of(worn.scenario), worn.peak_torques
     end = {name: float(series[-1]) for name, series in values.items()}
     filled = f"{_GAS.text(supply.supply.mass)} at {_WARMTH.text(supply.supply.temperature)}"
@@ -83,7 +83,7 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
 
 
 def bottle_data(worn: WalkResult) -> dict[str, Any]:
-    """Return the supply as data in SI units: what ended it, what closes, all at the end; nothing without a bottle."""
+    """Return the supply as data in SI units: end, balances, final and lowest values; {} without a bottle."""
     supply = worn.supply
     if supply is None:
         return {}
@@ -99,6 +99,6 @@ def bottle_data(worn: WalkResult) -> dict[str, Any]:
 
 
 def bottle_files(worn: WalkResult) -> dict[str, Callable[[], bytes]]:
-    """Return the file of the supply over the walk, by name; nothing without a bottle."""
+    """Return the CSV file of the supply over time, by file name; {} for a walk without a bottle."""
     supply = worn.supply
     return {} if supply is None else {"bottle.csv": lambda: marked_csv_bytes(supply.recording)}

@@ -1,4 +1,4 @@
-"""Additions of the command ``ppafo walk`` to its question: list of walks, and default output folder."""
+"""Additions of the command ``ppafo walk``: list of walks, and default output folder."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,7 +10,7 @@ from ppafo.walking.motion import walk_of
 
 
 def list_files() -> list[dict[str, Any]]:
-    """Return the walks and the task sequences that come with the package: name, what it is, description."""
+    """Return the walks and task sequences included in the package: name, kind of file, description."""
     rows = []
     for library in (FILE, task_sequences.FILE):
         files = {name: library.parse(library.read(name), name) for name in library.names()}
@@ -22,7 +22,7 @@ def list_files() -> list[dict[str, Any]]:
 
 
 def default_folder(values: Mapping[str, Any]) -> Path:
-    """Default output folder of the command, by the name of the configuration."""
+    """Return the default output folder of the command, named after the configuration."""
     names = ("overrides", "gait", "task_sequence", "bottle")
     configuration = load_walk(values["scenario"], **{name: values[name] for name in names})
     walked, bottled = walk_of(configuration).task_sequence, walk_of(configuration).bottle

@@ -1,4 +1,4 @@
-"""A walk as data and in rows: what ``walk.json`` and the tables say of every walk, whoever walks."""
+"""Walk as plain data and as table rows: content of ``walk.json`` and of the tables of all walks."""
 
 import platform
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,7 +17,7 @@ from ppafo.walking.walk import WalkComparison
 
 
 def walk_data(name: str, version: int, comparison: WalkComparison) -> dict[str, Any]:
-    """Plain data in the file of every walk, of a format with this name and version."""
+    """Return the common data of a walk file; ``name`` and ``version`` identify the file format."""
     worn, bare = comparison.with_device, comparison.without_device
     return {
         "format": name,
@@ -35,12 +35,12 @@ def walk_data(name: str, version: int, comparison: WalkComparison) -> dict[str, 
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of the packages that computed a result."""
+    """Return the versions of the packages with which a result was computed."""
     return {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__}
 
 
 def walk_document(scenario: Scenario) -> dict[str, Any]:
-    """Return a walk as data in SI units; its bottle by its values, not by the tables of its gas."""
+    """Return a walk as data in SI units; a bottle is described by its values, without the gas property tables."""
     motion, control, origin = walk_of(scenario), scenario.controller, scenario.origin
     return {
         "name": scenario.name,
@@ -71,7 +71,7 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
 
 
 class ShownNumber(NamedTuple):
-    """Number in the table of a walk: name, title, kind of quantity and decimals."""
+    """Row in the table of a walk: name of the number, title, kind of quantity and number of decimals."""
 
     name: str
     title: str
@@ -80,11 +80,11 @@ class ShownNumber(NamedTuple):
 
 
 WOULD_DRAG = "would drag"
-"""Remark on toes that would penetrate the ground."""
+"""Text for toes that would penetrate the ground."""
 
 
 def number_texts(shown: ShownNumber, values: Iterable[float | str | None]) -> tuple[str | None, ...]:
-    """Return the title with its unit, and values [SI] as text; a text and None stay what they are."""
+    """Return the title with its unit, and the values [SI] as text; texts and None are returned unchanged."""
     texts: list[str | None] = []
     for number in values:
         if number is None or isinstance(number, str):
@@ -98,14 +98,14 @@ def number_texts(shown: ShownNumber, values: Iterable[float | str | None]) -> tu
 
 
 def toes(height: float | None) -> float | str | None:
-    """Height of the toes over the ground [m]; the text that they would drag where it is below 0."""
+    """Return the toe clearance above the ground [m] or, if negative, the text that the toes would drag."""
     return WOULD_DRAG if height is not None and height < 0.0 else height
 
 
 def metrics_table(
     numbers: Sequence[ShownNumber], columns: Sequence[tuple[str, Mapping[str, float | str | None]]]
 ) -> list[Column]:
-    """Return a row for each number that one of the columns, head and values [SI] by name, has."""
+    """Return the table of the numbers in at least one column; a column is its head and values [SI] by name."""
     # A number that no walk of the table has would be a row of dashes.
     known = [number for number in numbers if any(values.get(number.name) is not None for _, values in columns)]
     cells = (number_texts(number, (values.get(number.name) for _, values in columns)) for number in known)
@@ -113,7 +113,7 @@ def metrics_table(
 
 
 def csv_of(columns: Mapping[str, Iterable[Any]]) -> bytes:
-    """Return simulated columns as comma-separated text; a cell is empty where there is nothing to say."""
+    """Return simulated columns as CSV; a missing value is an empty cell."""
     lists = (values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values())
     rows = (",".join(map(_cell, row)) for row in zip(*lists, strict=True))
     lines = ["# simulated: a model's own output, not measured", ",".join(columns), *rows]

@@ -1,4 +1,4 @@
-"""The question what a device does on a walk: its arguments."""
+"""Arguments of the analysis ``walk``: walking with the device, without it, and healthy."""
 
 from __future__ import annotations
 
@@ -73,11 +73,11 @@ def walk_with_and_without(
 
 
 _LONG_WALK = 12.0
-"""Minutes above which a walk reports how far it is."""
+"""Duration [min] above which a walk reports its progress."""
 
 
 def _reporter(report: Report, noun: str, above: float) -> Callable[[float, float], None]:
-    """Callback of a walk's progress, which reports it where there is more than ``above`` of the ``noun``."""
+    """Return a progress callback that reports only if the total exceeds ``above``, counted in the unit ``noun``."""
 
     def forward(done: float, total: float) -> None:
         if total > above:

@@ -1,4 +1,4 @@
-"""Task sequence in the report of a walk: table of its segments, remarks, data, files and pictures."""
+"""Task sequence in the report of a walk: table of the segments, remarks, data, files and figures."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
@@ -31,7 +31,7 @@ _NUMBERS = (
     ShownNumber(name="flat_push", title="push, heel loaded", quantity="torque", digits=1),
     ShownNumber(name="safe_time", title="less help at", quantity="time", digits=2),
 )
-"""Numbers of a segment, and lowest toes without the device, as the table shows them."""
+"""Numbers of a segment in the table, and lowest toes without the device."""
 _CAPTION = (
     "The task sequence over time. Grey: every other segment. 'Without' is the same task sequence without a device."
 )
@@ -45,9 +45,9 @@ _EXPLAINED = (
     "of the stance stay the same at every speed.",
 )
 _SAME_TIME = 0.05
-"""Time [s] by which a recording may end before its task sequence: its samples."""
+"""Time [s] by which a recording may end before its task sequence, because of its sampling."""
 _SAME_SPEED = 1.0e-9
-"""Difference of speeds [m/s] that is the rounding of another unit."""
+"""Difference of speeds [m/s] that is due to rounding in unit conversion."""
 _MEAN_CAPTION = (
     "Mean over the strides at an even speed on level ground, of all speeds together, with the standard deviation as a "
     "band."
@@ -55,7 +55,7 @@ _MEAN_CAPTION = (
 
 
 def task_sequence_parts(comparison: WalkComparison) -> tuple[Section, ...]:
-    """Return the table of the segments, and how to read it; nothing for a walk without a task sequence."""
+    """Return the table of the segments and its explanation; () for a walk without a task sequence."""
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is None:
         return ()
@@ -81,7 +81,7 @@ def task_sequence_parts(comparison: WalkComparison) -> tuple[Section, ...]:
 
 
 def _whole(worn: WalkResult, bare: WalkResult) -> dict[str, Any]:
-    """Return the numbers of the whole task sequence, or of it as far as it was walked, by the names of a segment's."""
+    """Return the numbers of the task sequence, whole or as far as walked, under the names of a segment's numbers."""
     numbers = {name: metric.value for name, metric in worn.metrics.items()}
     bare_toes = bare.metrics.get("task_sequence_lowest_toes")
     is_whole = numbers["task_sequence_time"] >= numbers["task_sequence_planned_time"] - _SAME_TIME
@@ -101,7 +101,7 @@ def _whole(worn: WalkResult, bare: WalkResult) -> dict[str, Any]:
 
 
 def task_sequence_pictures(comparison: WalkComparison) -> tuple[Section, ...]:
-    """Return the task sequence over time, and the mean of its even strides where there are any."""
+    """Return the figures of the task sequence over time and, if available, of the mean of its steady strides."""
     worn, bare = comparison.with_device, comparison.without_device
     mean = partial(walk_figure, {"with the device": worn, "without": bare})
     pictures = (
@@ -118,7 +118,7 @@ def task_sequence_pictures(comparison: WalkComparison) -> tuple[Section, ...]:
 
 
 def task_sequence_files(comparison: WalkComparison) -> dict[str, Callable[[], bytes]]:
-    """Return the files of the segments with and without the device, by name; nothing without a task sequence."""
+    """Return the files of the segments with and without the device, by name; {} without a task sequence."""
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is None:
         return {}
@@ -129,7 +129,7 @@ def task_sequence_files(comparison: WalkComparison) -> dict[str, Callable[[], by
 
 
 def segments_csv(segments: Sequence[SegmentResult]) -> bytes:
-    """Return one line for each segment, in SI units; a cell is empty where there is nothing to say."""
+    """Return a CSV line for each segment, in SI units; a missing value is an empty cell."""
     units = {number.name: si_unit(number.quantity) or "-" for number in _NUMBERS}
     names = [field.name for field in fields(SegmentResult) if field.name != "title"]
     heads = {name: f"{name} [{units[name]}]" if name in units else name for name in names}
@@ -137,7 +137,7 @@ def segments_csv(segments: Sequence[SegmentResult]) -> bytes:
 
 
 def task_sequence_data(comparison: WalkComparison) -> dict[str, Any]:
-    """Return the segments as data, in SI units; nothing for a walk without a task sequence."""
+    """Return the segments as data in SI units; {} for a walk without a task sequence."""
     worn, bare = comparison.with_device, comparison.without_device
     sequence = walk_of(worn.scenario).task_sequence
     if sequence is None:
@@ -150,7 +150,7 @@ def task_sequence_data(comparison: WalkComparison) -> dict[str, Any]:
 
 
 def trust_remark(configuration: Scenario) -> str:
-    """Remark on segments beyond the speeds for which scaling the gait can be trusted; empty without any."""
+    """Return a remark on segments outside the speed range to which the gait can be scaled; empty without any."""
     sequence, gait = walk_of(configuration).task_sequence, walk_of(configuration).gait
     if sequence is None:
         return ""
@@ -173,5 +173,5 @@ def trust_remark(configuration: Scenario) -> str:
 
 
 def _given(sequence: TaskSequence, name: str) -> list[float]:
-    """Return a number [SI] of all segments that state it."""
+    """Return the values [SI] of a number from all segments that state it."""
     return [segment.values[name] for segment in sequence.segments if name in segment.values]

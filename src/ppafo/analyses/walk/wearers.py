@@ -1,4 +1,4 @@
-"""A walk of many wearers: what they get, as quantiles, and who they are, in words, a table and a figure."""
+"""Report of a walk of many wearers: quantiles of outcomes and traits, as text, table and figure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from ppafo.walking.walk import OUTCOMES, SHOWN, TRAITS, Population, WearerQuanti
 from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""Fractions of the wearers that are below what the table shows."""
+"""Quantiles in the table, as fractions of the wearers."""
 WEARERS_FORMAT = "ppafo wearers"
 WEARERS_SCHEMA_VERSION = 1
 _WEARERS_CAPTION = (
@@ -30,12 +30,12 @@ _WEARERS_CAPTION = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wearers:
-    """Result of one walk of many wearers, in the form that is printed and kept."""
+    """Result of a walk of many wearers, as printed and saved."""
 
     population: Population
 
     def json_document(self) -> dict[str, Any]:
-        """Return the quantiles over the wearers, and who they are, as plain data in SI."""
+        """Return the quantiles of outcomes and traits over the wearers as plain data in SI units."""
         population = self.population
         return {
             "format": WEARERS_FORMAT,
@@ -66,7 +66,7 @@ class Wearers:
 
 @in_units(lambda population: population.scenario.device.shown)
 def wearers_finding(population: Population) -> Finding[Wearers]:
-    """Report of the walks of many wearers; no figure where every walk diverged."""
+    """Return the report of the walks of many wearers; it has no figure if all walks diverged."""
     configuration = population.scenario
     tables = {**population.outcomes, **population.traits}
     rows = []

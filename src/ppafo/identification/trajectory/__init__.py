@@ -1,8 +1,8 @@
-"""Trajectory fit: any numbers of a device from any recordings of its motion, with intervals and verdicts.
+"""Trajectory fit: any parameters of a device from any recordings of its motion, with intervals and verdicts.
 
-Each file leans on those before it: ``problem`` says what is requested, ``tolerances`` what is not known exactly,
-``runs`` makes residuals of it, ``fitting`` gives them to the one estimator, ``expected`` ranks further experiments, and
-``section`` does so for a problem file.
+``problem`` states the request, ``tolerances`` adds the uncertain quantities, ``runs`` computes residuals, ``fitting``
+passes them to the common estimator, ``expected`` ranks further experiments, and ``section`` does all of this for a
+problem file.
 """
 
 from ppafo.identification.tolerances import Tolerances

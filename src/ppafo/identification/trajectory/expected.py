@@ -1,4 +1,4 @@
-"""Choice of the most informative next experiment: information of its samples, added to the information of the fit."""
+"""Choice of the most informative next experiment: expected information of its samples, added to the present fit."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -20,10 +20,10 @@ from ppafo.simulation.scenario import Scenario
 
 @dataclass(frozen=True, slots=True)
 class CandidateExperiment:
-    """An experiment that could be done: its scenario, the noise of each channel [rad], [Pa], time between samples [s].
+    """Possible further experiment: scenario, noise of each channel [rad], [Pa], and sample interval [s].
 
-    The devices of candidates come from their scenarios, with the fitted numbers put in. Channels without ``noise``
-    have the one that the fit found, and no others are compared.
+    The device comes from the scenario, with the fitted values inserted. Without ``noise``, all channels of the fit are
+    compared, each with its estimated noise; otherwise only the channels in ``noise``.
     """
 
     label: str
@@ -36,9 +36,9 @@ class CandidateExperiment:
 class ExpectedBenefit:
     """Expected benefit of a candidate experiment.
 
-    ``gain`` is half the growth of the logarithm of the determinant of the information on the numbers sought [-]
-    (D-optimality): the volume of their region shrinks by exp(gain). ``shrinkage`` is, by number, the standard error
-    afterwards over the one now. ``most_helped`` names the number that gains most.
+    ``gain`` is half the increase of the log-determinant of the information on the unknowns [-] (D-optimality): the
+    volume of their confidence region shrinks by exp(gain). ``shrinkage`` is, for each unknown, the standard error after
+    the experiment divided by the present one. ``most_helped`` names the unknown that shrinks most.
     """
 
     label: str
@@ -48,9 +48,9 @@ class ExpectedBenefit:
 
 
 def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExperiment]) -> tuple[ExpectedBenefit, ...]:
-    """Return what each candidate would bring, the most informative first.
+    """Return the expected benefit of each candidate experiment, the most informative first.
 
-    IdentificationError for a candidate without noise in a channel that can be fitted.
+    Raises IdentificationError for a candidate without noise in any channel that can be fitted.
     """
     return tuple(sorted((_benefit(fit, one) for one in candidates), key=lambda one: -one.gain))
 

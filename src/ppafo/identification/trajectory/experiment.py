@@ -1,4 +1,4 @@
-"""Experiments of a trajectory fit: recordings with the scenarios that are to explain them."""
+"""Experiments of a trajectory fit: recordings paired with the scenarios that model them."""
 
 import math
 from collections.abc import Mapping
@@ -27,31 +27,31 @@ from ppafo.simulation.scenario import FreeMotion, Scenario, Sensors, vane_motion
 from ppafo.wording import nearest_name
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
-"""Channels compared with a recording [rad], [Pa], [Pa]."""
+"""Channels that can be compared with a recording [rad], [Pa], [Pa]."""
 
 INPUTS = (COMMAND, SUPPLY, EXTERNAL_TORQUE)
-"""Channels that a run follows where they were recorded, sample by sample, if it has no scenario."""
+"""Recorded channels that drive a run without a scenario, sample by sample."""
 
 ALL_INPUTS = (*INPUTS, DORSIFLEXION_SUPPLY, ANGLE)
-"""Channels that a run may follow instead of its scenario; a recorded angle prescribes the vane's."""
+"""Recorded channels that may drive a run in place of the scenario; a recorded angle is a prescribed motion."""
 
 InitialState = Literal["scenario", "recording"]
 """Source of the initial angle and pressures of a run."""
 
 _FITS = 1.0e-6
-"""Time [s] by which a sample may pass the start of an experiment: rounding of a clock."""
+"""Rounding tolerance [s] of sample times at the start of an experiment."""
 
 
 @dataclass(frozen=True, slots=True)
 class FittedExperiment:
-    """A recording and the scenario that is to explain it; time ``start`` [s] of the recording is time 0 of the run.
+    """Recording paired with the scenario that models it; time ``start`` [s] of the recording is time 0 of the run.
 
-    ``noise`` is the least standard deviation by channel [rad], [Pa]; it is estimated from what the fit leaves.
-    ``channels`` are those that are compared, to the end of the recording. ``inputs`` names measured channels that the
-    run follows sample by sample: ``command``, in place of the scenario's controller, ``supply_pressure`` (of both
-    inlets where they have one pressure), ``dorsiflexion_pressure``, ``external_torque``, ``angle``. ``initial_state``
-    takes angle and pressures at the start from the scenario or, by the samples up to the start, from the recording:
-    their mean, or where a line through them ends if they move. ``source`` names the file and its hash.
+    ``channels`` are compared from the start to the end of the recording. ``noise`` is a lower bound of the standard
+    deviation by channel [rad], [Pa]; the noise itself is estimated from the residuals. ``inputs`` are recorded channels
+    that drive the run, sample by sample: ``command`` (replaces the controller), ``supply_pressure`` (of both inlets if
+    they share a pressure), ``dorsiflexion_pressure``, ``external_torque``, ``angle``. ``initial_state`` selects the
+    source of the initial angle and pressures: the scenario, or the samples of the recording up to the start (their mean
+    or, if they move, the end of a line through them). ``source`` names the file and its hash.
     """
 
     label: str
@@ -66,7 +66,7 @@ class FittedExperiment:
 
 
 def check_experiment(experiment: FittedExperiment) -> None:
-    """Refuse an experiment that cannot be fitted; the message begins with its label. It is an IdentificationError."""
+    """Raise IdentificationError, with the label first, for an experiment that cannot be fitted."""
     said, recording, inputs = f"experiment '{experiment.label}'", experiment.recording, experiment.inputs
     if len(recording) < 2:
         raise IdentificationError(f"{said}: {recording.label} has only one sample; a fit needs two or more")
@@ -115,16 +115,16 @@ def check_experiment(experiment: FittedExperiment) -> None:
 
 
 def refuse_first(said: str, *checks: tuple[bool, str]) -> None:
-    """Refuse the first that is wrong of pairs, whether it is and why; ``said`` begins the line."""
+    """Raise IdentificationError for the first failed check of pairs (is wrong, reason); ``said`` starts the message."""
     for is_wrong, why in checks:
         if is_wrong:
             raise IdentificationError(f"{said}: {why}")
 
 
 def scenario_of(experiment: FittedExperiment) -> Scenario:
-    """Return the scenario of an experiment with all that it takes from the recording, but for the samples of inputs.
+    """Return the scenario of an experiment, completed with data from the recording except for the samples of inputs.
 
-    A state that is taken from the recording comes from the samples up to the start.
+    A recorded initial state is taken from the samples up to the start.
     """
     scenario, recording = experiment.scenario, experiment.recording
     if {SUPPLY, DORSIFLEXION_SUPPLY} & set(experiment.inputs):
@@ -156,7 +156,7 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
 
 
 def use_of(experiment: FittedExperiment) -> UsedRecording:
-    """Return what of its recording an experiment is compared with."""
+    """Return the part of the recording with which an experiment is compared."""
     last = float(experiment.recording.time[-1])
     trace = experiment.source or experiment.recording.label
     return UsedRecording(

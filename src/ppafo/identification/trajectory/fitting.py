@@ -1,4 +1,4 @@
-"""The trajectory fit: runs as residuals of the one estimator, and what comes of it as values of the device."""
+"""Trajectory fit: simulated runs as residuals of the common estimator, and results as estimates of the device."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -33,9 +33,9 @@ from ppafo.wording import nearest_name
 class ChannelFit:
     """Residual statistics of one channel of one experiment, in its SI unit.
 
-    ``noise`` is the standard deviation that weighs it and ``order`` the order of the autoregression that makes it
-    white, both of its sensor; ``rms`` and ``largest`` are of this recording, ``span`` is the range that the samples
-    cover.
+    ``noise`` is the estimated standard deviation and ``order`` the order of the autoregression, both common to all
+    recordings of the sensor. ``rms`` and ``largest`` are the RMS and largest magnitude of the residuals of this
+    recording, ``span`` is the range of its samples.
     """
 
     experiment: str
@@ -49,15 +49,15 @@ class ChannelFit:
 
     @property
     def fraction(self) -> float:
-        """RMS of what is left over the range that the samples cover [-]."""
+        """RMS of the residuals divided by the range of the samples [-]."""
         return self.rms / self.span if self.span > 0.0 else 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class NuisanceParameter:
-    """A tolerance in the SI unit of its number: what it was thought to be, and what the recordings make of it.
+    """Uncertain quantity of bench or device (tolerance) [SI]: value and standard error before and after the fit.
 
-    ``widens`` is the number that is sought whose interval it widens most, ``share`` its fraction of the variance there.
+    ``widens`` is the unknown whose interval depends most on this quantity, ``share`` the fraction of its variance [-].
     """
 
     name: str
@@ -72,12 +72,13 @@ class NuisanceParameter:
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryFit:
-    """Estimates of the numbers that were sought, each with verdict and sentence, and what was not known exactly.
+    """Result of a trajectory fit: estimates of the unknowns, and of the tolerances (``known``).
 
-    ``covariance`` [SI] and ``correlation`` are in the order of ``estimates``. ``models`` are the fitted runs at the
-    times of the samples, ``measurements`` the samples, both by experiment over the time of the run. ``conflict`` says
-    which recordings or channels alone give other values than all together, empty where they agree; ``remarks`` are
-    sentences about the fit as a whole, ``outliers`` about samples that were left out.
+    ``covariance`` [SI] and ``correlation`` are in the order of ``estimates``. ``channels`` are residual statistics.
+    ``models`` are the fitted runs at the sample times and ``measurements`` the samples, both by experiment with the
+    time of the run. ``scenarios`` have the fitted values. ``conflict`` is a sentence on recordings or channels whose
+    own estimates differ from the common ones, empty if all agree. ``remarks`` are sentences on the fit as a whole,
+    ``outliers`` on samples left out.
     """
 
     problem: TrajectoryProblem
@@ -96,9 +97,9 @@ class TrajectoryFit:
     outliers: tuple[str, ...] = ()
 
     def estimate(self, name: str) -> Estimate:
-        """Return the estimate of a number by its path; ``valve.area`` means the valve of the first experiment.
+        """Return the estimate at a path; ``valve.area`` means the valve of the first experiment.
 
-        IdentificationError where it was not sought.
+        Raises IdentificationError if the parameter was not fitted.
         """
         full = full_path(name, self.scenarios[0])
         for estimate in self.estimates:
@@ -109,14 +110,14 @@ class TrajectoryFit:
 
     @property
     def values(self) -> dict[str, float]:
-        """The estimates in SI units by path."""
+        """Estimated values by path [SI]."""
         return {estimate.path: estimate.value for estimate in self.estimates}
 
 
 def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> TrajectoryFit:
-    """Return the numbers of a problem that explain its recordings best, each with interval [SI] and verdict.
+    """Return the parameters that explain the recordings of a problem best, each with interval [SI] and verdict.
 
-    ``report`` hears what is being done. IdentificationError where it cannot be run.
+    ``report`` receives the progress. Raises IdentificationError if the problem cannot be simulated.
     """
     numbers = numbers_of(problem)
     free = [number.free for number in numbers]
@@ -175,7 +176,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
 
 
 def _remarks(fitted: Fit, scenarios: Sequence[Scenario], estimates: Sequence[Estimate]) -> tuple[str, ...]:
-    """Return what a fitted device breaks of the rules of devices, and that the search did not converge."""
+    """Return remarks on violated rules of the fitted device and on a search that did not converge."""
     remarks = [text for text in dict.fromkeys(broken_rule(scenario.device) for scenario in scenarios) if text]
     if fitted.edge:
         wanted, bounds = [], []
@@ -198,7 +199,7 @@ def _remarks(fitted: Fit, scenarios: Sequence[Scenario], estimates: Sequence[Est
 
 
 def _left_out(fitted: Fit, blocks: Sequence[ResidualBlock], times: Mapping[str, Floats]) -> Iterator[str]:
-    """Return what is said of the outliers of each channel of each recording; ``times`` [s] are those of the samples."""
+    """Yield a remark on the outliers of each channel of each recording; ``times`` [s] are the sample times."""
     for block in blocks:
         samples = [row - block.rows.start for row in fitted.outliers if block.rows.start <= row < block.rows.stop]
         if samples:
@@ -209,16 +210,16 @@ def _left_out(fitted: Fit, blocks: Sequence[ResidualBlock], times: Mapping[str, 
 
 
 _INSIDE = 1.0e-3
-"""Fraction of a number by which a bound lies on the side of an edge on which runs succeed."""
+"""Relative distance from the edge of successful runs [-] at which a bound is suggested."""
 
 
 def _in_unit(value: float, estimate: Estimate) -> str:
-    """Return a value with the unit of an estimate, as a problem file reads it."""
+    """Return a value with the unit of an estimate, in the format of a problem file."""
     return f"{value:.4g}" if estimate.unit in ("", "-") else f"{value:.4g} {estimate.unit}"
 
 
 def _known(fitted: Fit, number: FitNumber, row: int, error: float, estimates: Sequence[Estimate]) -> NuisanceParameter:
-    """Return what a fit says of a number that is known to a tolerance, and whose interval that widens most."""
+    """Return the fitted tolerance ``number``, with the unknown whose interval it widens most."""
     name, free = number.free.name, number.free
     shares = {estimate.path: dict(fitted.shares[estimate.path]).get(name, 0.0) for estimate in estimates}
     widens = max(shares, key=lambda path: shares[path], default="")
@@ -229,9 +230,9 @@ def _known(fitted: Fit, number: FitNumber, row: int, error: float, estimates: Se
 
 
 def _wandering(fitted: Fit, numbers: tuple[FitNumber, ...]) -> str:
-    """Return which channel leaves noise that wanders by more than its zero may be off; empty where none does.
+    """Return a sentence on a channel whose residual drifts by more than the limit of its zero error, else "".
 
-    A sensor whose zero is known within a limit does not leave it from sample to sample: what does is the model's.
+    The zero of a sensor stays within its limit, so that a larger drift must come from the model.
     """
     for number in (number for number in numbers if number.path.startswith(ZERO_OF)):
         channel = number.path.removeprefix(ZERO_OF)
@@ -250,9 +251,9 @@ def _wandering(fitted: Fit, numbers: tuple[FitNumber, ...]) -> str:
 
 
 _OWN_SHARE = 0.2
-"""Weight [-] in a combination that is open from which a number is open itself; others only accompany it."""
+"""Weight in an undetermined combination [-] from which a parameter itself counts as not identifiable."""
 _AT_BOUND = 1.0e-6
-"""Distance to a bound, as a fraction of it, up to which a number has ended there."""
+"""Relative distance from a bound [-] up to which an estimate counts as at its bound."""
 
 
 def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: int, conflict: str) -> Estimate:
@@ -289,7 +290,7 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
 
 
 def _channel(fitted: Fit, experiment: str, measured: FitChannel, model: Floats) -> ChannelFit:
-    """Return what a channel of an experiment leaves beside the model at its samples."""
+    """Return the residual statistics of a channel of an experiment, given the model at its samples."""
     left = measured.values - model
     return ChannelFit(
         experiment=experiment,

@@ -1,4 +1,4 @@
-"""The layout of the section [trajectory] of a problem file; texts have units, scenarios and recordings go by name."""
+"""Layout of the section [trajectory] of a problem file; texts have units, scenarios and recordings are named."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -16,14 +16,14 @@ _Noise = dict[str, Text]
 
 
 class PriorSection(StrictTable):
-    """Prior knowledge: a normal distribution."""
+    """Prior of a parameter: a normal distribution."""
 
     mean: Annotated[Text, Field(description="most likely value, with its unit")]
     relative: Annotated[float, Field(gt=0.0, description="standard deviation over the mean")]
 
 
 class ParameterSection(StrictTable):
-    """Entry of a problem file for a number that is to be fitted."""
+    """Entry of a problem file for a parameter to be fitted."""
 
     path: Text = Field(description="dotted path, such as friction.viscous_damping or initial.pressure_1")
     start: Text | None = Field(
@@ -38,10 +38,10 @@ class ParameterSection(StrictTable):
 
 
 class ExperimentSection(StrictTable):
-    """A recording and the scenario that is to explain it.
+    """Recording, with the scenario that models it.
 
-    A scenario has the device of the problem. Without one the run follows what the recording has of command, supply and
-    external torque, and begins as the recording does.
+    The scenario is run with the device of the problem. Without a scenario, the recorded command, supply and external
+    torque drive the run, which starts from the recorded state.
     """
 
     label: _Label
@@ -70,7 +70,7 @@ class ExperimentSection(StrictTable):
 
 
 class CandidateSection(StrictTable):
-    """Entry of a problem file for an experiment that could be done next."""
+    """Entry of a problem file for a possible further experiment."""
 
     label: _Label
     scenario: Text = Field(description="name of a scenario, or a file relative to this one")
@@ -80,7 +80,7 @@ class CandidateSection(StrictTable):
 
 
 class TrajectorySection(StrictTable):
-    """Section of a problem file for a fit of trajectories."""
+    """Section of a problem file for a trajectory fit."""
 
     parameters: tuple[ParameterSection, ...] = Field(strict=False, min_length=1, description="free parameters")
     experiments: tuple[ExperimentSection, ...] = Field(strict=False, min_length=1, description="recordings to explain")
@@ -102,7 +102,7 @@ _REMOVED = {
 
 
 def refuse_removed(document: Mapping[str, Any], file: str) -> None:
-    """Refuse keys that earlier versions had, with what to write instead; IdentificationError."""
+    """Raise IdentificationError for keys of earlier versions, naming the replacement."""
     section, bench = document.get("trajectory"), document.get("bench")
     if isinstance(bench, dict) and "can" in bench:
         raise IdentificationError(

@@ -1,4 +1,4 @@
-"""The numbers that a trajectory fit moves: which a scenario and a recording have, and their start, bounds and prior."""
+"""Parameters that a trajectory fit can vary: availability in scenario and recording, start, bounds and prior."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -19,10 +19,10 @@ from ppafo.simulation.scenario import Scenario, vane_motion
 from ppafo.wording import nearest_name
 
 TIME_OFFSET = "recording.time_offset"
-"""Path of a number that no scenario has: the time by which the samples of a recording are later than the run."""
+"""Path of the delay of the samples of a recording with respect to the run; no scenario has this parameter."""
 
 ZERO_OF, GAIN_OF = "recording.zero_of_", "recording.gain_of_"
-"""Paths, with a channel behind them, of what a sensor adds to its samples and of its gain less 1."""
+"""Prefixes of the paths of zero error and gain error of a sensor; the name of the channel follows."""
 
 RECORDING = (
     Quantity("time_offset", "s", "time by which the samples are later than the run, a late trigger", 0.0, -1.0, 1.0),
@@ -42,13 +42,13 @@ _OF_RECORDING = frozenset(f"recording.{quantity.name}" for quantity in RECORDING
 
 
 def full_path(path: str, scenario: Scenario) -> str:
-    """Return the path as a parameter set has it: ``valve.area`` becomes ``valves.NAME.area`` of the chosen valve."""
+    """Return the path as in a parameter set: ``valve.area`` becomes ``valves.NAME.area`` of the chosen valve."""
     section, _, name = path.partition(".")
     return f"valves.{scenario.device.valve_name}.{name}" if section == "valve" else path
 
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
-    """Return every number that can be fitted in this scenario, with its declaration, by path."""
+    """Return the declarations of all parameters that can be fitted in this scenario, by path."""
     device = scenario.device
     # An orifice has two forms, and the device one of them.
     other = {f"{section}.{name}" for section in ("actuator.leak", "valve") for name in other_form(device, section)}
@@ -67,7 +67,7 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
 
 
 def declaration_of(path: str, scenario: Scenario) -> Quantity:
-    """Return the declaration of the number at a path; IdentificationError with the nearest name for an unknown one."""
+    """Return the declaration of a parameter. Raises IdentificationError, with the nearest name, for an unknown path."""
     find_effects([path])
     known = declared_numbers(scenario)
     full = full_path(path, scenario)
@@ -78,13 +78,13 @@ def declaration_of(path: str, scenario: Scenario) -> Quantity:
 
 
 def number_at(scenario: Scenario, path: str) -> float:
-    """Return the number at a path in SI units; numbers of a recording are 0 before they are fitted."""
+    """Return the value at a path [SI]; parameters of a recording are 0 before they are fitted."""
     declaration_of(path, scenario)
     return 0.0 if path in _OF_RECORDING else numbers.number_at(scenario, path)
 
 
 def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
-    """Return the scenario with numbers [SI] replaced, by paths of ``declared_numbers``, but not of recordings."""
+    """Return the scenario with changed parameters [SI], by path; parameters of recordings are ignored."""
     # Those of a recording change what is compared, not the run.
     return numbers.with_numbers(
         scenario, {path: number for path, number in changed.items() if path not in _OF_RECORDING}
@@ -92,7 +92,7 @@ def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
 
 
 def broken_rule(device: Device) -> str:
-    """Return which rule of a device a set of numbers breaks, as a parameter set would say it; empty for none."""
+    """Return a sentence on a rule that the parameters of a device violate; empty for a valid device."""
     if device.friction.dynamic_torque > device.friction.static_torque:
         return "friction.dynamic_torque came out above friction.static_torque"
     if device.actuator.angle_min >= device.actuator.angle_max:
@@ -101,29 +101,29 @@ def broken_rule(device: Device) -> str:
 
 
 LONGEST_TIME_OFFSET = 0.02
-"""Bound [s] of a fitted time offset where none are given: a trigger or a sensor, not another experiment."""
+"""Default bound of a fitted time offset [s]: covers the delay of a trigger or a sensor."""
 
 _FURTHEST = 100.0
-"""Factor from its start by which a number is moved at most where no bounds are given."""
+"""Default bounds of a positive parameter: largest ratio to its start, up and down [-]."""
 
 _SCALE = 100.0
-"""Typical size of a number with a prior over its standard deviation; differences are a thousandth of it at most."""
+"""Scale of a parameter with a prior, in standard deviations [-]; finite differences are at most a thousandth of it."""
 
 _STATE = frozenset({"motion", "initial"})
-"""Sections that say how a run begins, which the recording may say better."""
+"""Sections of the initial state of a run, for which the recording may have better values."""
 
 _SUPPLIES = {"supply.pressure": "plant.supply_pressure", "supply.dorsiflexion_pressure": "plant.dorsiflexion_pressure"}
 
 
 @dataclass(frozen=True, slots=True)
 class FreeParameter:
-    """A number that the fit moves, by its path such as ``friction.viscous_damping`` or ``initial.pressure_1``; SI.
+    """Parameter varied by the fit, by path such as ``friction.viscous_damping`` or ``initial.pressure_1``, in SI units.
 
-    ``start`` None begins at the value of the scenario. ``deviation`` is the standard deviation of its prior about
-    ``mean``, which is the start where it is None; infinite for none. Bounds left out are the declared ones, at most a
-    factor of 100 from the start. ``recordings`` limits the number to some experiments, by label: an initial pressure
-    belongs to one. One that ``is_tolerance`` is known within a tolerance, and no value of the device that is sought.
-    One that ``is_logarithm`` is moved as its natural logarithm; ``deviation`` is of that.
+    ``start`` defaults to the value of the scenario. ``low`` and ``high`` default to the declared bounds, at most a
+    factor of 100 from the start. ``deviation`` is the standard deviation of a normal prior about the start, infinite
+    for none. ``recordings`` limits the parameter to some experiments, by label, such as an initial pressure to one.
+    ``is_tolerance`` marks a quantity known within a tolerance, which is not an unknown of the device. With
+    ``is_logarithm`` the natural logarithm is varied, and ``deviation`` refers to the logarithm.
     """
 
     path: str
@@ -137,13 +137,13 @@ class FreeParameter:
 
     @property
     def name(self) -> str:
-        """The path, with the experiments where it is limited to some."""
+        """Path, with the labels of the experiments if the parameter is limited to some."""
         return f"{self.path} of {', '.join(self.recordings)}" if self.recordings else self.path
 
 
 @dataclass(frozen=True, slots=True)
 class FitNumber:
-    """A number with everything settled: full path, SI unit, and what the estimator moves."""
+    """Parameter resolved for a fit: full path, SI unit, and the variable of the estimator."""
 
     path: str
     unit: str
@@ -153,14 +153,14 @@ class FitNumber:
     is_logarithm: bool
 
     def acts_in(self, label: str) -> bool:
-        """Return whether the number acts in the experiment with this label."""
+        """Return whether the parameter acts in the experiment with this label."""
         return not self.recordings or label in self.recordings
 
 
 def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment]) -> FitNumber:
-    """Return a parameter with all of it settled; ``experiments`` are those it acts in.
+    """Return a parameter with start, bounds and scale resolved, given the experiments in which it acts.
 
-    IdentificationError for a contradiction.
+    Raises IdentificationError for contradictory settings.
     """
     scenarios = [experiment.scenario for experiment in experiments]
     paths = {full_path(parameter.path, scenario) for scenario in scenarios}
@@ -201,7 +201,7 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
 
 
 def _bounds(parameter: FreeParameter, path: str, start: float, quantity: Quantity) -> tuple[float, float]:
-    """Return the lowest and the highest value [SI] of the search; those of the parameter go before the usual ones."""
+    """Return the lower and upper bound of the search [SI]: given by the parameter, or default."""
     if path == TIME_OFFSET:
         low, high = -LONGEST_TIME_OFFSET, LONGEST_TIME_OFFSET
     else:
@@ -212,7 +212,7 @@ def _bounds(parameter: FreeParameter, path: str, start: float, quantity: Quantit
 
 
 def _check_bounds(parameter: FreeParameter, start: float, low: float, high: float, quantity: Quantity) -> None:
-    """Raise IdentificationError for start, bounds and prior that contradict each other or what is declared."""
+    """Raise IdentificationError if start, bounds and prior contradict each other or the declaration."""
     bounds = f"{low:.6g} and {high:.6g}"
     has_size = math.isfinite(high - low) or math.isfinite(parameter.deviation)
     is_allowed = quantity.minimum <= low and high <= quantity.maximum
@@ -229,6 +229,6 @@ def _check_bounds(parameter: FreeParameter, start: float, low: float, high: floa
 
 
 def reach_of(chosen: Sequence[FitNumber]) -> float:
-    """Return the largest time offset [s] among the bounds of numbers; 0 where none is fitted."""
+    """Return the largest time offset [s] that the bounds of the parameters allow; 0 if none is fitted."""
     bounds = [bound for number in chosen if number.path == TIME_OFFSET for bound in (number.free.low, number.free.high)]
     return max(map(abs, bounds), default=0.0)

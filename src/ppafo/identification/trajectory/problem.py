@@ -1,4 +1,4 @@
-"""A trajectory fit as a value: the numbers that it moves and the experiments that they are to explain."""
+"""Trajectory fit problem: parameters to fit, and experiments that the model must explain."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from ppafo.wording import first_twice, nearest_name
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryProblem:
-    """Numbers to be fitted to recordings. IdentificationError for a problem that makes no sense."""
+    """Parameters to be fitted to the recordings of experiments. Raises IdentificationError if inconsistent."""
 
     parameters: tuple[FreeParameter, ...]
     experiments: tuple[FittedExperiment, ...]
@@ -36,7 +36,7 @@ class TrajectoryProblem:
 
 
 def numbers_of(problem: TrajectoryProblem) -> tuple[FitNumber, ...]:
-    """Return all parameters of a problem with start and bounds settled; refuses those that contradict."""
+    """Return all parameters of a problem with start and bounds resolved. Raises IdentificationError if inconsistent."""
     return tuple(
         number_of(
             parameter,
@@ -51,7 +51,7 @@ def numbers_of(problem: TrajectoryProblem) -> tuple[FitNumber, ...]:
 
 
 def _refuse_twice(what: str, names: list[str]) -> None:
-    """Raise IdentificationError where a name is there twice; ``what`` says of what they are names."""
+    """Raise IdentificationError for a duplicated name; ``what`` is the kind of the named things in the message."""
     twice = first_twice(names)
     if twice is not None:
         raise IdentificationError(f"{what} '{twice}' is named twice")

@@ -1,7 +1,7 @@
-"""Experiments made ready for fitting, and their runs: residuals of all recordings at many points, as one batch.
+"""Experiments prepared for fitting, and their runs: residuals of all recordings at many points, in one batch.
 
-Each experiment is one batch of runs, each run one set of numbers. One clock serves all columns: the step stays as it
-is during the search. Runs of a fit are allowed so little error that differences hardly see it.
+Each experiment is one batch of runs, one per point. All runs of a batch share one time step, fixed during the search.
+The error tolerance of the runs is so small that it hardly affects finite differences.
 """
 
 import math
@@ -39,24 +39,24 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 FIT_TOLERANCE = 0.02
-"""Error that a run of a fit is allowed over any other run's; columns of differences keep to 1e-3 with it."""
+"""Error tolerance of a run of a fit, relative to other runs [-]; finite differences are then accurate to 1e-3."""
 _FINER = 0.25
-"""Tolerance of the second run, by whose difference the error of the first is told."""
+"""Relative tolerance [-] of the second run that serves to estimate the error of the first."""
 _FITS = 1.0e-6
-"""Fraction of a record, and time [s], by which a sample may be off: rounding of a clock."""
+"""Rounding tolerance of sample times, as a fraction of a record interval [-] and in seconds."""
 
 _ZERO_OF_ANGLE = math.radians(1.0)
-"""Angle [rad] from a stop within which a sensor shows the stop."""
+"""Largest distance of a reading from a stop [rad] at which the vane counts as resting at the stop."""
 
 _READ_INTERVAL = 5.0e-5
-"""Seconds between two records that samples lie in between: a chamber fills within milliseconds ..."""
+"""Record interval for interpolation at samples [s]; a chamber fills within milliseconds."""
 _MAXIMUM_RECORDS = 100_000
-"""... and more where a recording is so long that memory would run out."""
+"""Number of records above which the interval is lengthened, to limit memory for long recordings."""
 
 
 @dataclass(frozen=True, slots=True)
 class FitChannel:
-    """Channel of an experiment: samples [rad] or [Pa], and the smallest noise assumed for them."""
+    """Channel of an experiment: samples [rad] or [Pa], and least noise assumed for them."""
 
     name: str
     values: Floats
@@ -65,12 +65,11 @@ class FitChannel:
 
 @dataclass(frozen=True, slots=True)
 class PreparedExperiment:
-    """An experiment by its label, with its scenario completed and its samples placed in the record of a run.
+    """Experiment prepared for fitting: completed scenario, planned run, and samples located between its records.
 
-    ``time`` [s] has the times of the samples in the run, ``reach`` how far [s] a fitted offset may move them. ``run``
-    has the step and the clock of all columns; a sample is ``fraction`` [-] of the way from record ``place`` to the
-    next. ``inputs`` are what the run follows at each step, made of what ``recorded`` has; None where it follows
-    nothing.
+    ``time`` has the sample times in the run [s]; a fitted offset may shift them by up to ``reach`` [s]. ``run`` has the
+    time step and clock of all runs. A sample lies a ``fraction`` [-] of the interval after the record ``place``.
+    ``inputs`` are the inputs at each step, computed from ``recorded``; None without recorded inputs.
     """
 
     label: str
@@ -86,10 +85,10 @@ class PreparedExperiment:
 
 
 def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: float = 0.0) -> PreparedExperiment:
-    """Return the experiment made ready.
+    """Return an experiment prepared for fitting.
 
-    ``numbers`` by path are the start values; ``reach`` [s] is the largest time offset that is tried.
-    IdentificationError for a recording with too few samples or a sensor at its limit.
+    ``numbers`` are the start values by path; ``reach`` [s] is the largest time offset that may be tried. Raises
+    IdentificationError for a recording with too few samples or a saturated sensor.
     """
     recording, said = experiment.recording, f"experiment '{experiment.label}'"
     inside = recording.time >= experiment.start - _FITS
@@ -135,7 +134,7 @@ def prepare_samples(
     numbers: Mapping[str, float],
     recorded: RecordedInputs | None = None,
 ) -> PreparedExperiment:
-    """Return samples of a scenario's run made ready, at ``numbers`` [SI] by path; an offset may be up to ``reach``."""
+    """Return samples of a scenario prepared for fitting, at ``numbers`` [SI], with time offsets up to ``reach`` [s]."""
     run = replace(plan_run(with_numbers(scenario, numbers)), tolerance=FIT_TOLERANCE)
     nowhere = np.zeros(time.size)
     place = nowhere.astype(np.intp)
@@ -144,7 +143,7 @@ def prepare_samples(
 
 
 def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment:
-    """Return the samples placed in a record of a run that is no finer than they need."""
+    """Return the experiment with its samples located in a record that is only as fine as they need."""
     time, recorded = prepared.time, prepared.recorded
     every = _steps_between_samples(time, prepared.reach, run.step)
     records = math.ceil((float(time[-1]) + prepared.reach) / (run.step * every) - _FITS)
@@ -161,9 +160,9 @@ def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment
 
 
 def _steps_between_samples(time: Floats, reach: float, step: float) -> float:
-    """Return the steps between two records: as many as between two samples, fewer where these are read in between.
+    """Return the steps between two records: a sample interval, or less if samples must be interpolated.
 
-    A fraction of a step where a whole one is too long to be read in between.
+    The result is a fraction of a step if a whole step is too long for interpolation.
     """
     every = max(1, round(float(np.min(np.diff(time))) / step))
     position = time / (step * every)
@@ -178,22 +177,22 @@ def _steps_between_samples(time: Floats, reach: float, step: float) -> float:
 
 
 def columns_in(label: str, numbers: Sequence[FitNumber], points: Floats) -> dict[str, Floats]:
-    """Return the numbers [SI] by path that act in the experiment with a label, at points [SI] (numbers, points)."""
+    """Return the parameters [SI] by path that act in an experiment, at points [SI] (numbers, points)."""
     acting = ((item, row) for item, row in zip(numbers, points, strict=True) if item.acts_in(label))
     return {item.path: np.exp(row) if item.is_logarithm else row for item, row in acting}
 
 
 def numbers_in(label: str, numbers: Sequence[FitNumber], point: Floats) -> dict[str, float]:
-    """Return the numbers [SI] by path that act in the experiment with a label, at one point [SI] (numbers,)."""
+    """Return the parameters [SI] by path that act in an experiment, at one point [SI] (numbers,)."""
     return {path: float(row[0]) for path, row in columns_in(label, numbers, point[:, None]).items()}
 
 
 def signals_of(
     experiments: Sequence[PreparedExperiment], numbers: Sequence[FitNumber], points: Floats
 ) -> list[dict[str, Floats]]:
-    """Return, for each experiment, its channels [SI] (samples, points) at many points [SI] (numbers, points).
+    """Return the channels of each experiment [SI] (samples, points) at points [SI] (numbers, points).
 
-    A run that leaves what is possible is NaN throughout. Experiments run side by side, one thread each.
+    A failed run is NaN throughout. Experiments run in parallel, one thread each.
     """
 
     def one(prepared: PreparedExperiment) -> dict[str, Floats]:
@@ -208,7 +207,7 @@ def signals_of(
 
 
 def residuals_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[FitNumber], points: Floats) -> Floats:
-    """Return measured less model [SI] (samples of all channels, points) at points [SI] (numbers, points)."""
+    """Return residuals, measured - model [SI] (samples of all channels, points), at points [SI] (numbers, points)."""
     signals = signals_of(experiments, numbers, points)
     return np.concatenate(
         [
@@ -222,10 +221,10 @@ def residuals_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Fi
 def blocks_of(
     experiments: Sequence[PreparedExperiment], numbers: Sequence[FitNumber], point: Floats
 ) -> tuple[ResidualBlock, ...]:
-    """Return the place of each channel of each recording among the residuals.
+    """Return the residual rows of each channel of each recording, with noise floor and integration error.
 
-    Its floor is the given noise, the size of the error of the engine, or what the converter of the sensor rounds. The
-    error of the engine is no noise: all samples of a recording share it.
+    The floor is the given noise, the integration error or the rounding of the converter, whichever is largest. The
+    integration error is not independent noise: all samples of a recording share it.
     """
     blocks, first = [], 0
     coarse = signals_of(experiments, numbers, point[:, None])
@@ -260,14 +259,14 @@ _NUMBERS_OF_RUN = (
     "effects",
     "leg",
 )
-"""Fields of a run that depend on the numbers of its scenario; program, clock and prescribed motion stay."""
+"""Fields of a run that depend on the parameters of its scenario; program, clock and prescribed motion do not."""
 
 
 def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
-    """Return the run of an experiment with other numbers [SI], on its program and clock.
+    """Return the run of an experiment with changed parameters [SI], on the same program and clock.
 
-    A number may be an array (runs,), one for each of many runs. IdentificationError where a setting of the valve goes
-    to or from 0.
+    A parameter may be an array (runs,). Raises IdentificationError if a valve setting or an effect changes to or from
+    0, which would need another program.
     """
     base = prepared.run
     scenario = with_numbers(prepared.scenario, numbers)
@@ -307,9 +306,10 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
 
 
 def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
-    """Return the channels [SI] (samples, runs) of one experiment with other numbers [SI] in each of ``count`` runs.
+    """Return the channels [SI] (samples, runs) of one experiment for ``count`` runs with parameters [SI] by path.
 
-    What differs only in zeros and gains of compared sensors is run once. A pressure sensor reads gauge pressure.
+    Runs that differ only in zeros and gains of compared sensors are simulated once. A pressure sensor reads gauge
+    pressure.
     """
     compared = [channel.name for channel in prepared.channels]
     errors = {
@@ -332,7 +332,7 @@ def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], coun
 
 
 def _with_inputs(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
-    """Return ideal signals; runs whose recorded inputs have other zeros are groups of their own."""
+    """Return ideal sensor signals; runs with different zeros of recorded inputs are simulated in separate groups."""
     zeros = {path: column for path, column in columns.items() if path.startswith(ZERO_OF)}
     rest = {path: column for path, column in columns.items() if path not in zeros}
     if not zeros or prepared.inputs is None:
@@ -360,7 +360,7 @@ def _with_inputs(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
 
 
 def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
-    """Return what ideal sensors would say."""
+    """Return the signals of ideal sensors [SI] (samples, runs)."""
     run = run_with(prepared, columns)
     kept, failure = _rows_of(run.program)
     records: Floats | None = None
@@ -392,13 +392,13 @@ def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
 
 @lru_cache(maxsize=16)
 def _rows_of(program: Program) -> tuple[tuple[int, ...], int]:
-    """Return the rows of the state that channels are made of, and the row with the time of a failure."""
+    """Return the rows of the state from which channels are computed, and the row with the time of a failure."""
     rows = row_numbers(program.state_rows())
     return tuple(rows[f"state.{name}"] for name in ("angle", "mass_1", "mass_2")), rows["result.failure_time"]
 
 
 def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -> Floats:
-    """Return a state at the times of the samples, by straight lines between records; each run with its offset [s]."""
+    """Return a state at the sample times, interpolated linearly between records; each run has a time offset [s]."""
     if offsets.any():
         # Before the first record the device stands still.
         interval = prepared.run.step * prepared.run.record_every

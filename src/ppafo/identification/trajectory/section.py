@@ -1,6 +1,6 @@
-"""Section [trajectory] of a problem file: its problem in SI units, and the outcome.
+"""Section [trajectory] of a problem file: conversion to a problem in SI units, and its result.
 
-Everything that can be refused is refused before the search begins.
+All input errors are reported before the search starts.
 """
 
 import math
@@ -48,10 +48,10 @@ _NOISE_UNITS = {"angle": "rad", "pressure_1": "Pa_d", "pressure_2": "Pa_d"}
 class SectionContext:
     """Context of a section: parameter set, recordings and earlier results.
 
-    ``read`` gives the recording of an experiment, ``folder`` is where paths of scenarios begin, ``file`` what messages
-    call the section. ``parameter_set`` takes the place of the sets that scenarios name, ``valve`` of their valves.
-    ``bench`` are estimates that came before, by path; ``used`` are the recordings from which they came. ``tolerances``
-    are those of the bench.
+    ``read``: function that returns the recording of an experiment. ``folder``: base of relative paths of scenarios.
+    ``file``: name of the section in messages. ``parameter_set`` and ``valve``: replacements for the sets and valves of
+    all scenarios. ``bench``: earlier estimates by path. ``used``: recordings from which these were obtained.
+    ``tolerances``: tolerances of the bench.
     """
 
     read: Callable[[ExperimentSection], RecordingSource]
@@ -65,9 +65,9 @@ class SectionContext:
 
 
 def noise_of_channels(texts: Mapping[str, str], said: str) -> dict[str, float]:
-    """Return the standard deviations [rad], [Pa] of the noise by channel; ``said`` begins messages.
+    """Return the standard deviation of the noise by channel [rad], [Pa]; ``said`` starts messages.
 
-    IdentificationError for a channel that has none here.
+    Raises IdentificationError for a channel that cannot be fitted.
     """
     deviations = {}
     for name, text in texts.items():
@@ -79,11 +79,11 @@ def noise_of_channels(texts: Mapping[str, str], said: str) -> dict[str, float]:
 
 
 SHORTEST_STEP = 1.0e-6
-"""Seconds; a shorter step would only cost time."""
+"""Shortest time step that may be requested [s]; a shorter step would only cost time."""
 
 
 def trajectory_problem(section: TrajectorySection, setting: SectionContext) -> TrajectoryProblem:
-    """Return the problem of a section. IdentificationError where it repeats what the bench settles."""
+    """Return the problem of a section. Raises IdentificationError if a bench procedure already used a recording."""
     experiments = tuple(_experiment(entry, setting) for entry in section.experiments)
     scenarios = {experiment.label: experiment.scenario for experiment in experiments}
     # Samples that a bench procedure used are in its interval, which is a prior here.
@@ -107,7 +107,7 @@ def trajectory_problem(section: TrajectorySection, setting: SectionContext) -> T
 
 
 def candidates_of(section: TrajectorySection, setting: SectionContext) -> tuple[CandidateExperiment, ...]:
-    """Return the experiments that could be done next, with their scenarios, noise and interval of samples [s]."""
+    """Return the candidate experiments of a section, with scenarios, noise and sample intervals [s]."""
     candidates = []
     for entry in section.candidates:
         said = f"{setting.file}: candidate '{entry.label}'"
@@ -119,7 +119,7 @@ def candidates_of(section: TrajectorySection, setting: SectionContext) -> tuple[
 
 
 def _experiment(entry: ExperimentSection, setting: SectionContext) -> FittedExperiment:
-    """Return an experiment of a section, with its recording and the scenario that is to explain it."""
+    """Return an experiment of a section: its recording, and the scenario that models it."""
     said = f"{setting.file}: experiment '{entry.label}'"
     source = setting.read(entry)
     if entry.scenario is None:
@@ -156,7 +156,7 @@ def _experiment(entry: ExperimentSection, setting: SectionContext) -> FittedExpe
 
 
 def _scenario(name: str, overrides: tuple[str, ...], setting: SectionContext) -> Scenario:
-    """Return a scenario of the package, or of a file in the folder of the problem, with the device of the problem."""
+    """Return a bundled scenario, or one from a file in the folder of the problem, with the device of the problem."""
     name_or_file = name if name in list_scenarios() else str(setting.folder / name)
     # The valve of the problem goes before what the experiment changes of it.
     chosen = () if setting.valve is None else (f"device.valve={setting.valve}",)
@@ -164,7 +164,7 @@ def _scenario(name: str, overrides: tuple[str, ...], setting: SectionContext) ->
 
 
 def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], setting: SectionContext) -> FreeParameter:
-    """Return a number to fit, in SI; ``scenarios`` are those of the experiments by label."""
+    """Return a parameter to fit [SI]; ``scenarios`` are the scenarios of the experiments, by label."""
     scenario = next((scenarios[label] for label in entry.recordings if label in scenarios), None)
     acting = scenario or next(iter(scenarios.values()))
     quantity = declaration_of(entry.path, acting)
@@ -191,9 +191,9 @@ def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], setti
 def _replay(
     entry: ExperimentSection, recording: Recording, setting: SectionContext, said: str
 ) -> tuple[Scenario, float, tuple[str, ...]]:
-    """Return the replay of a recording on the device of the set, its start [s] in the recording, and its inputs.
+    """Return a replay scenario for a recording, its start time [s] in the recording, and its inputs.
 
-    It begins at the first sample unless a start is given. IdentificationError where a scenario is needed.
+    The replay starts at the first sample unless a start is given. Raises IdentificationError if a scenario is needed.
     """
     if setting.parameter_set is None:
         raise IdentificationError(f"{said}: needs a scenario, because no device was given")
@@ -229,7 +229,7 @@ def _replay(
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryOutcome:
-    """The fit, candidates by what they would bring, the best first, and remarks on recordings and on the fit."""
+    """Result of a section: fit, expected benefit of candidates (best first), and remarks on recordings and fit."""
 
     fit: TrajectoryFit
     expected: tuple[ExpectedBenefit, ...]
@@ -237,12 +237,12 @@ class TrajectoryOutcome:
 
     @property
     def is_good(self) -> bool:
-        """Tell whether the search converged to a valid device on which all recordings agree."""
+        """True if the search converged to a valid device and no part of the recordings contradicts the rest."""
         return not self.fit.conflict and not self.fit.remarks
 
 
 def solve_section(section: TrajectorySection, setting: SectionContext, report: Report) -> TrajectoryOutcome:
-    """Return the outcome of a section; everything that can be refused is refused before the search begins."""
+    """Return the result of a section; all input errors are reported before the search starts."""
     try:
         problem = trajectory_problem(section, setting)
         candidates = candidates_of(section, setting)

@@ -1,4 +1,4 @@
-"""Tolerances of bench and parameter set, as numbers of a trajectory fit with priors."""
+"""Tolerances of bench and parameter set as parameters of a trajectory fit with priors."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,24 +24,25 @@ from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion
 
 _WIDEST = 12.0
-"""Standard deviations of its prior that a tolerance may be off at most in the search."""
+"""Largest deviation of a tolerance in the search, in standard deviations of its prior [-]."""
 
 _EXACT = ("area", "angle_min", "angle_max", "linear_ratio", "critical_ratio", "atmospheric_pressure")
-"""Names of numbers that only go with another one, or that the zero of a sensor moves as well."""
+"""Parameters without a default tolerance: they act only through another one, or like the zero error of a sensor."""
 
 _STRIBECK, _SHARE = "effects.stribeck.velocity", "effects.stribeck.share"
 _FACTOR, _ONE_SIDED, _LEAST = 1.5, 1.645, 0.01
-"""Standard deviation of the logarithm of that velocity, how many of them its limit is above, and its least over that.
+"""Prior of the Stribeck velocity: standard deviation of its logarithm, distance of the limit from the mean in standard
+deviations, and least value as a fraction of the limit [-].
 
-The fall is as good as abrupt below; the effect would be off at 0.
+At the least value the fall of the friction is practically abrupt; at 0 the effect would be off.
 """
 
 _START_OF_ANGLE = math.radians(0.05)
-"""Standard deviation of an angle that is read at the start [rad]."""
+"""Standard deviation of an initial angle read from a recording [rad]."""
 
 
 def stated_by(parameter_set: ParameterSet, scenario: Scenario) -> dict[str, float]:
-    """Return half widths of the 95 % intervals that a set states [SI], by path."""
+    """Return the half-widths of the 95 % intervals stated in a set [SI], by path."""
     found = {}
     for path, quantity in declared_numbers(scenario).items():
         entry = parameter_set.numbers.get(path)
@@ -56,9 +57,9 @@ def tolerance_parameters(
     fitted: Sequence[FreeParameter],
     stated: Mapping[str, float] | None = None,
 ) -> tuple[FreeParameter, ...]:
-    """Return what is not known exactly and not ``fitted`` anyway, as numbers of the fit with priors.
+    """Return all uncertain quantities, except parameters already ``fitted``, as fit parameters with priors.
 
-    ``stated`` are half widths of the 95 % intervals [SI] that the set states, by path.
+    ``stated`` are the half-widths of the 95 % intervals stated in the set [SI], by path.
     """
     found: list[FreeParameter] = []
     for experiment in experiments:
@@ -93,11 +94,11 @@ def tolerance_parameters(
 def _stribeck(
     tolerances: Tolerances, experiments: Sequence[FittedExperiment], given: set[str]
 ) -> Iterator[FreeParameter]:
-    """Yield velocity and share of the fall from static to dynamic friction, where the set has none.
+    """Yield Stribeck velocity and share of the fall to dynamic friction as parameters, if the set has no such effect.
 
-    With an abrupt fall static friction is traded for damping. What a step response says of static friction goes with
-    the logarithm of the velocity up to which friction at rest lasts, of which 95 % are below the limit, so that is
-    moved. A share that is held would make all of its error one of the static friction.
+    With an abrupt fall, static friction trades off against damping. The static friction seen in a step response varies
+    with the logarithm of the Stribeck velocity, so the logarithm is varied; 95 % of its prior lies below the limit. A
+    fixed share would shift its whole error to the static friction.
     """
     limit, scenario = tolerances.stribeck_velocity, experiments[0].scenario
     moves = any(vane_motion(one.scenario).profile is None and ANGLE not in one.inputs for one in experiments)
@@ -122,7 +123,7 @@ def _stribeck(
 
 
 def _of_run(tolerances: Tolerances, experiment: FittedExperiment) -> dict[str, tuple[float, float]]:
-    """Return start and standard deviation of what one run is done with and how it begins, by path [SI]."""
+    """Return start and standard deviation of the operating conditions and initial state of a run, by path [SI]."""
     scenario, inputs, recording = scenario_of(experiment), experiment.inputs, experiment.recording
     free = scenario.motion if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is None else None
     found = {}
@@ -148,7 +149,7 @@ def _of_run(tolerances: Tolerances, experiment: FittedExperiment) -> dict[str, t
 
 
 def _read_error(recording: Recording, name: str) -> float:
-    """Return the standard deviation [SI] of what one sample of a channel says: noise and resolution; 0 without any."""
+    """Return the standard deviation [SI] of one sample of a channel, from noise and resolution; 0 if not recorded."""
     if name not in recording:
         return 0.0
     return math.hypot(noise_of(recording[name]), resolution_of(recording[name]) / math.sqrt(12.0))
@@ -157,9 +158,9 @@ def _read_error(recording: Recording, name: str) -> float:
 def _of_set(
     tolerances: Tolerances, experiments: Sequence[FittedExperiment], given: set[str], stated: Mapping[str, float]
 ) -> Iterator[FreeParameter]:
-    """Return the numbers of the device that are held, each with its own uncertainty, as the fit moves them.
+    """Yield the fixed parameters of the device as fit parameters, each with its uncertainty as prior.
 
-    A number that follows another has no uncertainty of its own: it moves with that one.
+    A parameter linked to another one has no uncertainty of its own.
     """
     scenario = experiments[0].scenario
     following = {path for path, links in scenario.device.links.items() if not all(link.when_set for link in links)}
@@ -181,7 +182,7 @@ def _of_set(
 
 
 def _held(path: str, value: float, deviation: float, quantity: Quantity) -> FreeParameter:
-    """Return a number of the device that is held at a value, known to a standard deviation [SI]."""
+    """Return a fixed parameter of the device, with its standard deviation [SI] as prior, as a fit parameter."""
     low = max(quantity.minimum, value - _WIDEST * deviation)
     high = min(quantity.maximum, value + _WIDEST * deviation)
     # A volume or a friction of 0 would make no device.

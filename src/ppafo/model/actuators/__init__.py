@@ -1,1 +1,1 @@
-"""The kinds of actuator: volume and torque over angle and pressure."""
+"""Kinds of actuators: chamber volumes and torque as functions of angle and pressure."""

@@ -1,6 +1,6 @@
-"""A double-acting cylinder between two pins that drives a lever: the law of cosines between joint, base and rod end.
+"""Double-acting cylinder between two pins that drives a lever, by the law of cosines for joint, base and rod end.
 
-Chamber 1 is on the side of the piston, chamber 2 on the rod's. The cylinder grows longer with the angle.
+Chamber 1 is on the piston side, chamber 2 on the rod side. The length of the cylinder increases with the angle.
 """
 
 import math
@@ -18,13 +18,14 @@ from ppafo.model.declaration import Number
 from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
 
 LEAST_SINE = 0.05
-"""Sine of the angle between lever and base below which the lever is too near its dead centre."""
+"""Smallest sine of the angle between lever and base; below it the lever is too close to its dead centre."""
 
 
 class Cylinder(NamedTuple):
-    """Areas of piston and rod side [m^2], lever and base from the joint [m], angle between them at 0 [rad].
+    """Geometry of a cylinder: areas of piston and rod side [m^2], lever and base from the joint to the pins [m].
 
-    Then dead volumes [m^3] and the lengths between the pins at both stops [m].
+    ``lever`` and ``base`` [m], ``offset`` [rad] the angle between them at a joint angle of 0, dead volumes [m^3], and
+    the distances ``shortest`` and ``longest`` between the pins at both stops [m].
     """
 
     piston_area: float
@@ -39,9 +40,9 @@ class Cylinder(NamedTuple):
 
 
 def pins_at(lever: float, base: float, between: float) -> tuple[float, float]:
-    """Distance of the pins [m] with an angle [rad] between lever and base [m], and its growth per radian [m/rad].
+    """Distance of the pins [m] for an angle [rad] between lever and base [m], and its derivative [m/rad].
 
-    The law of cosines; the growth is the arm at which the cylinder pushes.
+    Law of cosines; the derivative is the lever arm of the cylinder force.
     """
     sine, cosine = sine_and_cosine_of_turns(between * TURNS_OF_RADIAN)
     # No test for a length of 0: ``problem`` refuses a lever near its dead centre, where the arm would vanish too.
@@ -50,7 +51,7 @@ def pins_at(lever: float, base: float, between: float) -> tuple[float, float]:
 
 
 def chambers_at(shape: Cylinder, angle: float) -> tuple[LinearChamber, LinearChamber]:
-    """Chamber on the side of the piston, which grows with the angle [rad], and the one of the rod, which shrinks."""
+    """Chamber on the piston side, which expands with the angle [rad], and chamber on the rod side, which contracts."""
     length, arm = pins_at(shape.lever, shape.base, angle + shape.offset)
     swept_1 = shape.piston_area * (length - shape.shortest)
     swept_2 = shape.rod_side_area * (shape.longest - length)
@@ -61,25 +62,25 @@ def chambers_at(shape: Cylinder, angle: float) -> tuple[LinearChamber, LinearCha
 
 
 def chambers(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> Chambers:
-    """Both chambers at an angle [rad]."""
+    """Volumes and compliances of both chambers at an angle [rad]."""
     first, second = chambers_at(plant.shape, angle)
     return linear_chambers(plant, first, second, pressure_1, pressure_2)
 
 
 def pressures(plant: ShapedPlant, angle: float, mass_1: float, mass_2: float) -> tuple[float, float]:
-    """Absolute pressures [Pa] of two masses [kg]. Equation (3)."""
+    """Absolute pressures [Pa] of both chambers for two masses [kg]. Equation (3)."""
     first, second = chambers_at(plant.shape, angle)
     return linear_pressures(plant, first, second, mass_1, mass_2)
 
 
 def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> float:
-    """Torque [N m] of two absolute pressures [Pa]; the atmosphere pushes on the rod."""
+    """Torque [N m] at two absolute pressures [Pa]; the atmospheric pressure acts on the rod."""
     first, second = chambers_at(plant.shape, angle)
     return linear_torque(plant, first, second, pressure_1, pressure_2)
 
 
 class CylinderSettings(NamedTuple):
-    """Bore, rod, lever and base of the cylinder."""
+    """Settings of a cylinder: bore, rod diameter, and geometry of the lever."""
 
     bore: Annotated[float, Number("m", "diameter of the piston", minimum=1.0e-3, maximum=0.5)]
     rod_diameter: Annotated[float, Number("m", "diameter of the rod", minimum=0.0, maximum=0.5)]
@@ -91,7 +92,7 @@ class CylinderSettings(NamedTuple):
 
 
 def prepare(settings: CylinderSettings, stops: Range) -> Cylinder:
-    """Numbers of the cylinder."""
+    """Geometry of the cylinder from settings and stops."""
     bore, rod = settings.bore, settings.rod_diameter
     lever, base, offset = settings.lever_length, settings.base_distance, settings.lever_offset
     quarter = 0.25 * math.pi
@@ -109,7 +110,7 @@ def prepare(settings: CylinderSettings, stops: Range) -> Cylinder:
 
 
 def problem(settings: CylinderSettings, stops: Range) -> str:
-    """A rod as wide as the bore, or a lever that comes to its dead centre between the stops."""
+    """Describe a rod as wide as the bore, or a lever that reaches its dead centre between the stops; else empty."""
     if settings.rod_diameter >= settings.bore:
         return "rod_diameter must be below bore"
     # Both stops suffice: between them the angle runs from one to the other, and the sine has no minimum inside.

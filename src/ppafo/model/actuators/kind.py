@@ -1,7 +1,8 @@
-"""Declaration of a kind of actuator: volumes, pressures and torque over angle, as the plant computes them.
+"""Declaration of a kind of actuator: volumes, pressures and torque as functions of the angle, as the plant uses them.
 
 Each chamber has a co-energy Phi(angle, gauge pressure) with the volume V = dPhi/dp and the torque tau = dPhi/dangle, so
-that d tau/dp = dV/dangle: what the gas gives as p dV the shaft gets. A kind is that relation as functions of floats.
+that d tau/dp = dV/dangle: the work p dV of the gas is the work on the shaft. A kind is this relation as functions of
+floats.
 """
 
 from collections import namedtuple
@@ -23,7 +24,7 @@ class Range(NamedTuple):
 
 
 class Chambers(NamedTuple):
-    """Volumes of both chambers [m^3], and how they grow with their own pressures [m^3/Pa]."""
+    """Volumes of both chambers [m^3], and their derivatives with respect to the pressure of the chamber [m^3/Pa]."""
 
     volume_1: float
     volume_2: float
@@ -33,15 +34,15 @@ class Chambers(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ActuatorModel:
-    """Compiled side of a kind; the functions take a plant, an angle [rad] and absolute pressures [Pa] or masses [kg].
+    """Compiled side of a kind; its functions take a plant, an angle [rad], and absolute pressures [Pa] or masses [kg].
 
-    ``shape`` is the NamedTuple of floats that stands as ``plant.shape``, None for the vane, which needs none;
-    ``prepare(settings, range)`` makes it from the declared settings. ``table`` is the NamedTuple of what a set names a
-    file for, which ``prepare`` is then given third; None for a kind without a file.
-    ``chambers(plant, angle, pressure_1, pressure_2)`` returns ``Chambers``, ``pressures(plant, angle, mass_1, mass_2)``
-    the two pressures at which p V = m R T, and ``torque(plant, angle, pressure_1, pressure_2)`` the torque [N m],
-    positive in plantarflexion. ``gives`` is False where no pressure widens a chamber: all compliances are 0.
-    ``has_torque_constant`` is True where the torque is ``plant.torque_constant`` times the difference of pressures.
+    ``shape`` is the NamedTuple of floats stored as ``plant.shape``, None for the vane, which needs none;
+    ``prepare(settings, range)`` makes it from the declared settings. ``table`` is the NamedTuple of a data file named
+    in a parameter set, the third argument of ``prepare``; None for a kind without a file. ``chambers(plant, angle,
+    pressure_1, pressure_2)`` returns ``Chambers``, ``pressures(plant, angle, mass_1, mass_2)`` the two pressures at
+    which p V = m R T, and ``torque(plant, angle, pressure_1, pressure_2)`` the torque [N m], positive in
+    plantarflexion. ``gives`` is False for rigid chambers, whose compliances are 0. ``has_torque_constant`` is True if
+    the torque is ``plant.torque_constant`` times the pressure difference.
     """
 
     shape: type | None
@@ -69,13 +70,13 @@ class ActuatorModel:
 
 @dataclass(frozen=True, slots=True)
 class ActuatorKind:
-    """An actuator as the catalogue knows it: name, what it is, its numbers beside stops and dead volumes, its model.
+    """Actuator in the catalogue: name, summary, settings besides stops and dead volumes, and model.
 
     ``settings`` is a NamedTuple class that declares the numbers, each an ``Annotated[float, Number(...)]``.
 
-    ``problem(settings, range)`` says in words what of the numbers does not fit together; empty where all of it does,
-    None where the declared limits say all. ``has_one_chamber(table)`` is true where chamber 2 is nothing but its dead
-    volume, in an actuator with a table (None without one).
+    ``problem(settings, range)`` describes an inconsistency between the settings, empty if there is none; None if the
+    declared limits are sufficient. ``has_one_chamber(table)`` returns whether chamber 2 is only its dead volume, in an
+    actuator with a table (None without one).
     """
 
     name: str
@@ -87,15 +88,15 @@ class ActuatorKind:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """Quantities that its settings declare."""
+        """Quantities that the settings declare."""
         return quantities_of(self.settings)
 
 
 class ShapedPlant(Protocol):
-    """A plant whose actuator is no vane: ``PlantParameters`` with the numbers of its kind. What a kind may ask of it.
+    """Plant with an actuator other than a vane: ``PlantParameters`` with the geometry of the kind.
 
-    ``displacement_per_radian`` of chamber 1 is the mean over the range, and ``torque_constant`` the same number: they
-    scale errors, and laws that were made for a vane rely on them.
+    ``displacement_per_radian`` of chamber 1 is the mean over the range, and ``torque_constant`` is the same number:
+    errors are scaled by both, and control laws designed for a vane use them.
     """
 
     shape: Any
@@ -115,14 +116,14 @@ class ShapedPlant(Protocol):
 
 
 class UnpressurisedPlant(NamedTuple):
-    """The part of a plant that a kind's ``chambers`` read, where pressures count from the atmosphere."""
+    """Plant parameters that the ``chambers`` function of a kind reads; pressures are relative to the atmosphere."""
 
     shape: Any
     atmospheric_pressure: float
 
 
 def mean_growth(shape: Any, stops: Range, gauge: float, chambers: Callable[..., Chambers]) -> float:
-    """Mean growth of chamber 1 between the stops [m^3/rad] at a gauge pressure [Pa]: torque per pressure, too."""
+    """Mean volume change of chamber 1 between the stops [m^3/rad] at a gauge pressure [Pa]: torque per pressure."""
     still = UnpressurisedPlant(shape, 0.0)
     first = chambers(still, stops.angle_min, gauge, 0.0).volume_1
     last = chambers(still, stops.angle_max, gauge, 0.0).volume_1

@@ -1,7 +1,7 @@
-"""Chambers whose volumes grow linearly with the pressure, V = rest + compliance p, as in most kinds.
+"""Chambers whose volumes grow linearly with pressure, V = rest + compliance p, as in most kinds of actuators.
 
-The co-energy of one is Phi = rest p + compliance p^2/2 at gauge pressure p, rest and compliance functions of the angle.
-Rigid chambers have no compliance.
+The co-energy of a chamber is Phi = rest p + compliance p^2/2 at the gauge pressure p, where rest and compliance are
+functions of the angle. Rigid chambers have no compliance.
 """
 
 import math
@@ -11,7 +11,7 @@ from ppafo.model.actuators.kind import Chambers, ShapedPlant
 
 
 class LinearChamber(NamedTuple):
-    """A chamber at an angle: volume at no gauge pressure [m^3], compliance [m^3/Pa], both once more per radian."""
+    """Chamber at an angle: volume at zero gauge pressure [m^3], compliance [m^3/Pa], and derivatives per radian."""
 
     rest: float
     compliance: float
@@ -20,12 +20,12 @@ class LinearChamber(NamedTuple):
 
 
 def rigid(volume: float, slope: float) -> LinearChamber:
-    """A chamber of a volume [m^3], growing with the angle [m^3/rad], that does not give under pressure."""
+    """Rigid chamber with a volume [m^3] and its derivative with respect to the angle [m^3/rad]."""
     return LinearChamber(rest=volume, compliance=0.0, rest_slope=slope, compliance_slope=0.0)
 
 
 def pressure_in(chamber: LinearChamber, content: float, atmosphere: float) -> float:
-    """Absolute pressure [Pa] at which p V is a gas content [J]."""
+    """Absolute pressure [Pa] of a chamber with a gas content p V [J]."""
     # p (rest + compliance (p - p_0)) = content is a quadratic. This form of its root subtracts no near numbers, and is
     # exact for a rigid chamber too.
     above = content - chamber.rest * atmosphere
@@ -36,7 +36,7 @@ def pressure_in(chamber: LinearChamber, content: float, atmosphere: float) -> fl
 def linear_chambers(
     plant: ShapedPlant, chamber_1: LinearChamber, chamber_2: LinearChamber, pressure_1: float, pressure_2: float
 ) -> Chambers:
-    """Both chambers at two absolute pressures [Pa]: the volumes dPhi/dp."""
+    """Volumes dPhi/dp and compliances of both chambers at two absolute pressures [Pa]."""
     room = plant.atmospheric_pressure
     return Chambers(
         volume_1=chamber_1.rest + chamber_1.compliance * (pressure_1 - room),
@@ -49,7 +49,7 @@ def linear_chambers(
 def linear_pressures(
     plant: ShapedPlant, chamber_1: LinearChamber, chamber_2: LinearChamber, mass_1: float, mass_2: float
 ) -> tuple[float, float]:
-    """Absolute pressures [Pa] of two masses [kg]. Equation (3)."""
+    """Absolute pressures [Pa] of both chambers for two masses [kg]. Equation (3)."""
     room = plant.atmospheric_pressure
     return (
         pressure_in(chamber_1, mass_1 * plant.gas_product, room),
@@ -60,7 +60,7 @@ def linear_pressures(
 def linear_torque(
     plant: ShapedPlant, chamber_1: LinearChamber, chamber_2: LinearChamber, pressure_1: float, pressure_2: float
 ) -> float:
-    """Torque [N m] of both chambers at two absolute pressures [Pa]: dPhi/dangle at gauge pressures."""
+    """Torque dPhi/dangle [N m] of both chambers at two absolute pressures [Pa]."""
     gauge_1, gauge_2 = pressure_1 - plant.atmospheric_pressure, pressure_2 - plant.atmospheric_pressure
     torque_1 = gauge_1 * (chamber_1.rest_slope + 0.5 * chamber_1.compliance_slope * gauge_1)
     return torque_1 + gauge_2 * (chamber_2.rest_slope + 0.5 * chamber_2.compliance_slope * gauge_2)

@@ -1,8 +1,9 @@
-"""A measured actuator: volumes of both chambers over angle and pressure, from a file.
+"""Measured actuator: volumes of both chambers as functions of angle and pressure, from a file.
 
-Over the angle a volume is a cubic spline through what was measured, with two continuous derivatives; over the pressure
-it runs straight from one measured pressure to the next, and no further. Its integral over the pressure is written down,
-and the torque is the derivative of that over the angle: d tau/dp = dV/dangle holds to rounding, whatever was measured.
+As a function of the angle a volume is a cubic spline through the measured values, with two continuous derivatives; as a
+function of pressure it is linear between measured pressures, and constant outside. Its integral over the pressure is
+known in closed form, and the torque is the derivative of this integral with respect to the angle: d tau/dp = dV/dangle
+holds to rounding for every measurement.
 """
 
 from typing import Annotated, NamedTuple
@@ -12,19 +13,19 @@ from ppafo.model.actuators.linear_chambers import LinearChamber, pressure_in
 from ppafo.model.declaration import Number
 
 BENDS, RISES = 8, 4
-"""Places inside the range of the angle where a spline may bend, and stretches between two measured pressures."""
+"""Number of inner knots of the splines in the angle, and number of intervals between measured pressures."""
 MOST_ANGLES, MOST_PRESSURES = BENDS + 4, RISES + 1
 
 
 class Curve(NamedTuple):
-    """A cubic spline [m^3] over the share of the range: four coefficients of powers, one for each bend."""
+    """Cubic spline [m^3] over the relative angle: four polynomial coefficients, and one coefficient per inner knot."""
 
     powers: Annotated[tuple[float, ...], 4]
     bends: Annotated[tuple[float, ...], BENDS]
 
 
 class Rise(NamedTuple):
-    """A stretch between two gauge pressures [Pa]: its lower end, its length, and what the volume gains over it."""
+    """Interval between two gauge pressures [Pa]: lower end, length, and volume gain over the interval."""
 
     lower: float
     length: float
@@ -32,14 +33,18 @@ class Rise(NamedTuple):
 
 
 class TabulatedChamber(NamedTuple):
-    """A chamber: its volume [m^3] up to the lowest pressure measured, then stretch by stretch."""
+    """Tabulated chamber: volume [m^3] up to the lowest measured pressure, and gains of the pressure intervals."""
 
     lowest: Curve
     rises: Annotated[tuple[Rise, ...], RISES]
 
 
 class Table(NamedTuple):
-    """Both chambers over the share of a range of angles: where it begins [rad], one over its length, its bends [-]."""
+    """Volumes of both chambers over the relative angle, which is 0 to 1 from the first to the last angle.
+
+    ``first_angle`` and ``last_angle`` [rad], ``per_angle`` the inverse of their difference [1/rad], and ``bends`` the
+    inner knots of the splines [-].
+    """
 
     first_angle: float
     last_angle: float
@@ -50,7 +55,7 @@ class Table(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """A table with dead volumes beside it [m^3], passive stiffness [N m/rad], and where that gives no torque [rad]."""
+    """Table with additional dead volumes [m^3], passive stiffness [N m/rad], and its angle of zero torque [rad]."""
 
     table: Table
     dead_volume_1: float
@@ -60,14 +65,14 @@ class Measured(NamedTuple):
 
 
 class Level(NamedTuple):
-    """Volume of a chamber [m^3] and its slope over the angle [m^3/rad] at one pressure."""
+    """Volume of a chamber [m^3] and its derivative with respect to the angle [m^3/rad] at one pressure."""
 
     volume: float
     slope: float
 
 
 def bases_at(table: Table, angle: float) -> tuple[Curve, Curve]:
-    """Factors of the coefficients of all curves of a table at an angle [rad]: for value and slope [1/rad]."""
+    """Spline basis of a table at an angle [rad], for the value [-] and the slope [1/rad]."""
     # Truncated powers: the cube of max(share - bend, 0) begins at its bend with two continuous derivatives.
     share = (angle - table.first_angle) * table.per_angle
     square, per = share * share, table.per_angle
@@ -92,7 +97,7 @@ def bases_at(table: Table, angle: float) -> tuple[Curve, Curve]:
 
 
 def curve_value(curve: Curve, basis: Curve) -> float:
-    """Value of a curve, or of its slope, at an angle where the basis of the spline is known."""
+    """Value of a spline, or its slope, for the basis at an angle."""
     a, b, c, d = curve.powers, basis.powers, curve.bends, basis.bends
     smooth = (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
     low = (c[0] * d[0] + c[1] * d[1]) + (c[2] * d[2] + c[3] * d[3])
@@ -100,12 +105,12 @@ def curve_value(curve: Curve, basis: Curve) -> float:
 
 
 def level_of(curve: Curve, bases: tuple[Curve, Curve]) -> Level:
-    """Value and slope of a curve over the angle."""
+    """Value and slope of a spline at an angle."""
     return Level(curve_value(curve, bases[0]), curve_value(curve, bases[1]))
 
 
 def levels_of(chamber: TabulatedChamber, bases: tuple[Curve, Curve], dead_volume: float) -> tuple[Level, ...]:
-    """A chamber with a dead volume [m^3] at an angle: up to the lowest pressure, and what each stretch adds."""
+    """Volume of a chamber with its dead volume [m^3] at the lowest pressure, and gain of each pressure interval."""
     lowest, rises = level_of(chamber.lowest, bases), chamber.rises
     return (
         Level(lowest.volume + dead_volume, lowest.slope),
@@ -117,18 +122,18 @@ def levels_of(chamber: TabulatedChamber, bases: tuple[Curve, Curve], dead_volume
 
 
 def share_of(rise: Rise, gauge: float) -> float:
-    """Share of a stretch [-] below a gauge pressure [Pa]."""
+    """Fraction of a pressure interval [-] below a gauge pressure [Pa]."""
     return max(0.0, min(1.0, (gauge - rise.lower) / rise.length))
 
 
 def filled_share(rise: Rise, gauge: float) -> float:
-    """Integral of ``share_of`` over the pressure, from the lower end of its stretch to a gauge pressure [Pa]."""
+    """Integral of ``share_of`` [Pa] from the lower end of the interval to a gauge pressure [Pa]."""
     inside = share_of(rise, gauge)
     return rise.length * 0.5 * inside * inside + max(gauge - rise.lower - rise.length, 0.0)
 
 
 def filled_from_vented(rise: Rise, gauge: float) -> float:
-    """Integral of ``share_of`` over the pressure, from 0 to a gauge pressure [Pa]."""
+    """Integral of ``share_of`` [Pa] from a gauge pressure of 0 to a gauge pressure [Pa]."""
     # A stretch below the atmosphere is filled in part where the chamber is vented.
     return filled_share(rise, gauge) - filled_share(rise, 0.0)
 
@@ -142,20 +147,20 @@ def volume_at(chamber: TabulatedChamber, levels: tuple[Level, ...], gauge: float
 
 
 def compliance_in(rise: Rise, gain: Level, gauge: float) -> float:
-    """Growth of the volume with the pressure [m^3/Pa] in a stretch, 0 outside."""
+    """Compliance [m^3/Pa] within a pressure interval, 0 outside."""
     # Half-open, so that no two stretches both count where they meet.
     return gain.volume / rise.length if gauge >= rise.lower and gauge < rise.lower + rise.length else 0.0
 
 
 def compliance_at(chamber: TabulatedChamber, levels: tuple[Level, ...], gauge: float) -> float:
-    """Growth of the volume with the pressure [m^3/Pa] at a gauge pressure [Pa]."""
+    """Compliance of a chamber [m^3/Pa] at a gauge pressure [Pa]."""
     rises = chamber.rises
     low = compliance_in(rises[0], levels[1], gauge) + compliance_in(rises[1], levels[2], gauge)
     return low + (compliance_in(rises[2], levels[3], gauge) + compliance_in(rises[3], levels[4], gauge))
 
 
 def chamber_torque(chamber: TabulatedChamber, levels: tuple[Level, ...], gauge: float) -> float:
-    """Torque [N m] at a gauge pressure [Pa]: the integral of the volume's slope over the pressure."""
+    """Torque [N m] of a chamber at a gauge pressure [Pa]: the pressure integral of the volume's slope."""
     rises = chamber.rises
     low = levels[1].slope * filled_from_vented(rises[0], gauge) + levels[2].slope * filled_from_vented(rises[1], gauge)
     high = levels[3].slope * filled_from_vented(rises[2], gauge) + levels[4].slope * filled_from_vented(rises[3], gauge)
@@ -163,7 +168,7 @@ def chamber_torque(chamber: TabulatedChamber, levels: tuple[Level, ...], gauge: 
 
 
 def stretch_pressure(rise: Rise, gain: Level, volume: float, found: float, content: float, atmosphere: float) -> float:
-    """Absolute pressure [Pa] in a stretch that the gas content [J] reaches; else the one found below it."""
+    """Absolute pressure [Pa] for a gas content [J] in the interval, else the pressure ``found`` in a lower one."""
     begin = rise.lower + atmosphere
     stretch = LinearChamber(
         rest=volume, compliance=gain.volume / rise.length, rest_slope=gain.slope, compliance_slope=0.0
@@ -177,7 +182,7 @@ def stretch_pressure(rise: Rise, gain: Level, volume: float, found: float, conte
 
 
 def pressure_at(chamber: TabulatedChamber, levels: tuple[Level, ...], content: float, atmosphere: float) -> float:
-    """Absolute pressure [Pa] at which p V is a gas content [J]."""
+    """Absolute pressure [Pa] of a chamber with a gas content p V [J]."""
     rises = chamber.rises
     volume = levels[0].volume
     pressure = stretch_pressure(rises[0], levels[1], volume, content / volume, content, atmosphere)
@@ -189,7 +194,7 @@ def pressure_at(chamber: TabulatedChamber, levels: tuple[Level, ...], content: f
 
 
 def chambers(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> Chambers:
-    """Both chambers at an angle [rad]."""
+    """Volumes and compliances of both chambers at an angle [rad] and two absolute pressures [Pa]."""
     shape: Measured = plant.shape
     room = plant.atmospheric_pressure
     first, second, bases = shape.table.chamber_1, shape.table.chamber_2, bases_at(shape.table, angle)
@@ -204,7 +209,7 @@ def chambers(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: fl
 
 
 def pressures(plant: ShapedPlant, angle: float, mass_1: float, mass_2: float) -> tuple[float, float]:
-    """Absolute pressures [Pa] of two masses [kg]. Equation (3)."""
+    """Absolute pressures [Pa] of both chambers for two masses [kg]. Equation (3)."""
     shape: Measured = plant.shape
     room = plant.atmospheric_pressure
     first, second, bases = shape.table.chamber_1, shape.table.chamber_2, bases_at(shape.table, angle)
@@ -215,7 +220,7 @@ def pressures(plant: ShapedPlant, angle: float, mass_1: float, mass_2: float) ->
 
 
 def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> float:
-    """Torque [N m] of two absolute pressures [Pa] and of the passive stiffness."""
+    """Torque [N m] of both chambers at two absolute pressures [Pa], and of the passive stiffness."""
     shape: Measured = plant.shape
     room = plant.atmospheric_pressure
     first, second, bases = shape.table.chamber_1, shape.table.chamber_2, bases_at(shape.table, angle)
@@ -226,13 +231,13 @@ def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: floa
 
 
 def has_one_chamber(table: Table) -> bool:
-    """True where the volume of chamber 2 is 0 at every angle and pressure."""
+    """Return whether the volume of chamber 2 is 0 at every angle and pressure."""
     curves = (table.chamber_2.lowest, *(rise.gain for rise in table.chamber_2.rises))
     return not any(number for curve in curves for number in (*curve.powers, *curve.bends))
 
 
 class TableSettings(NamedTuple):
-    """Settings of an actuator by table: what its material does without pressure."""
+    """Settings of a tabulated actuator: passive stiffness without pressure, and its angle of zero torque."""
 
     passive_stiffness: Annotated[
         float, Number("N m/rad", "torque of the material per angle from rest", 0.0, 0.0, 1.0e4)
@@ -241,7 +246,7 @@ class TableSettings(NamedTuple):
 
 
 def prepare(settings: TableSettings, stops: Range, table: Table) -> Measured:
-    """Numbers of the actuator."""
+    """Numbers of the actuator from settings, stops and table."""
     return Measured(
         table=table,
         dead_volume_1=stops.dead_volume_1,

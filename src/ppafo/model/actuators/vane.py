@@ -1,7 +1,7 @@
-"""The vane of the paper: two chambers whose volumes run linearly with the angle. Equations (2), (4), (5).
+"""Vane of the paper: two chambers whose volumes are linear in the angle. Equations (2), (4), (5).
 
-By virtual work the displacement per radian is the torque constant, and follows it; a set may state another, as it was
-reported: then the shaft does not get the work of the gas (docs/decisions/0014).
+By virtual work the displacement per radian equals the torque constant, and is derived from it by default. A parameter
+set may give another value, as reported: then the shaft does not receive the work of the gas (docs/decisions/0014).
 """
 
 from typing import Annotated, Any, NamedTuple
@@ -12,22 +12,22 @@ from ppafo.model.plant import PlantParameters, chamber_pressures, chamber_volume
 
 
 def chambers(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float) -> Chambers:
-    """Both chambers, which no pressure widens. Equations (4), (5)."""
+    """Both chambers, which are rigid. Equations (4), (5)."""
     volume_1, volume_2 = chamber_volumes(plant, angle)
     return Chambers(volume_1=volume_1, volume_2=volume_2, compliance_1=0.0, compliance_2=0.0)
 
 
 def prepare(_settings: Any, _stops: Range) -> None:
-    """Nothing: the numbers of a vane stand in the plant itself."""
+    """None, because the numbers of a vane are fields of the plant."""
 
 
 MODEL = ActuatorModel(None, prepare, chambers, chamber_pressures, joint_torque, gives=False, has_torque_constant=True)
 SMALLEST_VOLUME = 1e-18
-"""A cube of a micrometre [m^3]: less is a slip, and what is divided by it leaves the range of floats."""
+"""Smallest volume [m^3], a cube of a micrometre: a smaller value is a typing error, and dividing by it may overflow."""
 
 
 class VaneSettings(NamedTuple):
-    """Torque per pressure, and displacement per radian."""
+    """Settings of a vane: torque per pressure, and displacement per radian."""
 
     torque_constant: Annotated[float, Number("m^3", "torque per pressure difference", minimum=SMALLEST_VOLUME)]
     displacement_per_radian: Annotated[float, Number("m^3/rad", "displacement per radian", minimum=SMALLEST_VOLUME)]

@@ -1,1 +1,1 @@
-"""Physical effects beside the paper's equations: one module each, and the catalogue of them."""
+"""Physical effects in addition to the paper's equations: one module each, and the catalogue of effects."""

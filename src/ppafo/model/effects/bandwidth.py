@@ -1,4 +1,4 @@
-"""Sensors that follow with a bandwidth: what a controller sees lags behind, each signal by a first order."""
+"""Sensors with a bandwidth: each signal of the controller has a first-order lag."""
 
 import math
 from typing import Annotated, Any, NamedTuple
@@ -10,14 +10,14 @@ from ppafo.model.sensors import follow, follow_rate
 
 
 class SensorRates(NamedTuple):
-    """Rates [1/s] at which the angle sensor and the pressure sensors follow, 2 pi times the bandwidth; 0: at once."""
+    """Rates [1/s] of angle sensor and pressure sensors, 2 pi times the bandwidth; 0 for a sensor without lag."""
 
     angle: float
     pressure: float
 
 
 class SensorState(NamedTuple):
-    """Angle [rad] and absolute pressures [Pa] as the sensors show them."""
+    """Readings of the sensors: angle [rad] and absolute pressures [Pa]."""
 
     angle: float
     pressure_1: float
@@ -25,7 +25,7 @@ class SensorState(NamedTuple):
 
 
 class Bandwidths(NamedTuple):
-    """Settings of sensors that follow with a lag: a bandwidth [Hz] for each signal."""
+    """Settings of sensors with a lag: a bandwidth [Hz] for each signal."""
 
     angle_bandwidth: Annotated[
         float, Number("Hz", "bandwidth of the angle sensor, 0 for an instant one", 0.0, 0.0, 1.0e6)
@@ -45,7 +45,7 @@ def prepare(settings: Bandwidths, _device: Any) -> SensorRates:
 def sensor_readings(
     angle: float, pressure_1: float, pressure_2: float, bandwidth: SensorRates, bandwidth_state: SensorState
 ) -> tuple[float, float, float]:
-    """Angle [rad] and absolute pressures [Pa] that the sensors show; a sensor without a bandwidth shows the truth."""
+    """Sensor readings of angle [rad] and absolute pressures [Pa]; a sensor without a bandwidth reads the true value."""
     follows_angle, follows_pressure = bandwidth.angle > 0.0, bandwidth.pressure > 0.0
     true_angle, true_1, true_2 = shown_signals(angle, pressure_1, pressure_2)
     return (
@@ -56,7 +56,7 @@ def sensor_readings(
 
 
 def start(_bandwidth: SensorRates, now: PlantSnapshot) -> SensorState:
-    """State of sensors that show the true values when a run begins."""
+    """State of the sensors at the start of a run, equal to the true values."""
     return SensorState(angle=now.angle, pressure_1=now.pressure_1, pressure_2=now.pressure_2)
 
 
@@ -73,7 +73,7 @@ def advance(
 
 
 def slopes(bandwidth: SensorRates, bandwidth_state: SensorState, now: PlantSnapshot) -> SensorState:
-    """Rates of what the sensors show [rad/s, Pa/s]."""
+    """Rates of the sensor readings [rad/s, Pa/s]."""
     return SensorState(
         angle=follow_rate(bandwidth.angle, bandwidth_state.angle, now.angle),
         pressure_1=follow_rate(bandwidth.pressure, bandwidth_state.pressure_1, now.pressure_1),

@@ -1,4 +1,4 @@
-"""Coils of solenoid valves that warm while they are on: a hot coil has more resistance, and lifts its valve later."""
+"""Heating of solenoid coils that are on: a hot coil has more resistance, and opens its valve later."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -14,9 +14,9 @@ COPPER = 3.93e-3
 
 
 class CoilHeating(NamedTuple):
-    """Rise of a coil that is always on [K], rate at which it comes there [1/s], opening time over the cold one.
+    """Steady temperature rise of a coil that is always on [K], its rate [1/s], coefficients of the opening time.
 
-    The last is ``1 + slowing x + slowing_squared x^2`` for a rise of ``x`` [K].
+    The opening time relative to a cold coil is ``1 + slowing x + slowing_squared x^2`` for a rise of ``x`` [K].
     """
 
     steady_rise: float
@@ -26,24 +26,24 @@ class CoilHeating(NamedTuple):
 
 
 class CoilRises(NamedTuple):
-    """Rises of both coils over the room [K], cold at the start."""
+    """Temperature rises of both coils over the room [K]; 0 at the start."""
 
     rise_a: float = 0.0
     rise_b: float = 0.0
 
 
 def relative_opening_time(rise: float, pull_in_share: float) -> float:
-    """Opening time of a coil relative to a cold one [-], at a rise [K].
+    """Opening time of a coil relative to a cold one [-], at a temperature rise [K].
 
-    The current in a coil rises as ``i = u/R (1 - exp(-R t/L))`` to the one that lifts the valve, which is a share ``q``
-    of the cold coil's last current: ``t/t_0 = ln(1 - q r) / (r ln(1 - q))`` with ``r = R/R_0 = 1 + alpha x``.
+    The current in a coil rises as ``i = u/R (1 - exp(-R t/L))`` to the pull-in current, which is a fraction ``q`` of
+    the cold coil's steady current: ``t/t_0 = ln(1 - q r) / (r ln(1 - q))`` with ``r = R/R_0 = 1 + alpha x``.
     """
     ratio = 1.0 + COPPER * rise
     return logarithm(1.0 - pull_in_share * ratio) / (ratio * logarithm(1.0 - pull_in_share))
 
 
 class CoilSettings(NamedTuple):
-    """Temperature rise and time constant of a coil, and current that lifts its valve."""
+    """Settings of a coil: temperature rise, time constant, and pull-in current of the valve."""
 
     steady_rise: Annotated[
         float, Number("K", "rise of temperature of a coil that is always on, 0 for none", 0.0, 0.0, 100.0)
@@ -57,9 +57,9 @@ class CoilSettings(NamedTuple):
 
 
 def prepare(settings: CoilSettings, _device: Any) -> CoilHeating:
-    """Parameters from the settings, with the parabola through a cold, a half warm and a hot coil.
+    """Parameters from the settings; a parabola is fitted through a cold, a half warm and a hot coil.
 
-    It is within 0.6 % of the formula for every allowed rise and share, and needs no logarithm in each step.
+    The parabola is within 0.6 % of the formula for every allowed rise and share, and avoids a logarithm in each step.
     """
     # A parabola through three points of the formula, exact at no rise, half and full rise.
     steady, share = settings.steady_rise, settings.pull_in_share
@@ -75,7 +75,7 @@ def prepare(settings: CoilSettings, _device: Any) -> CoilHeating:
 
 
 def warm_opening_time(time: float, is_coil_a: float, coil_heating: CoilHeating, coil_heating_state: CoilRises) -> float:
-    """Time [s] from energising to flow of a coil as warm as it is then."""
+    """Time [s] from energising to flow at the present coil temperature."""
     rise = coil_heating_state.rise_a if is_coil_a > 0.5 else coil_heating_state.rise_b
     return opening_time(time, is_coil_a) * (1.0 + rise * (coil_heating.slowing + rise * coil_heating.slowing_squared))
 
@@ -83,7 +83,7 @@ def warm_opening_time(time: float, is_coil_a: float, coil_heating: CoilHeating, 
 def advance(
     coil_heating: CoilHeating, coil_heating_state: CoilRises, _before: PlantSnapshot, after: PlantSnapshot, step: float
 ) -> CoilRises:
-    """Rises [K] after a step [s] with one command: ``dx/dt = (x_s on - x) / tau``, solved exactly."""
+    """Temperature rises [K] after a step [s] with one command: ``dx/dt = (x_s on - x) / tau``, solved exactly."""
     on_a, on_b = coil_commands(after.command)
     kept, mean = decay_factors(coil_heating.warming, step)
     gained = step * mean * coil_heating.warming * coil_heating.steady_rise
@@ -93,7 +93,7 @@ def advance(
 
 
 def slopes(coil_heating: CoilHeating, coil_heating_state: CoilRises, now: PlantSnapshot) -> CoilRises:
-    """Rates [K/s] of the rises in temperature of both coils."""
+    """Rates [K/s] of the temperature rises of both coils."""
     on_a, on_b = coil_commands(now.command)
     return CoilRises(
         rise_a=coil_heating.warming * (coil_heating.steady_rise * on_a - coil_heating_state.rise_a),

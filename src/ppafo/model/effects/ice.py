@@ -1,4 +1,4 @@
-"""Ice at the exhaust of the valve: cold gas lets moisture freeze there, which narrows the path and melts again."""
+"""Ice at the exhaust of the valve: moisture freezes in the cold gas, which narrows the exhaust, and melts again."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -9,20 +9,20 @@ from ppafo.model.sensors import decay_factors
 
 
 class Ice(NamedTuple):
-    """Blockage per gas that leaves [1/kg], and the rate at which it melts [1/s]."""
+    """Blockage per exhausted gas [1/kg], and melting rate [1/s]."""
 
     blockage_per_gas: float
     melting: float
 
 
 class IceState(NamedTuple):
-    """Blockage [-]: the exhaust conductance is divided by 1 + blockage. It starts without ice."""
+    """Blockage [-], 0 at the start; the exhaust conductance is divided by 1 + blockage."""
 
     blockage: float = 0.0
 
 
 class IceSettings(NamedTuple):
-    """Settings of ice in the vents: how it grows and melts, and how far it may block them."""
+    """Settings of ice in the exhaust: growth and melting."""
 
     blockage_per_gas: Annotated[float, Number("1/kg", "blockage per gas that leaves, 0 for none", 0.0, 0.0, 1.0e6)]
     melting_time: Annotated[float, Number("s", "time constant with which it melts", 30.0, 1.0e-3, 1.0e6)]
@@ -34,20 +34,20 @@ def prepare(settings: IceSettings, _device: Any) -> Ice:
 
 
 def iced_path(conductance: float, ice_state: IceState) -> float:
-    """Conductance [kg/(s Pa)] of the exhaust path with ice in it; ``C / (1 + s)``."""
+    """Conductance [kg/(s Pa)] of the exhaust path with ice; ``C / (1 + s)``."""
     # A stage of a step extrapolates the state, below 0 too.
     return exhaust_path(conductance / (1.0 + max(ice_state.blockage, 0.0)))
 
 
 def advance(ice: Ice, ice_state: IceState, _before: PlantSnapshot, after: PlantSnapshot, step: float) -> IceState:
-    """Blockage [-] after a step [s] with the mean flow in it: ``ds/dt = g m' - s / tau``, solved exactly."""
+    """Blockage [-] after a step [s] with the mean flow of the step: ``ds/dt = g m' - s / tau``, solved exactly."""
     # Only gas that leaves grows ice; what flows in from the atmosphere does not melt it either.
     kept, mean = decay_factors(ice.melting, step)
     return IceState(kept * ice_state.blockage + step * mean * ice.blockage_per_gas * max(after.vented_flow, 0.0))
 
 
 def slopes(ice: Ice, ice_state: IceState, now: PlantSnapshot) -> IceState:
-    """Rates [1/s] at which ice blocks the vents."""
+    """Rate of the blockage [1/s]."""
     # The same balance as in ``advance``, for the solver in continuous time.
     return IceState(ice.blockage_per_gas * max(now.vented_flow, 0.0) - ice.melting * ice_state.blockage)
 

@@ -1,4 +1,4 @@
-"""Loads at the joint beside the foot plate: drag, spring, and weight of a link."""
+"""Loads at the joint in addition to the foot plate: drag, spring, and weight of a link."""
 
 import math
 from typing import Annotated, NamedTuple
@@ -10,7 +10,7 @@ from ppafo.model.ports import load_torque
 
 
 class JointLoad(NamedTuple):
-    """Settings of a load at the joint, which are its parameters."""
+    """Parameters of a load at the joint, equal to its settings."""
 
     drag: Annotated[float, Number("N m s^2/rad^2", "drag torque per square of the rate", 0.0, 0.0, 1.0e3)]
     stiffness: Annotated[float, Number("N m/rad", "stiffness of a spring", 0.0, 0.0, 1.0e4)]
@@ -21,7 +21,7 @@ class JointLoad(NamedTuple):
 
 
 def joint_load_torque(torque: float, angle: float, rate: float, joint_load: JointLoad) -> float:
-    """Torque [N m] that drag, spring and weight take from the joint: ``c w |w| + k (theta - theta_0) + T_w(theta)``."""
+    """Load torque [N m] of drag, spring and weight at the joint: ``c w |w| + k (theta - theta_0) + T_w(theta)``."""
     others = load_torque(torque, angle, rate)
     drag = joint_load.drag * rate * abs(rate)
     spring = joint_load.stiffness * (angle - joint_load.rest_angle)

@@ -1,7 +1,7 @@
-"""Physical effect as one value, from which every part of the package takes its share.
+"""Physical effect as one value, from which every part of the package derives its share.
 
 Files, overrides, columns of studies, fits, exported libraries, the page, linear models, the reference solver and walks
-know an effect by this value alone; none of them names one.
+use an effect by this value alone; none of them names an effect.
 """
 
 import inspect
@@ -14,14 +14,14 @@ from ppafo.model.declaration import PlainFunction, Quantity, quantities_of
 from ppafo.model.gas import SPECIES
 
 SECTION = "effects"
-"""Section of a parameter set, and begin of the paths, that hold the settings of effects."""
+"""Section of a parameter set with the settings of effects, and first part of their paths."""
 
 
 class PlantSnapshot(NamedTuple):
-    """State of the plant that an effect depends on: angle [rad], its rate [rad/s], absolute pressures [Pa].
+    """State of the plant on which an effect depends: angle [rad], its rate [rad/s], absolute pressures [Pa].
 
-    Flows [kg/s] from the supplies and to the atmosphere, and the command that the valve has [-]. At both ends of a step
-    that is done the flows are their means over it.
+    Flows [kg/s] from the supplies and to the atmosphere, and the valve command [-]. For a completed step both snapshots
+    contain the mean flows of the step.
     """
 
     angle: float
@@ -35,16 +35,16 @@ class PlantSnapshot(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """State of an effect: ``row``, a NamedTuple of floats, and how it changes.
+    """State of an effect: ``row``, a NamedTuple of floats, and its dynamics.
 
-    ``start(row, now)`` makes it from the effect's parameters and the plant at the beginning; None where the defaults of
-    ``row`` are the state then. ``advance(row, state, before, after, step)`` brings it over a step [s] between two
-    instants. ``slopes(row, state, now)`` are its rates in continuous time: the reference solver integrates them, and
-    the second stage of a step has ``state + step * slopes`` where a law acts on the gas. ``tolerances`` has for each
-    number the error of one step that is allowed, for which ``advance`` less ``state + step * slopes`` stands; without
-    any, as where ``advance`` is exact, the state shortens no step. ``settle(row, state, command)`` is the state after
-    what changes at once where the valve gets a command: a step does it in ``advance``, the reference solver between two
-    stretches.
+    ``start(row, now)`` makes the initial state from the effect's parameters and the plant at the start; None if the
+    initial state is the defaults of ``row``. ``advance(row, state, before, after, step)`` returns the state after a
+    step [s] between two snapshots. ``slopes(row, state, now)`` returns the rates in continuous time: the reference
+    solver integrates them, and the second stage of a step uses ``state + step * slopes`` where a law acts on the gas.
+    ``tolerances`` contains the permissible error of each number in one step, estimated by ``advance`` minus ``state +
+    step * slopes``; without tolerances, as where ``advance`` is exact, the state limits no step. ``settle(row, state,
+    command)`` returns the state after the instantaneous change at a new valve command: a step does this in ``advance``,
+    the reference solver between two integration intervals.
     """
 
     row: type
@@ -63,29 +63,29 @@ class State:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Effect:
-    """A physical effect: its name in files, what it is, its settings in SI, its parameters, and its laws.
+    """Physical effect: name in files, summary, settings in SI units, parameters, and laws.
 
     ``settings`` is a NamedTuple class that declares them, each an ``Annotated[float, Number(...)]``.
 
-    ``switch`` names settings, none of them ever below 0; where all of them are 0 the effect is off, and programs are
-    composed without it: they have the bits that they would have if it did not exist. One that is ``always`` on has no
-    switch, and its settings are numbers that every device has, in a section of its own of a parameter set.
+    ``switch`` names settings that are never below 0; if all of them are 0 the effect is off, and programs are composed
+    without the effect, bit for bit as if it did not exist. An effect that is ``always`` on has no switch: its settings
+    are numbers of every device, in a separate section of a parameter set.
 
-    ``prepare(settings, device)`` makes the NamedTuple ``parameters`` from the settings and the numbers of the
-    device (``device.gas``, ``.actuator``, ``.friction``, ``.foot_plate`` and ``.supply``, by their names in a parameter
-    set). It must be in the subset that is compiled, for an exported library has it in C. None where the parameters are
-    the settings in their order, which columns of an ensemble then fill without a call for each run.
+    ``prepare(settings, device)`` makes the NamedTuple ``parameters`` from the settings and the numbers of the device
+    (``device.gas``, ``.actuator``, ``.friction``, ``.foot_plate`` and ``.supply``, by their names in a parameter set).
+    It must be in the compiled subset of Python, because an exported library has it in C. None if the parameters are the
+    settings in order, which columns of an ensemble then fill without a call for each run.
 
-    ``laws`` has for ports of ``ppafo.model.ports`` the functions that act there. A law takes what its port takes,
-    and its parameters by the effect's name as one more argument, which the caller of the port passes on. A law that
-    calls its own port gets the law of the effect before, or the port as it is without effects.
+    ``laws`` maps ports of ``ppafo.model.ports`` to the functions that act there. A law takes the arguments of its port,
+    and its parameters in an additional argument with the name of the effect, which the caller of the port passes on. A
+    law that calls its own port calls the law of the previous effect, or the port as it is without effects.
 
-    ``state`` says how the effect's own state changes, which laws take as ``NAME_state``; None where it has none.
+    ``state`` declares the dynamics of the effect's own state, which laws take as ``NAME_state``; None without a state.
 
-    ``of_gas`` has for settings whose default is a property of the gas these defaults [SI] by species, for all species.
+    ``of_gas`` maps settings whose default is a property of the gas to these defaults [SI] by species, for all species.
 
-    ``source`` says where law and numbers are from, ``equation`` is its line of the equations; ``symbols`` are lines of
-    the nomenclature: symbol, name in the code, unit, meaning.
+    ``source`` is the source of law and numbers, ``equation`` is the line of the effect in the equations; ``symbols``
+    are lines of the nomenclature: symbol, name in the code, unit, meaning.
     """
 
     name: str
@@ -105,41 +105,41 @@ class Effect:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """Quantities that its settings declare."""
+        """Quantities that the settings declare."""
         return quantities_of(self.settings)
 
     @property
     def section(self) -> str:
-        """Section of its settings in files and start of their paths; by default, in a parameter set."""
+        """Section of the settings in files and start of their paths; by default, in a parameter set."""
         return self.section_of_files or f"{SECTION}.{self.name}"
 
     @property
     def is_of_device(self) -> bool:
-        """Tell whether its settings belong to a parameter set, beside the numbers of the device."""
+        """Return whether the settings belong to a parameter set, with the numbers of the device."""
         return not self.section_of_files
 
     @property
     def state_name(self) -> str:
-        """Name of its state in a program, and the parameter by which laws take it."""
+        """Name of the state in a program, and of the parameter by which laws take it."""
         return f"{self.name}_state"
 
     @property
     def rows(self) -> tuple[str, ...]:
-        """Names of the structs that its laws may take."""
+        """Names of the structs that the laws may take."""
         return (self.name,) if self.state is None else (self.name, self.state_name)
 
     def quantities_in(self, species: str) -> tuple[Quantity, ...]:
-        """Settings with the defaults that they have in a gas; the declaration's own in one that is unknown."""
+        """Settings with their defaults in a gas; with the declared defaults for an unknown gas."""
         return tuple(
             replace(item, default=self.of_gas.get(item.name, {}).get(species, item.default)) for item in self.quantities
         )
 
     def defaults(self, species: str = "") -> dict[str, float]:
-        """Settings [SI] of a device with a gas that says nothing of the effect."""
+        """Default settings [SI] of a device with a gas whose parameter set does not mention the effect."""
         return {item.name: float(item.default or 0.0) for item in self.quantities_in(species)}
 
     def is_on(self, settings: Mapping[str, Any]) -> Any:
-        """Tell whether the effect is on with some settings; an array of truth values if some are arrays (runs,)."""
+        """Return whether the effect is on with some settings; an array of truth values if some are arrays (runs,)."""
         found: Any = self.always
         for name in self.switch:
             # Not "or": settings may be columns of an ensemble.
@@ -148,7 +148,7 @@ class Effect:
 
 
 def effect_problem(effect: Effect) -> str:
-    """Return what is wrong with an effect as a value, in words; empty where nothing is."""
+    """Describe the first fault in the declaration of an effect; empty if there is none."""
     return next(_problems(effect), "")
 
 
@@ -184,10 +184,10 @@ def _problems(effect: Effect) -> Iterator[str]:
 
 
 def laws_in_order(effects: Sequence[Effect]) -> dict[Any, Any]:
-    """Return the law for each port, and under pairs of law and port what a law that calls its port gets.
+    """Return the law for each port, and for each pair of law and port the function that the law calls as its port.
 
-    Effects act in the order in which they are given: each but the first at a port must call it, or it would be as if
-    those before it did not exist. ProgramError where one does not.
+    Effects act in the given order: each effect but the first at a port must call the port, otherwise it would disable
+    the effects before it. Raises ProgramError if one does not.
     """
     found: dict[Any, Any] = {}
     last: dict[Any, Effect] = {}

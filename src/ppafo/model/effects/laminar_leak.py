@@ -1,4 +1,4 @@
-"""A laminar leak beside the orifice between the chambers: a long, narrow gap, as a seal leaves along its lip."""
+"""Laminar leak parallel to the orifice between the chambers: a long, narrow gap along the lip of a seal."""
 
 from typing import Annotated, NamedTuple
 
@@ -9,7 +9,7 @@ from ppafo.model.ports import leakage_path
 
 
 class LaminarLeak(NamedTuple):
-    """Coefficient [kg/(s Pa^2)] of the flow of the gap."""
+    """Coefficient [kg/(s Pa^2)] of the laminar flow through the gap."""
 
     coefficient: Annotated[
         float, Number("kg/(s Pa^2)", "laminar leak between the chambers: flow over P_1^2 - P_2^2", 0.0, 0.0, 1.0e-12)
@@ -19,10 +19,11 @@ class LaminarLeak(NamedTuple):
 def leak_with_gap(
     conductance: float, pressure_1: float, pressure_2: float, curve: FlowCurve, laminar_leak: LaminarLeak
 ) -> float:
-    """Conductance [kg/(s Pa)] of an orifice that passes as much as leak and gap together, ``c (P_1^2 - P_2^2)`` more.
+    """Conductance [kg/(s Pa)] of an orifice that passes the flow of leak and gap together, ``c (P_1^2 - P_2^2)`` more.
 
-    An orifice passes ``C P_up psi(r)``, so that the gap is ``c (P_up + P_dn) (1 - r) / psi(r)`` of ``C``. Near equal
-    pressures both 1 - r and psi go to zero on a straight line, and their quotient is that at its end.
+    The flow of an orifice is ``C P_up psi(r)``, so that the gap adds ``c (P_up + P_dn) (1 - r) / psi(r)`` to ``C``.
+    Near equal pressures both 1 - r and psi are linear and go to zero; their quotient is the one at the end of the
+    linear region.
     """
     upstream, downstream = max(pressure_1, pressure_2), min(pressure_1, pressure_2)
     ratio = min(downstream / upstream, curve.linear_ratio)

@@ -1,4 +1,4 @@
-"""A leak that opens: below some pressure between the chambers the seal of the vane is tight."""
+"""Leak with an opening pressure: below this pressure difference the seal of the vane is tight."""
 
 from typing import Annotated, NamedTuple
 
@@ -9,14 +9,14 @@ from ppafo.model.ports import leakage_path
 
 
 class LeakOpening(NamedTuple):
-    """Pressure between the chambers at which the leak begins [Pa], above 0, and how slowly it then opens [-]."""
+    """Pressure difference between the chambers at which the leak opens [Pa], above 0, and relative rise width [-]."""
 
     opening_pressure: float
     opening_rise: float
 
 
 class LeakSettings(NamedTuple):
-    """Settings of a leak past the vane that opens in use: when, and how slowly."""
+    """Settings of a leak past the vane with an opening pressure and a gradual rise."""
 
     pressure: Annotated[
         float, Number("Pa_d", "pressure between chambers at which the leak opens, 0 for always", 0.0, 0.0, 1.0e7)
@@ -29,8 +29,8 @@ def lifted_leak(
 ) -> float:
     """Conductance [kg/(s Pa)] of the leak: ``C e / (e + w P_o)`` with ``e = |P_1 - P_2| - P_o``, and 0 below ``P_o``.
 
-    The gas lifts the lip of a seal against its preload, in either direction. The flow begins without a jump, is half of
-    the orifice's flow at ``w P_o`` above the opening pressure ``P_o``, and approaches the orifice's far above it.
+    The gas lifts the lip of a seal against its preload, in either direction. The flow starts without a jump, is half of
+    the flow of the orifice at ``w P_o`` above the opening pressure ``P_o``, and approaches it far above.
     """
     opening, rise = leak_opening.opening_pressure, leak_opening.opening_rise
     # e / (e + w P_o) written as 1 - w P_o / (e + w P_o), whose divisor is never 0, and whose sign shuts the leak below

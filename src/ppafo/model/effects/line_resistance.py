@@ -1,4 +1,4 @@
-"""Lines with resistance between valve and chambers: what enters or leaves a chamber passes its line and the valve."""
+"""Lines with flow resistance between valve and chambers, in series with the valve."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -15,7 +15,7 @@ class LineResistance(NamedTuple):
 
 
 class LineSettings(NamedTuple):
-    """An orifice that loses as much pressure as a line."""
+    """Settings of a line, as an orifice with the same pressure drop."""
 
     area: Annotated[
         float, Number("m^2", "area of an orifice with the pressure loss of a line, 0 for no loss", 0.0, 0.0, 1.0e-2)
@@ -24,7 +24,7 @@ class LineSettings(NamedTuple):
 
 
 def prepare(settings: LineSettings, device: Any) -> LineResistance:
-    """Parameters of an orifice that loses as much pressure as a line does, with the gas of the device. Equation (6)."""
+    """Parameters of an orifice with the pressure drop of a line, for the gas of the device. Equation (6)."""
     area, gas = settings.area, device.gas
     conductance = area_conductance(
         area,
@@ -40,14 +40,14 @@ def prepare(settings: LineSettings, device: Any) -> LineResistance:
 def fed_through_line(conductance: float, line_resistance: LineResistance) -> float:
     """Conductance [kg/(s Pa)] from a supply to a chamber, given the valve's: ``1/C^2 = 1/C_v^2 + 1/C_r^2``.
 
-    The volume of a line belongs to the dead volume of its chamber, and is filled at the pressure of the chamber: right
-    where the line is small beside it. Gas by which a valve joins both chambers passes no line.
+    The volume of a line is part of the dead volume of its chamber, and is at the pressure of the chamber: valid if the
+    line is small compared with the chamber. Gas that a valve passes from chamber to chamber does not pass the lines.
     """
     return supply_path(conductance_in_series(conductance, line_resistance.resistance))
 
 
 def vented_through_line(conductance: float, line_resistance: LineResistance) -> float:
-    """Conductance [kg/(s Pa)] from a chamber to the atmosphere, likewise."""
+    """Conductance [kg/(s Pa)] from a chamber to the atmosphere, by the formula of ``fed_through_line``."""
     return exhaust_path(conductance_in_series(conductance, line_resistance.resistance))
 
 

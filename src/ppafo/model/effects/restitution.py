@@ -1,4 +1,4 @@
-"""Rebound of the vane from its stops: every device has it, with a coefficient that may be 0."""
+"""Rebound of the vane from its stops: every device has a coefficient of restitution, which may be 0."""
 
 from typing import Annotated, NamedTuple
 
@@ -8,13 +8,13 @@ from ppafo.model.ports import rebound
 
 
 class Restitution(NamedTuple):
-    """Rebound speed over impact speed at a stop [-], 0 to 1."""
+    """Coefficient of restitution at a stop [-], 0 to 1: rebound speed divided by impact speed."""
 
     restitution: Annotated[float, Number("", "rebound speed over impact speed at a stop", minimum=0.0, maximum=1.0)]
 
 
 def rebound_velocity(angular_velocity: float, restitution: Restitution) -> float:
-    """Angular velocity [rad/s] with which the vane leaves a stop: ``-e w``, Newton's law of impact."""
+    """Angular velocity [rad/s] of the vane after an impact on a stop: ``-e w``, Newton's law of impact."""
     return -restitution.restitution * angular_velocity
 
 

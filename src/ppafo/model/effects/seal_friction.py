@@ -1,4 +1,4 @@
-"""Friction that grows with pressure: the gas presses the seals of the vane on its walls."""
+"""Friction that increases with pressure: the gas presses the seals of the vane against the walls."""
 
 from typing import Annotated, NamedTuple
 

@@ -1,8 +1,7 @@
-"""Gas that is not ideal: the virial equation of state cut after its second term, ``P = rho R T (1 + b rho)``.
+"""Real gas by the virial equation of state truncated after its second term, ``P = rho R T (1 + b rho)``.
 
-With a constant ``b`` the internal energy is the ideal gas's, so that energy and state agree with each other; with
-``b = 0`` all of it is the ideal gas. The engine, the reference solver and the simulated test bench share these
-functions.
+With a constant ``b`` the internal energy equals the ideal gas's, so that energy and state are consistent; with
+``b = 0`` the gas is ideal. The engine, the reference solver and the simulated test bench share these functions.
 """
 
 import math
@@ -17,13 +16,13 @@ SECOND_VIRIAL = {"CO2": -123.0e-6, "air": -7.4e-6, "N2": -4.5e-6, "He": 11.8e-6}
 
 
 class SecondVirial(NamedTuple):
-    """Second virial coefficient over the molar mass, b [m^3/kg], below 0 for CO2."""
+    """Second virial coefficient divided by the molar mass, b [m^3/kg], below 0 for CO2."""
 
     per_mass: float
 
 
 class VirialSettings(NamedTuple):
-    """The coefficient, and the share of it that the gas has."""
+    """Settings of a real gas: the second virial coefficient, and the fraction of it that applies."""
 
     share: Annotated[
         float, Number("", "share of the second virial coefficient that the gas has, 0 for ideal", 0.0, 0.0, 5.0)
@@ -41,7 +40,7 @@ class VirialSettings(NamedTuple):
 
 
 def prepare(settings: VirialSettings, device: Any) -> SecondVirial:
-    """Parameters from a share of a molar coefficient, with the molar mass of the device's gas."""
+    """Parameters from a fraction of a molar coefficient, with the molar mass of the device's gas."""
     return SecondVirial(settings.share * settings.coefficient / device.gas.molar_mass)
 
 
@@ -59,7 +58,7 @@ def real_pressure(mass: float, volume: float, temperature: float, gas_constant: 
 def real_density(pressure: float, temperature: float, gas_constant: float, virial: float) -> float:
     """Density [kg/m^3] at an absolute pressure [Pa]; the inverse of ``real_pressure``, by its smaller root.
 
-    Where the gas would condense first, at 4 b rho_ideal below -1, it is twice the ideal gas's density.
+    For 4 b rho_ideal below -1, where the gas would condense first, twice the density of the ideal gas.
     """
     # 2 c / (1 + sqrt(1 + 4 b c)) instead of the textbook root, which cancels where b c is small, as it is here.
     product = gas_constant * temperature
@@ -67,17 +66,17 @@ def real_density(pressure: float, temperature: float, gas_constant: float, viria
 
 
 def gas_enthalpy(temperature: float, density: float, gas_constant: float, heat_capacity: float, virial: float) -> float:
-    """Specific enthalpy [J/kg], internal energy and P/rho; c_p T for an ideal gas. ``heat_capacity`` is c_v."""
+    """Specific enthalpy [J/kg]: internal energy + P/rho, c_p T for ideal gas. ``heat_capacity`` is c_v [J/(kg K)]."""
     return temperature * (heat_capacity + gas_constant * real_gas_factor(density, virial))
 
 
 def real_gas_density(density: float, second_virial: SecondVirial) -> float:
-    """Density [kg/m^3] of the gas, given an ideal gas's at its pressure and temperature."""
+    """Density [kg/m^3] of the real gas, given the density of an ideal gas at the same pressure and temperature."""
     return real_density(density, 1.0, 1.0, second_virial.per_mass)
 
 
 def ideal_gas_density(density: float, second_virial: SecondVirial) -> tuple[float, float]:
-    """Density [kg/m^3] of an ideal gas with the pressure of this one, ``rho Z``, and how it grows with rho [-]."""
+    """Density [kg/m^3] of an ideal gas at the same pressure, ``rho Z``, and its derivative with respect to rho [-]."""
     virial = second_virial.per_mass
     return density * real_gas_factor(density, virial), 1.0 + 2.0 * virial * density
 

@@ -1,4 +1,4 @@
-"""A silencer behind the valve's exhaust: what leaves a chamber passes two restrictions, one behind the other."""
+"""Silencer downstream of the valve's exhaust: two restrictions in series between a chamber and the atmosphere."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -15,12 +15,12 @@ class Silencer(NamedTuple):
 
 
 def behind_silencer(conductance: float, silencer: Silencer) -> float:
-    """Conductance [kg/(s Pa)] of valve and silencer in a row, given the valve's: ``1/C^2 = 1/C_v^2 + 1/C_s^2``."""
+    """Conductance [kg/(s Pa)] of valve and silencer in series, given the valve's: ``1/C^2 = 1/C_v^2 + 1/C_s^2``."""
     return exhaust_path(conductance_in_series(conductance, silencer.resistance))
 
 
 class SilencerSettings(NamedTuple):
-    """Settings of a silencer on the vents, which ISO 6358 describes by conductance and critical ratio."""
+    """Settings of a silencer on the vents, described by the sonic conductance of ISO 6358."""
 
     sonic_conductance: Annotated[
         float, Number("m^3/(s Pa)", "sonic conductance C of the silencer, 0 for none", 0.0, 0.0, 1.0e-4)
@@ -28,7 +28,7 @@ class SilencerSettings(NamedTuple):
 
 
 def prepare(settings: SilencerSettings, device: Any) -> Silencer:
-    """Parameters from the sonic conductance of the silencer and the gas of the device, as ISO 6358 counts it."""
+    """Parameters from the sonic conductance of the silencer, defined by ISO 6358, and the gas of the device."""
     sonic, gas = settings.sonic_conductance, device.gas
     conductance = sonic_conductance_mass(sonic, gas.specific_gas_constant, gas.temperature)
     return Silencer(1.0 / (conductance * conductance) if sonic > 0.0 else 0.0)

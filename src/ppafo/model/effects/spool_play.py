@@ -1,4 +1,4 @@
-"""Play of a spool behind its command, which makes a hysteresis: it moves only when the command has crossed the play."""
+"""Backlash between command and spool, a hysteresis: the spool moves only after the command crosses the backlash."""
 
 from typing import Annotated, NamedTuple
 
@@ -9,22 +9,22 @@ from ppafo.model.valves.kind import VENTS_ABOVE
 
 
 class SpoolPlace(NamedTuple):
-    """Command [-] that the spool follows, -1 to 1, which starts in its middle."""
+    """Command [-] that the spool follows after the backlash, -1 to 1; 0 at the start."""
 
     spool_command: float = 0.0
 
 
 class SpoolPlay(NamedTuple):
-    """Setting of the play [-] between command and spool."""
+    """Backlash [-] between command and spool."""
 
     width: Annotated[float, Number("", "whole width of the play over the full command, 0 for none", 0.0, 0.0, 0.5)]
 
 
 def spool_position(position: float, command: float, play_width: float) -> float:
-    """Position [-1, 1] to which a command [-] draws a spool with play of a whole ``play_width`` [-].
+    """Spool position [-1, 1] for a command [-], with a backlash of the total width ``play_width`` [-].
 
-    The inside of the play, ``y``, is drawn along when the command leaves it: ``y = max(c - b/2, min(c + b/2, y))``.
-    The spool comes to ``y / (1 - b/2)``, so that it reaches full opening.
+    The inner side of the backlash, ``y``, moves with the command at its limits: ``y = max(c - b/2, min(c + b/2, y))``.
+    The spool position is ``y / (1 - b/2)``, so that the spool reaches full opening.
     """
     half = 0.5 * play_width
     inner = position * (1.0 - half)
@@ -34,26 +34,26 @@ def spool_position(position: float, command: float, play_width: float) -> float:
 
 
 def command_behind_play(command: float, spool_play: SpoolPlay, spool_play_state: SpoolPlace) -> float:
-    """Command [-] that a spool follows with play behind its command. A command that vents is no position."""
+    """Spool command [-] after backlash between command and spool. A venting command passes unchanged."""
     given = at_valve(command)
     drawn = spool_position(spool_play_state.spool_command, given, spool_play.width)
     return given if given > VENTS_ABOVE else drawn
 
 
 def settle(_spool_play: SpoolPlay, spool_play_state: SpoolPlace, command: float) -> SpoolPlace:
-    """The spool where the command [-] that it follows has drawn it."""
+    """Spool position after a change of the command [-]."""
     return SpoolPlace(spool_play_state.spool_command if command > VENTS_ABOVE else command)
 
 
 def advance(
     spool_play: SpoolPlay, spool_play_state: SpoolPlace, _before: PlantSnapshot, after: PlantSnapshot, step: float
 ) -> SpoolPlace:
-    """The spool after a step [s], in which its command stays what it is; exact."""
+    """Spool position after a step [s] with a constant command; exact."""
     return settle(spool_play, spool_play_state, after.command)
 
 
 def slopes(_spool_play: SpoolPlay, _spool_play_state: SpoolPlace, _now: PlantSnapshot) -> SpoolPlace:
-    """Rate [1/s] of the spool in its play: none, for it moves with the command alone."""
+    """Rate of the spool command [1/s], which is 0: the spool moves only when the command changes."""
     return SpoolPlace(0.0)
 
 

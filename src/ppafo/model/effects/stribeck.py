@@ -1,4 +1,4 @@
-"""Stribeck friction: near standstill a sliding vane has nearly the friction that it has at rest."""
+"""Stribeck friction: near standstill a sliding vane has nearly its static friction."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -8,14 +8,14 @@ from ppafo.model.ports import friction_in_motion
 
 
 class Stribeck(NamedTuple):
-    """Additional friction near standstill [N m], and inverse square of its velocity [s^2/rad^2]."""
+    """Additional friction near standstill [N m], and inverse square of the Stribeck velocity [s^2/rad^2]."""
 
     friction_rise: float
     velocity_scale: float
 
 
 class StribeckSettings(NamedTuple):
-    """Velocity at which half of the rise is left, and the share of it."""
+    """Stribeck velocity, at which half of the additional friction is left, and additional friction as a fraction."""
 
     velocity: Annotated[
         float, Number("rad/s", "angular velocity at which half of the rise is left, 0 for none", 0.0, 0.0, 1.0e4)
@@ -26,7 +26,7 @@ class StribeckSettings(NamedTuple):
 
 
 def prepare(settings: StribeckSettings, device: Any) -> Stribeck:
-    """Parameters from the velocity at which half of the rise is left, and the friction of the device."""
+    """Parameters from the Stribeck velocity and the friction of the device."""
     velocity, friction = settings.velocity, device.friction
     scale = 1.0 / (velocity * velocity) if velocity > 0.0 else 0.0
     return Stribeck(settings.share * (friction.static_torque - friction.dynamic_torque), scale)
@@ -35,7 +35,7 @@ def prepare(settings: StribeckSettings, device: Any) -> Stribeck:
 def stribeck_friction(
     torque: float, angular_velocity: float, pressure_1: float, pressure_2: float, stribeck: Stribeck
 ) -> float:
-    """Size of the friction torque in motion [N m]: ``T_d + a (T_s - T_d) / (1 + (w / w_s)^2)``."""
+    """Friction torque in motion [N m], without sign: ``T_d + a (T_s - T_d) / (1 + (w / w_s)^2)``."""
     without = friction_in_motion(torque, angular_velocity, pressure_1, pressure_2)
     return without + stribeck.friction_rise / (1.0 + stribeck.velocity_scale * angular_velocity * angular_velocity)
 

@@ -171,7 +171,7 @@ _TORQUE = Kind("Torque", "N m", "torque", ".3g")
 _GAS = Kind("Gas per repetition", "kg", "gas mass", ".3g")
 _MASS = Kind("Mass", "kg", "part mass")
 _MAXIMUM_OF_LIMIT = 4.0
-"""Top of the axis of the error over its limit: large errors say no more than that they are too large."""
+"""Top of the error axis divided by the error limit; larger errors are not resolved."""
 _DOTTED = {"marker": ".", "markersize": 4}
 
 

@@ -26,13 +26,13 @@ from ppafo.units import parse_quantity, split_quantity
 
 _TORQUE = "N m"
 _ROUNDING = 1.0e-9
-"""Fraction of the range of a profile below which a difference is none."""
+"""Fraction of the range of a profile below which a difference counts as rounding."""
 _MOMENT = 1.0e-5
-"""Time [s] in which a table goes from the end of a repetition to the beginning of the next where these differ."""
+"""Time [s] for the step from the end of a repetition to the start of the next, if their torques differ."""
 
 
 class ProfileSection(StrictTable):
-    """The prescribed torque over one repetition: a recording, or times and torques."""
+    """Section of a sizing file: torque over one repetition, from a recording or as times and torques."""
 
     recording: Annotated[
         str | None, Field(description="a .csv or .nc file or a result folder, relative to this file")
@@ -261,7 +261,7 @@ class SizingProblem:
 
     @property
     def torque_constant(self) -> float:
-        """Torque constant [m^3] of the actuator."""
+        """Torque constant of the actuator [m^3]."""
         own = self.scenario.device.actuator.torque_constant
         return own if self.actuator is None else self.actuator.values["torque_constant"]
 

@@ -35,39 +35,39 @@ LIMITS: dict[Limit, str] = {
     "control": "the control: neither more pressure nor a larger opening would suffice",
     "pressure": "nothing: the lowest requested pressure suffices",
 }
-"""Quantity that keeps a valve from working at a lower pressure, or at any pressure, in words."""
+"""Limiting quantity of a valve, in words."""
 ERROR, GAS = "rms_error", "gas_supplied"
 OSCILLATES = "the torque loop oscillates"
 _OPENINGS = ("valve.area", "valve.sonic_conductance")
 
 STREAMS = 16
-"""Noise streams in each of which a limit must be kept, the same for all trials, where sensors are noisy."""
+"""Number of noise streams of every trial, the same for all, if sensors are noisy."""
 _SEED = 1
-"""Seed of the sensor noise: every pressure that is tried has the same."""
+"""Seed of the sensor noise, the same for every pressure."""
 _AT_ONCE = 16_384
-"""Runs handed over at once: enough to fill the batches of all threads, little enough memory."""
+"""Number of runs of a batch: enough to occupy all threads with little memory."""
 GRID = 17
-"""Pressures of a grid."""
+"""Number of pressures of a grid."""
 FINENESS = 0.1 * PASCALS_PER_PSI
-"""Pressure [Pa] to which the lowest one is found."""
+"""Tolerance [Pa] of the lowest pressure."""
 WIDER = (2.0, 4.0, 16.0)
-"""Factors by which the opening is enlarged to test whether the flow is the limit [-]."""
+"""Factors [-] on the opening with which the flow is tested as the limit."""
 NEAR_CEILING = 1.2
-"""A lowest gauge pressure of at most this many times the one that the torque ceiling alone demands is owed to it."""
+"""Ratio [-] of lowest gauge pressure to ceiling gauge pressure up to which the torque counts as the limit."""
 LEAST_PEAK = 0.7
-"""Share of the peak that a pressure has to hold: an RMS error over a stride that is mostly zero lets half of it go."""
+"""Required share of the peak torque [-]: the RMS error over a mostly zero stride alone would accept half the peak."""
 MORE_PRESSURE = 1.1
-"""Times the gauge pressure at which the margin of the flow is looked for."""
+"""Factor on the gauge pressure for the flow margin [-]."""
 OPENINGS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05)
-"""Fractions of a valve's opening that are tried, one after the other, for that margin."""
+"""Fractions of a valve's opening tried in turn for the flow margin."""
 
 
 Trial = NDArray[np.void]
 """Trials as a structured array of ``TRIAL``."""
 TRIAL = np.dtype([("pressure", np.float64), ("error", np.float64), ("gas", np.float64), ("gains", np.intp)])
-"""Supply pressure [Pa absolute], RMS error [N m], gas per repetition [kg] and number of the set of gains of a trial.
+"""Row of a trial: supply pressure [Pa absolute], RMS error [N m], gas per repetition [kg], index of the gain set.
 
-Error and gas are nan where a run failed or oscillated.
+Error and gas are nan if a run failed or oscillated.
 """
 
 
@@ -198,9 +198,10 @@ def first_of(members: NDArray[np.bool_]) -> int | None:
 def limit_of(trials: Trials, valve: Part, tried: Trial) -> Limit:
     """Return the quantity that keeps a valve from a lower pressure, or from working at all.
 
-    The limit is the torque if the lowest feasible pressure is near ``ceiling_pressure``. Otherwise larger openings are
-    tried at the mean of these two pressures, or of ``ceiling_pressure`` and the highest pressure if none is feasible:
-    if a larger opening works, the limit is the flow, else the control.
+    There is no limit if the lowest requested pressure works ('pressure'). The limit is the torque if the lowest
+    feasible pressure is near ``ceiling_pressure``. Otherwise larger openings are tried halfway between these two
+    pressures (or between ``ceiling_pressure`` and the highest pressure if none is feasible): if a larger opening works,
+    the limit is the flow, else the control.
     """
     problem = trials.problem
     first = first_of(works_in(problem, tried))
@@ -217,7 +218,7 @@ def limit_of(trials: Trials, valve: Part, tried: Trial) -> Limit:
 
 
 def ceiling_pressure(problem: SizingProblem) -> float:
-    """Return the pressure [Pa absolute] below which clipping of the peak exceeds the error limit; equation (2)."""
+    """Return the pressure [Pa absolute] below which the clipped peak alone exceeds the error limit; equation (2)."""
     from scipy.optimize import brentq
 
     atmosphere = problem.atmosphere
@@ -246,7 +247,7 @@ def cut_error(problem: SizingProblem, pressure: float) -> float:
 
 
 def ceiling(problem: SizingProblem, pressure: float) -> float:
-    """Return the largest torque [N m] that a pressure [Pa absolute] can hold; equation (2) of the paper."""
+    """Return the largest static torque [N m] at a supply pressure [Pa absolute]; equation (2) of the paper."""
     return problem.torque_constant * (pressure - problem.atmosphere)
 
 

@@ -1,4 +1,4 @@
-"""The lowest pressure and the smallest bottle of each valve for a torque profile."""
+"""Sizing for a torque profile: lowest pressure and smallest bottle of each valve."""
 
 import time
 from collections.abc import Sequence

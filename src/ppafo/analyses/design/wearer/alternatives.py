@@ -22,19 +22,19 @@ from ppafo.parameters.parts.catalogue import rated_pressure
 from ppafo.progress import Progress, Report
 
 _MORE_PRESSURE = (1.1, 1.25, 1.5, 1.8, 2.2)
-"""Times the gauge pressure that are tried where no torque suffices."""
+"""Factors on the gauge pressure that are tried if no torque suffices."""
 _LESS_PRESSURE = tuple(0.95 - 0.05 * step for step in range(12))
-"""Times the gauge pressure that are tried where no bottle lasts."""
+"""Factors on the gauge pressure that are tried if no bottle lasts."""
 _MOST_PAIRS = 5
-"""Pairs of parts that are tried at less pressure: those with the most torque for their gas."""
+"""Number of pairs of parts tried at lower pressure: the pairs with the most torque per gas flow."""
 _MOST_WALKED = 4
-"""Pairs and pressures, from the least gas, that are walked on a bottle to find an alternative."""
+"""Number of candidates walked on a bottle in the search for an alternative, starting with the least gas."""
 _USABLE = 0.8
-"""Share of its gas above which no walk on a bottle is tried for an alternative; the walk decides."""
+"""Usable fraction of a bottle's gas, above which no walk is tried for an alternative."""
 _SHOWN_TIME = 0.6
-"""Time [s] to which an alternative rounds times down: a hundredth of a minute."""
+"""Resolution [s] to which the time of an alternative is rounded down: a hundredth of a minute."""
 _SHOWN_TORQUE = 100.0
-"""Parts of a newton metre to which an alternative rounds torques down."""
+"""Fractions of a newton metre to which the torque of an alternative is rounded down."""
 
 
 class _Candidate(NamedTuple):

@@ -14,7 +14,7 @@ from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import walk
 
 _ALLOWANCE = 1.15
-"""Gas that a pair may need over what another got out of a bottle, to be tried on it as well."""
+"""Allowance factor on the gas flow of a pair, relative to the gas that another pair drew from the same bottle."""
 
 
 def lightest_on_bottle(

@@ -11,7 +11,7 @@ from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
 USABLE = 0.8
-"""Share of a battery's energy that is taken: cold, ageing and a converter of 90 % take the rest. Assumed."""
+"""Usable fraction of a battery's energy; cold, ageing and a converter of 90 % take the rest. Assumed."""
 
 
 @dataclass(frozen=True, slots=True)

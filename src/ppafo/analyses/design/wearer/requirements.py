@@ -21,15 +21,15 @@ from ppafo.walking.result import WalkResult
 from ppafo.walking.wearer import STATURES, WEARER
 
 WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regulators"}
-"""The walk, with its controller, of each kind of valve."""
+"""Walk, with its controller, for each kind of valve."""
 BODY_MASS_INDEX = 22.0
-"""Body mass over the square of the stature [kg/m^2] of a wearer of whom the mass alone is known."""
+"""Body mass divided by the square of the stature [kg/m^2], for a wearer of unknown stature."""
 TOES = 0.01
-"""Clearance of the toes [m] that is required where none is given, unless the healthy gait itself has less."""
+"""Default toe clearance [m], unless the healthy gait has less."""
 REACHED = 0.95
 """Least ratio [-] of the peak torque of the mean stride to the required torque that counts as reached."""
 SHORTEST = 6.0
-"""Time [s] that a walk on a bottle takes at least."""
+"""Shortest time [s] of a walk on a bottle."""
 _STRONGEST, _HIGHEST_TOES = 100.0, 0.2
 """Torque [N m] and clearance [m] above which a requirement is refused as a typing error."""
 TORQUE, MASS, CLEARANCE = Kind("", "N m", "torque", ".3g"), Kind("", "kg", "part mass"), Kind("", "m", "length", ".1f")
@@ -81,7 +81,7 @@ class DesignRequirements:
         return torque >= REACHED * self.torque
 
     def text(self) -> str:
-        """Return torque, pressure, time and clearance in words."""
+        """Return torque, pressure, time and toe clearance in words."""
         pressure = Kind("", "Pa_a", "pressure").text(self.pressure)
         toes = f"toes {CLEARANCE.text(self.clearance)} over the ground"
         return f"{TORQUE.text(self.torque)} at {pressure} for {self.seconds / 60.0:.4g} min, {toes}"
@@ -151,11 +151,12 @@ class WalkedDevice:
 class SizedDevice:
     """Device whose walk on a bottle lasts for the required time.
 
-    ``bottle_name``: argument of ``--bottle`` for the bottle
+    ``tried``: valve and actuator, after a few strides
+    ``bottle``, ``bottle_name``: bottle, and the argument of ``--bottle`` for it
     ``walked``: walk on the bottle
-    ``life``: walking time on the bottle
+    ``life``: duration of the gas in the bottle
     ``electrical``: electrical energy of the walk, and the battery
-    ``masses``: masses of the parts
+    ``masses``: mass [kg] by part
     """
 
     tried: WalkedDevice
@@ -223,7 +224,7 @@ class WearerSizing:
 
     @property
     def parts(self) -> list[Part]:
-        """Parts of the device that have figures to check."""
+        """Valve, actuator, bottle and battery cell of the device; empty without a device."""
         device = self.device
         if device is None:
             return []
@@ -231,7 +232,7 @@ class WearerSizing:
 
     @property
     def doubtful(self) -> list[tuple[Part, str]]:
-        """Quoted or assumed figures of the parts of the device."""
+        """Quoted or assumed figures of these parts."""
         return [(part, name) for part in self.parts for name in part.doubtful]
 
     def json_document(self) -> dict[str, Any]:

@@ -33,9 +33,9 @@ from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import healthy_metrics
 
 _REGULATORS = ("pipeline-jacpac-regulator", "festo-lrma-qs-4")
-"""The regulators of plantarflexion and dorsiflexion, unless the catalogue is one's own."""
+"""Regulators of plantarflexion and dorsiflexion, unless the user's catalogue has others."""
 _PROCESSOR, _CELL = "msp430g2553", "ncr18650b"
-"""The processor and the cells of the battery, unless the catalogue is one's own."""
+"""Processor and battery cells, unless the user's catalogue has others."""
 
 
 def size_for_wearer(

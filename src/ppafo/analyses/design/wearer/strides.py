@@ -16,19 +16,19 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import walk
 
 _REQUESTS = (1.0, 1.3, 1.7)
-"""Torque requested of a torque controller over the torque wanted, in turn: it lags behind its reference."""
+"""Ratios of requested to required torque, tried in turn, because the torque lags behind its reference."""
 _ABOVE = 1.1
-"""Limit of a pair over the torque that is wanted: it vents the chamber from its limit on."""
+"""Ratio of torque limit to required torque: above its limit, a pair of on/off valves vents the chamber."""
 _MINUTES = 0.15
-"""Minutes of the walks that are compared at a constant supply: a few strides after those that settle."""
+"""Minutes of the walks compared at constant supply: a few strides after the transient."""
 _DORSIFLEXION = 0.9
-"""Gauge pressure of dorsiflexion over plantarflexion's, of the walks with regulators: 45 of 50 psi."""
+"""Gauge pressure of dorsiflexion divided by plantarflexion, for walks with regulators: 45 of 50 psi."""
 _EARLY_LIFT = ("controller.swing_peak_time=0.73", "controller.swing_rise_time=0.1", "controller.swing_fall_time=0.2")
-"""A lift that begins at toe-off, when the toes come down late with the walk's own; with all the torque there is."""
+"""Foot lift from toe-off with full torque, for toes that do not clear the ground with the walk's own lift."""
 _OF_ACTUATOR = ("torque_constant", "displacement_per_radian")
-"""Numbers of an actuator in the catalogue that a walk takes over."""
+"""Catalogue figures of an actuator that a walk adopts."""
 _PROPORTIONAL = "proportional"
-"""Kind of valve with which a controller follows a torque; solenoid valves only limit it."""
+"""Kind of valve for a torque controller; solenoid valves only limit the torque."""
 SHUT_OFF_PARTS = {quantity.name: quantity.default or 0.0 for quantity in SHUT_OFF} | {"area": 1.0e-5}
 """Numbers of the shut-off valve of every device [SI]: the usual ones, and an area that does not throttle the supply."""
 
