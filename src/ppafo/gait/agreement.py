@@ -1,12 +1,13 @@
 """Agreement of the curves of one stride: delay, side and scale of each, estimated against the others.
 
-Healthy walking shows where each curve belongs. Just after toe-off the foot is furthest in plantarflexion, and then the
-shank furthest back; ankle moment and vertical force end the push-off together. While the foot stands flat the ankle
-turns as the shank does, and the largest moment of the push-off is the force times a lever as long as the forefoot. An
-impaired gait may differ in each of these, so that what is unusual is remarked and not refused; but an ankle that fits
-half a stride away is of the other foot.
+Healthy walking relates the curves to each other. Just after toe-off the ankle has its peak plantarflexion, followed by
+the rearmost position of the shank; ankle moment and vertical force end the push-off at the same time. While the foot is
+flat, the ankle rotates with the shank. The largest push-off moment is the force times the length of the forefoot. An
+impaired gait may differ in each of these relations, so an unusual curve is remarked and not rejected. An ankle that
+fits better half a stride later, however, belongs to the other foot.
 
-Ranges in brackets are of 13 recorded strides: 11 of one walker overground and both legs of another on a treadmill.
+Numbers in brackets are the ranges of 13 recorded strides: 11 of one walker overground and both legs of another on a
+treadmill.
 """
 
 import numpy as np
@@ -20,37 +21,37 @@ from ppafo.gait.plausible_angles import MIDSTANCE
 from ppafo.signals.recording import Floats
 
 LARGEST_DELAY = 0.03
-"""Seconds by which a curve may be away from its usual place (0.016 at most in the recorded strides)."""
+"""Largest plausible delay [s] of a curve relative to its usual time (at most 0.016 in the recorded strides)."""
 
 _USUALLY = {"shank_angle": 0.052, "ankle_angle": 0.041, "ankle_moment": -0.002}
-"""Strides from toe-off to the shank furthest back and to the peak of plantarflexion; of the moment, from the force."""
+"""Usual times from toe-off to the rearmost shank and to peak plantarflexion, and from force to moment [strides]."""
 _ABOUT_TOE_OFF = (-0.16, 0.22)
-"""Strides from toe-off within which both are looked for."""
+"""Interval around toe-off [strides] in which both extremes are searched."""
 _PUSH_OFF_FROM = 0.35
-"""Fraction of the stride; the largest load from there on is the push-off's."""
+"""Start of the push-off [strides]: the largest load afterwards is the push-off peak."""
 _FORCE_ENDS = -0.06
-"""Strides from toe-off to half the largest force of the push-off (-0.060): for a moment without a force."""
+"""Usual time from toe-off to half the push-off peak of the force [strides] (-0.060); used without a measured force."""
 
 # Far from 0 and nearer to the half stride at which the other foot lies.
 _OTHER_FOOT = 0.3
-"""Strides between ankle and shank from which the ankle is of the other foot, which is half a stride away."""
+"""Delay between ankle and shank [strides] that shows the other foot, which is half a stride away."""
 _ALIKE, _UNLIKE = 0.65, 0.4
-"""Correlation with a usual ankle, at least where it fits best (0.76), and at most in its own place."""
+"""Correlation with a usual ankle: least value at the best shift (0.76), and largest value without a shift."""
 _ALIKE_SHANK = 0.8
-"""Correlation of the shank with a usual one in its own place (0.97): one that is counted the other way has less."""
+"""Least correlation of the shank with a usual shank without a shift (0.97); with a reversed sign it is smaller."""
 
 USUAL_LEVER = (0.1, 0.21)
-"""Metres from the ankle to the force at the largest moment of the push-off (0.140 to 0.154)."""
+"""Plausible lever of the vertical force about the ankle at the largest push-off moment [m] (0.140 to 0.154)."""
 USUAL_MOMENT = (0.9, 2.2)
-"""Largest ankle moment [N m/kg] (1.4 to 1.8), where no force gives the lever."""
+"""Plausible largest ankle moment [N m/kg] (1.4 to 1.8), checked if no force gives the lever."""
 USUAL_SHANK = (48.0, 105.0)
-"""Degrees over which the shank turns in a stride (72 to 81)."""
+"""Plausible range of the shank angle in a stride [deg] (72 to 81)."""
 USUAL_ANKLE = (18.0, 45.0)
-"""Degrees over which the ankle turns in a stride (25 to 33)."""
+"""Plausible range of the ankle angle in a stride [deg] (25 to 33)."""
 USUAL_FOLLOWING = (0.35, 1.4)
-"""Turn of the ankle over the turn of the shank while the foot stands (0.38 to 1.07)."""
+"""Plausible rotation of the ankle relative to the rotation of the shank while the foot stands [-] (0.38 to 1.07)."""
 _RESTS = 0.2
-"""Turn of the ankle over the shank's below which it hardly turns there and says nothing of its size."""
+"""Relative rotation of the ankle [-] below which it is too small for a check of its scale."""
 
 _FINE = np.linspace(0.0, 1.0, 1000, endpoint=False)
 

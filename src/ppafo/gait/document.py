@@ -18,7 +18,7 @@ from ppafo.gait.plausible import check_gait
 from ppafo.units import from_si, parse_quantity, to_si
 
 _MAXIMUM_HARMONICS = 40
-"""Harmonics of a curve in a gait file at most."""
+"""Largest number of harmonics of a curve in a gait file."""
 _SUMMARIES = {
     "shank_angle": "shank angle from the vertical, above 0 while the ankle is in front of the knee",
     "ankle_angle": "ankle angle, 90 deg neutral, growing in plantarflexion",
@@ -38,7 +38,7 @@ _LIMITS = {
     "stride.stance_share": ("", 0.2, 0.95),
     "stride.stance_share_deviation": ("", 0.0, 0.5),
 }
-"""Unit, lowest and highest value of every quantity; wide, to exclude slips of the pen only."""
+"""Unit, lowest and highest value of every quantity; wide limits that exclude only typing errors."""
 
 
 @functools.cache
@@ -160,7 +160,7 @@ def json_schema() -> dict[str, Any]:
 
 
 NORMATIVE = "falisse2019-subject1"
-"""The gait that is taken where none is named."""
+"""Default gait."""
 
 _FILE = TomlKind(
     "gait",
@@ -185,7 +185,7 @@ def list_gaits() -> tuple[str, ...]:
 def load_gait(gait: str | Path = NORMATIVE) -> Gait:
     """Return a gait by its name in the package or by the path of a gait file (TOML), in SI units.
 
-    DataError where it cannot be used.
+    Raises DataError if the gait cannot be used.
 
     >>> import ppafo
     >>> gait = ppafo.load_gait("falisse2019-subject1")
@@ -204,10 +204,10 @@ def parse_gait(content: bytes, file: str) -> Gait:
 
 
 WRITTEN_UNITS: dict[str, str] = {"rad": "deg"}
-"""Angles are written in degrees; every other curve in its own unit."""
+"""Units of angles in a gait file; every other curve is written in its SI unit."""
 
 _DIGITS = 12
-"""Digits written of a coefficient; degrees made of radians carry noise behind these."""
+"""Significant digits of a written coefficient; conversion from radians to degrees adds noise beyond these."""
 
 
 def gait_toml(gait: Gait) -> str:

@@ -38,11 +38,11 @@ _PLAIN = (
     "stance_share_deviation",
     "strides",
 )
-"""Fields of a gait that are plain data as they stand."""
+"""Fields of a gait that are plain data already."""
 _STRIDE_KEYS = ("start", "toe_off", "end", "stance_share")
 
 _NOISE = 1e-9
-"""Number [SI] below which a deviation or a misfit is rounding."""
+"""Deviation or misfit [SI] below which it is rounding error."""
 _CAPTION = "The curves over the stride: mean, standard deviation between strides as a band, toe-off dashed."
 
 

@@ -1,14 +1,14 @@
-"""A gait: one periodic stride as Fourier series, in SI units and in the signs of the package.
+"""Gait: one periodic stride as Fourier series, in SI units and in the signs of the package.
 
-- ``shank_angle`` phi [rad]: from the vertical, above 0 while the ankle is in front of the knee.
-- ``ankle_angle`` theta [rad]: 90 deg neutral (foot square to the shank), growing in plantarflexion (toes down).
-- ``ankle_moment`` [N m/kg]: internal moment of the wearer per body mass, above 0 in plantarflexion.
-- ``vertical_force`` [body weights]: ground reaction on this foot, above 0 upwards.
-- ``centre_of_pressure`` [m]: where it acts, forward of the ankle along the foot; without meaning while the foot is off.
+- ``shank_angle`` phi [rad]: from the vertical, positive with the ankle in front of the knee.
+- ``ankle_angle`` theta [rad]: 90 deg neutral (foot square to the shank), increasing in plantarflexion (toes down).
+- ``ankle_moment`` [N m/kg]: internal moment of the wearer per body mass, positive in plantarflexion.
+- ``vertical_force`` [body weights]: ground reaction on this foot, positive upwards.
+- ``centre_of_pressure`` [m]: distance forward of the ankle along the foot; undefined while the foot is off the ground.
 - ``knee_forward``, ``knee_up`` [m/s^2]: acceleration of the knee in the sagittal plane, without gravity.
 
 With a flat foot theta is 90 deg plus phi. The phase counts strides from one heel strike of the foot to its next.
-At another walking speed the stride gets longer or shorter in time, and every motion in it stays.
+At another walking speed the stride time changes; the motion as a function of the phase stays the same.
 """
 
 import math
@@ -39,12 +39,12 @@ CURVES: dict[str, str] = {
     "knee_forward": "m/s^2",
     "knee_up": "m/s^2",
 }
-"""The curves of a gait and the unit of each; the first two are always there."""
+"""Curves of a gait with their units; the first two are mandatory."""
 
 REQUIRED = ("shank_angle", "ankle_angle")
 
 KNEE = ("knee_forward", "knee_up")
-"""Curves that are accelerations: they go with the square of the cadence."""
+"""Curves that are accelerations, which scale with the square of the cadence."""
 
 
 def clinical_angle(angle: Floats) -> Floats:
@@ -184,7 +184,7 @@ HARMONICS: dict[str, int] = {
     "knee_forward": 6,
     "knee_up": 6,
 }
-"""Harmonics of each curve: enough for a fit well below the spread between strides; more roughen the acceleration."""
+"""Number of harmonics of each curve: the fit error is well below the spread; more would make the acceleration noisy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,18 +216,18 @@ def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[G
 
 
 LARGEST_CHANGE = 0.2
-"""Fraction of the recorded speed; further away angles and moments change too much to be left as they are."""
+"""Largest relative change of the recorded speed; beyond it, angles and moments would change too much."""
 
 SLOWEST_CONSTANT_WALK_RATIO = 1.03
-"""Speed [m/s] below which step length over cadence is no longer constant: Murakami and Otaka (2017),
-J Phys Ther Sci 29:819 (62 m/min)."""
+"""Speed [m/s] below which step length divided by cadence is no longer constant: Murakami and Otaka (2017), J Phys Ther
+Sci 29:819 (62 m/min)."""
 
 
 def speed_range(gait: Gait) -> tuple[float, float]:
     """Return the lowest and highest speed [m/s] to which a gait may be scaled: within 20 % of the recorded speed.
 
-    For a gait recorded at more than 1.03 m/s, the lowest speed is at least 1.03 m/s. Raises DataError for a gait
-    without a speed.
+    The lowest speed is also limited to 1.03 m/s, or to the recorded speed of a slower gait. Raises DataError for a
+    gait without a speed.
     """
     recorded = _recorded_speed(gait)
     lowest = (1.0 - LARGEST_CHANGE) * recorded
@@ -272,9 +272,9 @@ def _recorded_speed(gait: Gait) -> float:
 
 
 _RATE = 200.0
-"""Samples a second of the recording of a gait, unless another rate is given."""
+"""Default sampling rate of the recording of a gait [Hz]."""
 _MAXIMUM_STRIDES = 100_000
-"""Strides of such a recording at most."""
+"""Largest number of strides of such a recording."""
 
 
 def walk_recording(gait: Gait, strides: int) -> Recording:

@@ -20,7 +20,7 @@ class MeanStride:
     stride_time: float
     signs_from: SignSource
     is_knee_one_marker: bool = False
-    """True if both coordinates of the knee are of one marker, which excludes a scale between them."""
+    """True if both coordinates of the knee are from one marker, so that their scales cannot differ."""
 
 
 def other_sign(signs_from: SignSource, key: str, turned: str = "the other sign") -> str:
@@ -33,4 +33,4 @@ def other_sign(signs_from: SignSource, key: str, turned: str = "the other sign")
 
 
 CLEARLY_BETTER = 2.0
-"""Times that a curve has to fit better, or be larger, with the other sign for its sign to be reversed."""
+"""Factor by which the opposite sign of a curve must fit better, or give a larger value, to reject the given sign."""

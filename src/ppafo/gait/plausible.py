@@ -75,16 +75,16 @@ MOMENT_PEAK = (0.05, 3.5)
 FORCE_PEAK = (0.5, 2.5)
 FORCE_MEAN = (0.25, 0.75)
 USUAL_FORCE_MEAN = (0.42, 0.58)
-"""Body weights: over steady strides both legs carry 1 together, half each in a symmetric walk."""
+"""Plausible mean of the vertical force [body weights]: both legs together carry 1, each half in symmetric walking."""
 
 _ON_GROUND = 0.05
-"""Body weights, either way; a plate with no foot on it shows less."""
+"""Force [body weights], in either direction, below which a plate reads without a foot on it."""
 _AFTER_TOE_OFF = 0.03
-"""Fraction of the stride; a toe-off found in the shank is no nearer than this."""
+"""Least time after toe-off [strides], because toe-off found from the shank is not more accurate."""
 _LEFT_IN_SWING = 0.25
-"""Fraction of the peak; the swinging foot needs a few hundredths."""
+"""Largest moment in swing relative to the peak [-]; the swinging foot needs a few hundredths."""
 _FOOT_ALONE = 0.05
-"""N m/kg that a swinging foot may need, however weak the push-off."""
+"""Moment that a swinging foot may need in any case [N m/kg], however weak the push-off."""
 
 
 def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
@@ -128,7 +128,7 @@ def check_moment(walk: MeanStride) -> None:
 
 
 _UNCLEAR_MOMENT = 0.5
-"""Fraction of the largest plantarflexion moment; healthy walking has 0.05 to 0.2 of it into dorsiflexion."""
+"""Ratio of dorsiflexion to plantarflexion peak above which the sign is unclear; 0.05 to 0.2 in healthy walking."""
 
 
 def moment_remarks(moment: Floats) -> list[str]:
@@ -182,7 +182,7 @@ def check_force(walk: MeanStride) -> None:
 
 
 def force_remarks(force: Floats) -> list[str]:
-    """Return a remark on an unusual mean of the vertical force [body weights] over a stride, ends included."""
+    """Return a remark on an unusual mean vertical force [body weights] over a stride; ``force`` includes both ends."""
     # Both ends are one phase, which must not count twice.
     mean, (low, high) = float(np.mean(force[:-1])), USUAL_FORCE_MEAN
     if low <= mean <= high:

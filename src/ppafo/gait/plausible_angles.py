@@ -11,20 +11,20 @@ SHANK_RANGE = (25.0, 120.0)
 ANKLE_RANGE = (5.0, 80.0)
 ANKLE_LIMITS = (40.0, 150.0)
 MIDSTANCE = slice(15, 41)
-"""Percent of the stride in which the foot stands: the ankle then turns as the shank does."""
+"""Samples [percent of the stride] in which the foot stands, so that the ankle rotates with the shank."""
 _TURNS = 2.0
-"""Degrees, RMS, by which a standing foot has to turn for a sign to show; recorded feet turn by 0.5 to 1.5."""
+"""Least rotation of a standing foot [deg, RMS] that shows a wrong sign; recorded feet rotate by 0.5 to 1.5 deg."""
 _TURNED_BACK = 0.1
-"""Fraction of its range by which a shank has to rotate backwards over the standing foot for its sign to be reversed.
+"""Backward rotation of the shank over the standing foot, relative to its range [-], that shows a reversed sign.
 
-Recorded shanks rotate forward by 0.15 to 0.25 of it.
+Recorded shanks rotate forward by 0.15 to 0.25 of the range.
 """
 REMARKED_TILT, REFUSED_TILT = 5.0, 20.0
-"""Degrees that the standing foot may be tilted, on average over mid-stance, before it is remarked and refused.
+"""Mean tilt of the standing foot in mid-stance [deg] above which it is remarked, and rejected.
 
-Recorded feet on level ground have 0.5 to 4.6: the sole of a shoe and the placing of markers. Nothing tilts a standing
-foot further than 20: a shoe with a heel of 6 cm on a foot of 17 cm from heel to ball, a walk on the toes, or a ramp of
-1 in 3. Beyond that the zero is another one.
+Recorded feet on level ground have 0.5 to 4.6 deg, from the sole of the shoe and the placement of markers. A standing
+foot is not tilted by more than 20 deg: this is a heel of 6 cm on a foot of 17 cm from heel to ball, walking on the
+toes, or a ramp of 1 in 3. A larger tilt shows a wrong zero.
 """
 
 

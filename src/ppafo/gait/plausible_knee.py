@@ -12,17 +12,16 @@ from ppafo.gait.mean_stride import MeanStride, SignSource, other_sign
 from ppafo.signals.recording import Floats
 
 FOOT_FLAT = slice(15, 43)
-"""Percent of the stride in which the foot stands flat."""
+"""Samples [percent of the stride] in which the foot stands flat."""
 
 SHANK_LENGTHS = (0.25, 0.6)
-"""Metres; within these the length is the one that fits best, since a gait does not say it."""
+"""Range of shank lengths [m] for the best fit, as a gait does not contain the length."""
 
 _FITS = 0.6
-"""Largest misfit of the turning, relative and root mean square: true recordings have 0.3 to 0.46."""
+"""Largest relative misfit of the rotation [-, RMS] that counts as a fit; correct recordings have 0.3 to 0.46."""
 _LEFT_BY_MISTAKE, _LEFT_BY_ONE = 0.7, 0.62
-"""A mistake is remarked where correcting it leaves less than the first fraction of the misfit, and refused below the
-second: true knees in units of g leave 0.48 to 0.57, and a true knee in its own unit has shown 0.68.
-"""
+"""Fractions of the misfit that remain after correction of a mistake: below the first it is remarked, below the second
+rejected. Correct knees in units of g leave 0.48 to 0.57, and a correct knee in its own unit has shown 0.68."""
 
 Factors = tuple[float, float]
 
@@ -76,7 +75,7 @@ _MISTAKES = (
     *_too_large(1000.0),
     _Mistake("are exchanged and in units of g", f"exchange them and multiply both by {_G:g}", (0.0, _G), (_G, 0.0)),
 )
-"""The first that fits is named. A sign alone is recognised in the swing."""
+"""Possible mistakes; the first that fits is reported. A wrong sign alone is recognised from the swing."""
 
 _WHERE: dict[SignSource, str] = {
     "map": "in the gait map or the file",
@@ -141,17 +140,17 @@ def _misfit(measured: Floats, expected: Floats) -> float:
 
 
 KNEE_TRAVEL = (0.5, 80.0)
-"""Range of a knee's acceleration over the stride, in m/s^2, that a walk may have."""
+"""Plausible range of the knee acceleration over a stride [m/s^2]."""
 KNEE_MEAN = 1.5
-"""Mean of a knee's acceleration over the stride, in m/s^2, that a walk may have: it comes back to where it was."""
+"""Largest mean of the knee acceleration over a stride [m/s^2]; it is 0 for a periodic motion."""
 _HELD_BACK = 0.2
-"""Fraction of its range by which a knee has to decelerate where others are driven for its sign to be reversed.
+"""Fraction of its range by which a knee must decelerate in the phase of usual acceleration to reject its sign.
 
-A measured knee is driven by 0.8 to 0.9 of it.
+A measured knee accelerates by 0.8 to 0.9 of its range.
 """
 
 _PARTS = {"knee_forward": ((-0.3, 0.0), (0.3, 0.6)), "knee_up": ((0.0, 0.3), (0.4, 0.7))}
-"""Parts of the swing, from toe-off, in which the knee is driven on and up, and in which it is held back and falls."""
+"""Intervals from toe-off, as fractions of the swing, of acceleration forward or up, and of deceleration or fall."""
 
 
 def check_knee(walk: MeanStride) -> None:

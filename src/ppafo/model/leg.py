@@ -1,9 +1,9 @@
 """Shank and foot as a planar two-link pendulum. Equations (11) and (12).
 
-Coordinates: the shank angle phi from the vertical, above 0 where the ankle is in front of the knee, and the ankle angle
-theta, 90 deg neutral, growing in plantarflexion. The foot then stands at ``alpha = phi - theta + 90 deg`` over the
-horizontal, above 0 with the toes up. The knee may accelerate; x points forward, y up. Lengths count from the joint
-above: the shank's mass centre from the knee, the foot's from the ankle, on the line to the toes.
+Coordinates: the shank angle phi from the vertical, positive with the ankle in front of the knee, and the ankle angle
+theta, 90 deg neutral, increasing in plantarflexion. The foot is then at ``alpha = phi - theta + 90 deg`` to the
+horizontal, positive with the toes up. The knee may accelerate; x points forward, y up. Distances are from the proximal
+joint: the shank's centre of mass from the knee, the foot's from the ankle, on the line to the toes.
 """
 
 from typing import NamedTuple
@@ -15,11 +15,11 @@ class LegParameters(NamedTuple):
     """Segments of one leg and the wearer's ankle, SI units.
 
     ``ankle_stiffness`` [N m/rad] pulls the ankle to ``ankle_rest_angle`` [rad]; ``ankle_damping`` [N m s/rad].
-    ``residual_share`` [-] of the measured ankle moment is what the wearer still has: 0 is the paper's full deficit.
-    With ``keeps_gait`` 1 the wearer is nondisabled: muscles keep the measured ankle whatever the device does.
-    The ground force acts on a foot that rolls on its heel with a lever [m] behind the ankle: ``flat_heel_lever`` where
-    the foot is nearly flat, towards ``heel_lever`` as it tilts up, half of the way at ``heel_roll_angle`` [rad].
-    ``toe_lever`` [m] reaches from the ankle forward to the toes.
+    ``residual_share`` [-] is the fraction of the measured ankle moment that the wearer still has: 0 is the paper's full
+    deficit. With ``keeps_gait`` 1 the wearer is nondisabled: muscles keep the measured ankle motion whatever the device
+    does. For a foot that rolls on its heel the lever arm [m] of the ground force behind the ankle is
+    ``flat_heel_lever`` near flat and approaches ``heel_lever`` as the foot tilts up, half of the way at
+    ``heel_roll_angle`` [rad]. ``toe_lever`` [m] is the distance from the ankle forward to the toes.
     """
 
     shank_length: float
@@ -43,7 +43,7 @@ class LegParameters(NamedTuple):
 
 
 class ShankNow(NamedTuple):
-    """A prescribed shank: angle [rad], rate [rad/s], acceleration [rad/s^2]; of the knee forward and up [m/s^2]."""
+    """Prescribed shank: angle [rad], rate [rad/s], acceleration [rad/s^2]; knee acceleration forward and up [m/s^2]."""
 
     angle: float
     rate: float
@@ -53,9 +53,9 @@ class ShankNow(NamedTuple):
 
 
 class FootLoad(NamedTuple):
-    """Foot and plate about the ankle of a prescribed shank: mass moment [kg m] and inertia about the ankle [kg m^2].
+    """Foot and foot plate on a prescribed shank: mass moment [kg m] and inertia [kg m^2] about the ankle.
 
-    Length of the shank [m] and gravity [m/s^2] are of the leg.
+    ``shank_length`` [m] and ``gravity`` [m/s^2] are properties of the leg.
     """
 
     mass_moment: float
@@ -70,7 +70,7 @@ def foot_inertia_about_ankle(leg: LegParameters) -> float:
 
 
 def link_product(leg: LegParameters) -> float:
-    """Mass of the foot times shank length times distance of its mass centre [kg m^2]; what couples both links."""
+    """Coupling inertia of both links [kg m^2]: foot mass times shank length times distance of its centre of mass."""
     return leg.foot_mass * leg.shank_length * leg.foot_mass_centre
 
 
@@ -105,9 +105,9 @@ def gravity_torques(
     knee_forward: float,
     knee_up: float,
 ) -> tuple[float, float]:
-    """The vector G on knee and ankle [N m], with the knee's acceleration [m/s^2] in it. Equations (11), (12).
+    """Gravity vector G on knee and ankle [N m], including the knee's acceleration [m/s^2]. Equations (11), (12).
 
-    phi is the shank angle, alpha the foot's angle over the horizontal; the knee accelerates forward and up.
+    phi is the shank angle, alpha the foot's angle to the horizontal; the knee accelerates forward and up.
     """
     # A knee that accelerates upwards acts as more gravity.
     up = leg.gravity + knee_up
@@ -117,7 +117,7 @@ def gravity_torques(
 
 
 def foot_load(leg: LegParameters) -> FootLoad:
-    """Foot of a leg about its ankle, without a device."""
+    """Foot of a leg, without a device, as a load about the ankle."""
     return FootLoad(
         mass_moment=leg.foot_mass * leg.foot_mass_centre,
         inertia=foot_inertia_about_ankle(leg),
@@ -137,7 +137,7 @@ def torque_of_shank(
     knee_forward: float,
     knee_up: float,
 ) -> float:
-    """Torque [N m] that shank, knee and weight ask of a body that turns with the foot, beside its own acceleration.
+    """Torque [N m] about the ankle from shank motion, knee motion and weight, without the ankle's own acceleration.
 
     The ankle's row of equation (11) without the term in theta''; angles as in ``gravity_torques``, rates [rad/s],
     accelerations [rad/s^2], [m/s^2].
@@ -152,10 +152,10 @@ def torque_of_shank(
 
 
 def torque_on_foot(load: FootLoad, now: ShankNow, angle: float) -> float:
-    """Torque [N m] that shank, knee and weight put on what turns about the ankle, positive in plantarflexion.
+    """Torque [N m] of shank motion, knee motion and weight on the foot and its plate, positive in plantarflexion.
 
-    T_shank of docs/equations.md: ``torque_of_shank`` at an angle [rad] of the ankle, with the sign of a torque that
-    drives. Equation (11).
+    T_shank of docs/equations.md: ``torque_of_shank`` at an angle [rad] of the ankle, with the sign of a driving torque.
+    Equation (11).
     """
     # alpha = phi - theta + a quarter turn: the foot is level at an ankle angle of 90 deg below an upright shank.
     sine_phi, cosine_phi = sine_and_cosine_of_turns(now.angle * TURNS_OF_RADIAN)
@@ -166,12 +166,12 @@ def torque_on_foot(load: FootLoad, now: ShankNow, angle: float) -> float:
 
 
 def torque_on_resting_foot(load: FootLoad, shank: float, angle: float) -> float:
-    """Torque [N m] of the weight on a foot whose shank rests at an angle [rad]; to the bit as ``torque_on_foot``."""
+    """Torque [N m] of the weight on a foot whose shank rests at an angle [rad]; bit for bit as ``torque_on_foot``."""
     _, cosine_alpha = sine_and_cosine_of_turns((shank - angle) * TURNS_OF_RADIAN + 0.25)
     # Grouped as torque_of_shank groups it, or the last bits would differ.
     return load.mass_moment * (cosine_alpha * load.gravity)
 
 
 def passive_torque(leg: LegParameters, angle: float) -> float:
-    """Torque of tissue on the ankle [N m], positive in plantarflexion, without its damping."""
+    """Passive tissue torque on the ankle [N m], positive in plantarflexion, without its damping."""
     return leg.ankle_stiffness * (leg.ankle_rest_angle - angle)

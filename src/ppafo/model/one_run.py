@@ -1,4 +1,4 @@
-"""The functions of ``columns`` for one run, whose numbers are no columns: what a translated program has of them."""
+"""Scalar versions of the functions of ``columns``, for translated programs of one run."""
 
 import math
 
@@ -6,32 +6,32 @@ from ppafo.model import columns
 
 
 def root(number: float) -> float:
-    """Square root of a number of one run."""
+    """Square root of a number."""
     return math.sqrt(number)
 
 
 def larger(first: float, second: float) -> float:
-    """The larger of two numbers of one run."""
+    """Larger of two numbers."""
     return max(first, second)
 
 
 def smaller(first: float, second: float) -> float:
-    """The smaller of two numbers of one run."""
+    """Smaller of two numbers."""
     return min(first, second)
 
 
 def choose(test: bool, yes: float, no: float) -> float:
-    """The first number where a test holds, else the second."""
+    """First number where a test holds, else the second."""
     return yes if test else no
 
 
 def truncated(number: float) -> float:
-    """A number from -2^63 to 2^63 without its fraction, as a float."""
+    """Integer part of a number from -2^63 to 2^63, as a float."""
     return float(int(number))
 
 
 def whole(number: float) -> int:
-    """A whole number of one run as an int."""
+    """Integer value of a number without fraction, as an int."""
     return int(number)
 
 

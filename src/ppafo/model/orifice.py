@@ -2,8 +2,8 @@
 
 Both forms are one curve, ``mass_flow = conductance * upstream_pressure * flow_function(pressure_ratio)``,
 with a flow function that is 1 when the flow is choked. ``conductance`` [kg/(s Pa)] is ``Cd A C1`` in the paper's
-form and ``C rho_0 sqrt(T_0 / T)`` in the standard's. The exact flow functions stand here beside the fitted one
-that the time stepping uses: a square root times a polynomial, free of powers (``flow_curve.py`` fits it).
+form and ``C rho_0 sqrt(T_0 / T)`` in the standard's. This module has the exact flow functions, and the fitted one
+for the time stepping: a square root times a polynomial, without powers (``flow_curve.py`` fits the polynomial).
 """
 
 import math
@@ -14,13 +14,13 @@ from ppafo.model.columns import root
 from ppafo.model.gas import choked_flow_constant
 
 TERMS = 7
-"""Coefficients of the polynomial of a flow curve."""
+"""Number of coefficients of the polynomial of a flow curve."""
 
 
 class FlowCurve(NamedTuple):
-    """A flow function as data: ``sqrt(1 - r)`` times a polynomial in ``1 - r``, constant below the critical ratio.
+    """Fitted flow function: ``sqrt(1 - r)`` times a polynomial in ``1 - r``, constant below the critical ratio.
 
-    All dimensionless; coefficients from the constant one upwards. Above ``linear_ratio`` the curve is the straight line
+    All dimensionless; coefficients with the constant term first. Above ``linear_ratio`` the curve is the straight line
     to zero at ``r = 1``.
     """
 
@@ -31,7 +31,7 @@ class FlowCurve(NamedTuple):
 
 
 def isentropic_flow_function(pressure_ratio: float, heat_capacity_ratio: float) -> float:
-    """Flow over choked flow [-], 0 to 1, of an isentropic nozzle; ratio is downstream over upstream. Eqs (6), (7)."""
+    """Flow divided by choked flow [-] of an isentropic nozzle, for downstream over upstream pressure. Eqs (6), (7)."""
     k = heat_capacity_ratio
     critical = (2.0 / (k + 1.0)) ** (k / (k - 1.0))
     if pressure_ratio <= critical:
@@ -45,7 +45,7 @@ def isentropic_flow_function(pressure_ratio: float, heat_capacity_ratio: float) 
 
 
 def iso6358_flow_function(pressure_ratio: float, critical_ratio: float) -> float:
-    """Flow over choked flow [-], 0 to 1, of ISO 6358-1:2013 (index 0.5); ratio is downstream over upstream."""
+    """Flow divided by choked flow [-] of ISO 6358-1:2013 (index 0.5), for downstream over upstream pressure."""
     if pressure_ratio <= critical_ratio:
         return 1.0
     if pressure_ratio >= 1.0:
@@ -55,9 +55,10 @@ def iso6358_flow_function(pressure_ratio: float, critical_ratio: float) -> float
 
 
 class ExactOrifice(NamedTuple):
-    """An orifice: conductance [kg/(s Pa)], 1 for the ISO 6358 form or 0 for the isentropic one, and its number [-].
+    """Orifice with an exact flow function: conductance [kg/(s Pa)], and form of the flow function.
 
-    The number is the critical ratio in the first case and the heat capacity ratio in the second.
+    ``is_iso6358`` is 1 for the ISO 6358 form and 0 for the isentropic one; ``number`` is the critical ratio in the
+    first case and the heat capacity ratio in the second.
     """
 
     conductance: float
@@ -67,7 +68,7 @@ class ExactOrifice(NamedTuple):
 
 
 def exact_flow(pressure_a: float, pressure_b: float, conductance: float, orifice: ExactOrifice) -> float:
-    """Mass flow from a to b [kg/s] through a conductance [kg/(s Pa)] with the flow function of an orifice.
+    """Mass flow from a to b [kg/s] through a conductance [kg/(s Pa)] with the exact flow function of an orifice.
 
     Positive from a to b, with a straight line near equal pressures. Equations (6), (7).
     """
@@ -86,15 +87,15 @@ def exact_flow(pressure_a: float, pressure_b: float, conductance: float, orifice
 
 
 def fitted_flow_function(pressure_ratio: float, curve: FlowCurve) -> float:
-    """Flow over choked flow [-], 0 to 1, from a fitted curve; ratio is downstream over upstream, at most 1."""
+    """Flow divided by choked flow [-] by a fitted curve; the ratio of downstream to upstream pressure is at most 1."""
     value, _ = fitted_flow_slope(pressure_ratio, curve)
     return value
 
 
 def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, float]:
-    """Flow function [-] and a slope with respect to the pressure ratio [-], at most 0, from a fitted curve.
+    """Flow function [-] and slope with respect to the pressure ratio [-], at most 0, of a fitted curve.
 
-    The slope is the derivative; within twice the linear region it is the slope of the chord to equal pressures.
+    The slope is the derivative; within twice the linear region it is the slope of the secant to equal pressures.
     """
     gap = 1.0 - pressure_ratio
     linear_gap = 1.0 - curve.linear_ratio
@@ -130,7 +131,7 @@ def orifice_flow(pressure_a: float, pressure_b: float, conductance: float, curve
 def check_valve_flow(
     pressure_a: float, pressure_b: float, conductance: float, is_relieving: float, curve: FlowCurve
 ) -> float:
-    """Mass flow from a to b [kg/s] past a check valve: none back into a where ``is_relieving`` is 0. Eqs (6) to (8)."""
+    """Mass flow from a to b [kg/s] with a check valve: no backflow if ``is_relieving`` is 0. Eqs (6) to (8)."""
     upstream = max(pressure_a, pressure_b)
     ratio = min(pressure_a, pressure_b) / upstream
     flow = conductance * upstream * fitted_flow_function(ratio, curve)
@@ -170,7 +171,7 @@ def area_conductance(
 
 
 def sonic_conductance_mass(sonic_conductance: float, gas_constant: float, temperature: float) -> float:
-    """Conductance [kg/(s Pa)] of a sonic conductance [m^3/(s Pa)] measured with air, for another gas and temperature.
+    """Mass-flow conductance [kg/(s Pa)] for the sonic conductance C [m^3/(s Pa)] of ISO 6358, gas and temperature.
 
     ISO 6358 gives C rho_0 sqrt(T_0 / T) for air; another gas passes sqrt(R_air / R) times as much.
     """
@@ -182,10 +183,11 @@ def sonic_conductance_mass(sonic_conductance: float, gas_constant: float, temper
 
 
 def conductance_in_series(conductance: float, resistance: float) -> float:
-    """Conductance [kg/(s Pa)] of an orifice with a second one behind it, one over whose square is ``resistance``.
+    """Conductance [kg/(s Pa)] of two orifices in series; ``resistance`` is the second conductance to the power -2.
 
-    ``1/C^2 = 1/C_1^2 + 1/C_2^2``: pressure drops of a subsonic flow add up, each as the square of the flow. Written as
-    ``C_1 / sqrt(1 + (C_1/C_2)^2)``, it holds for a shut orifice too. Exact where the flow is far from choked; where it
-    is choked, up to 12 % low for a second orifice as narrow as the first, 5 % for one three times as wide (ISO 6358-3).
+    ``1/C^2 = 1/C_1^2 + 1/C_2^2``: pressure drops of a subsonic flow add up, each proportional to the square of the
+    flow. The form ``C_1 / sqrt(1 + (C_1/C_2)^2)`` is also valid for a closed orifice. Exact for a flow far from choked;
+    for a choked flow up to 12 % low if the second orifice is as narrow as the first, 5 % if it is three times as wide
+    (ISO 6358-3).
     """
     return conductance / math.sqrt(1.0 + conductance * conductance * resistance)

@@ -1,15 +1,15 @@
-"""The plant: vane, chambers and the ports of a valve, put together as floats.
+"""Plant: vane, chambers and the ports of a valve, composed as functions of floats.
 
 First the structs of a device's parameters and of its state. Then the vane with its foot plate, equations (1), (2) and
 (10): torques, stick-slip friction, acceleration. Then the two chambers, equations (3) to (5): volume, pressure and
 mass.
 
-Last what a chamber is connected to during one step, equation (8), for a steady or a changing valve. A ``SinglePort``
-joins a chamber to one node, source or atmosphere. A ``BlendedPort`` joins it to both, each with the mean opening over
-the step: that is how a valve that moves or switches inside a step is seen by the chamber. Flows are positive into the
-chamber. Both kinds offer the same two functions; the engine is composed with one pair. A source lets gas in only,
-unless its regulator is a relieving one: a flow back into a node is multiplied by ``is_relieving``, 1 for the
-atmosphere and for a relieving supply, 0 for a supply with a check valve.
+Last the connections of a chamber during one step, equation (8), for a steady or a changing valve. A ``SinglePort``
+connects a chamber to one node, source or atmosphere. A ``BlendedPort`` connects the chamber to both, each with the mean
+opening over the step, for a valve that moves or switches within a step. Flows are positive into the chamber. Both kinds
+of port have the same two functions; the engine is composed with one pair. A source does not take gas back, unless its
+regulator is a relieving one: a flow back into a node is multiplied by ``is_relieving``, 1 for the atmosphere and for a
+relieving supply, 0 for a supply with a check valve.
 """
 
 from collections.abc import Callable
@@ -25,9 +25,9 @@ HALF_TURN = 0.5 * TURN
 
 
 class PlantParameters(NamedTuple):
-    """Everything fixed about a device and the bench it stands on, SI units; conductances are Cd A C1 [kg/(s Pa)].
+    """Constant parameters of a device and its test bench, SI units; conductances are Cd A C1 [kg/(s Pa)].
 
-    ``relieving`` is 1 where the supplies are relieving, 0 where they let gas in only.
+    ``relieving`` is 1 where the supplies are relieving, 0 where they take no gas back.
     """
 
     gas_product: float
@@ -69,10 +69,10 @@ class PlantState(NamedTuple):
 
 
 class ThermalParameters(NamedTuple):
-    """Gas with an energy balance: heat capacity ratio [-], and what the walls give, h a (k - 1)/R [kg/(s m^3)].
+    """Parameters of the energy balance: heat capacity ratio [-], and wall heat transfer h a (k - 1)/R [kg/(s m^3)].
 
-    ``h`` is the heat transfer coefficient, ``a`` the wall's area over the volume, ``R`` the specific gas constant.
-    ``temperature`` [K] of the walls and the source is the one at which ``PlantState`` counts the gas.
+    ``h`` is the heat transfer coefficient, ``a`` the wall area divided by the volume, ``R`` the specific gas constant.
+    ``temperature`` [K] of walls and source is the reference temperature of the gas in ``PlantState``.
     """
 
     heat_capacity_ratio: float
@@ -81,10 +81,10 @@ class ThermalParameters(NamedTuple):
 
 
 class ThermalState(NamedTuple):
-    """True masses of the gas in both chambers [kg], where ``PlantState`` counts it at the reference temperature.
+    """True masses of the gas in both chambers [kg]; ``PlantState`` has equivalent masses at the reference temperature.
 
-    Totals since the start of the run: energy from the supplies, to the atmosphere and from the walls, counted as
-    contents of chambers are [kg], and work of the gas on the vane [J].
+    Totals since the start of the run: energy from the supplies, to the atmosphere and from the walls, expressed as gas
+    content [kg], and work of the gas on the vane [J].
     """
 
     mass_1: float
@@ -96,27 +96,27 @@ class ThermalState(NamedTuple):
 
 
 class TrueMasses(NamedTuple):
-    """True masses of the gas in both chambers [kg] where it is not ideal: ``PlantState`` counts it by its pressure."""
+    """True masses of a real gas in both chambers [kg]; ``PlantState`` has masses of an ideal gas at its pressure."""
 
     mass_1: float
     mass_2: float
 
 
 class ActuatorFunctions(NamedTuple):
-    """Functions of an actuator, each of a plant first, in SI units: parts of those that step, measure and record."""
+    """Functions of an actuator, as parts of stepping, measuring and recording; SI units, first argument a plant."""
 
     chambers: Callable[..., Any]
-    """Both ``Chambers`` at an angle and two absolute pressures."""
+    """``Chambers`` at an angle and two absolute pressures."""
     pressures: Callable[..., tuple[float, float]]
-    """Absolute pressures at an angle with two masses."""
+    """Absolute pressures at an angle for two masses."""
     torque: Callable[..., float]
     """Torque at an angle and two absolute pressures."""
     rest_volumes: Callable[..., tuple[float, float]]
-    """Volumes of both chambers at an angle, of chambers that give at the pressures of their supplies."""
+    """Volumes of both chambers at an angle; for compliant chambers at their supply pressures."""
     rest_pressures_per_mass: Callable[..., tuple[float, float]]
-    """Pressures over masses in these volumes."""
+    """Pressures divided by masses, for the volumes of ``rest_volumes``."""
     held_pressures: Callable[..., tuple[float, float]]
-    """Absolute pressures of the gas of a state in ``HeldChambers``."""
+    """Absolute pressures of the chambers in a ``HeldChambers`` state."""
 
 
 class Openings(NamedTuple):
@@ -136,17 +136,17 @@ def actuator_torque(pressure_1: float, pressure_2: float, torque_constant: float
 def joint_torque(plant: PlantParameters, _angle: float, pressure_1: float, pressure_2: float) -> float:
     """Torque of the actuator [N m] at an angle [rad] and two absolute pressures [Pa]. Equation (2).
 
-    A vane's is the same at every angle.
+    For a vane the torque does not depend on the angle.
     """
     return actuator_torque(pressure_1, pressure_2, plant.torque_constant)
 
 
 def gravity_torque(angle: float, largest_torque: float) -> float:
-    """Torque [N m] that gravity takes from the vane (it is subtracted in equation (1)), for an upright shank.
+    """Gravity torque [N m] against the vane for an upright shank; it is subtracted in equation (1).
 
     The foot plate is level at 90 deg, where gravity pulls the toes down with ``largest_torque`` = m g l, that is in
-    plantarflexion, so the value is negative. The cosine of the slope is a power series, good to 1e-8 at every angle
-    that a set may state, because a call of a library cosine would keep the loop over runs from vector code.
+    plantarflexion, so the value is negative. The cosine of the slope is a power series, accurate to 1e-8 at every angle
+    that a parameter set may contain: a call of the library cosine would prevent vector code over runs.
     """
     slope = abs(angle - QUARTER_TURN)
     # The cosine is even and periodic: a slope of up to 5 half turns comes within one half turn of level.
@@ -166,21 +166,21 @@ def gravity_torque(angle: float, largest_torque: float) -> float:
 
 
 def torque_less_loads(torque: float, angle: float) -> float:
-    """Torque [N m] less what loads take at an angle [rad] from a joint at rest. Equation (1)."""
+    """Torque [N m] minus the load torques at an angle [rad] for a joint at rest. Equation (1)."""
     return torque - load_torque(0.0, angle, 0.0)
 
 
 def viscous_torque(viscous_damping: float, angular_velocity: float) -> float:
-    """Torque [N m] of viscous damping [N m s/rad] at an angular velocity [rad/s]: it is subtracted. Equation (1)."""
+    """Viscous torque [N m] of a damping [N m s/rad] at an angular velocity [rad/s], to be subtracted. Equation (1)."""
     return viscous_damping * angular_velocity
 
 
 def net_torque(driving: float, friction: float, damping: float, angle: float, angular_velocity: float) -> float:
-    """Torque [N m] that is left to accelerate the joint: the right-hand side of equation (1), and its only home.
+    """Net torque [N m] that accelerates the joint: the right-hand side of equation (1), defined here only.
 
-    ``driving`` [N m] is less what loads take at rest (``torque_less_loads``): what they take of a joint that moves is
-    subtracted here, with ``friction`` [N m] and viscous ``damping`` [N m], along the motion; the latter is 0 for an
-    implicit step, which finds it with its end.
+    ``driving`` [N m] is the torque minus the loads at rest (``torque_less_loads``). The additional load torque of a
+    moving joint is subtracted here, as are ``friction`` [N m] and viscous ``damping`` [N m], positive along the motion;
+    the damping is 0 for an implicit step, which solves for it.
     """
     moving = load_torque(0.0, angle, angular_velocity) - load_torque(0.0, angle, 0.0)
     return driving - friction - moving - damping
@@ -189,21 +189,21 @@ def net_torque(driving: float, friction: float, damping: float, angle: float, an
 def vane_acceleration(
     driving: float, friction: float, viscous_damping: float, inertia: float, angle: float, angular_velocity: float
 ) -> float:
-    """Angular acceleration [rad/s^2] of a joint that moves; arguments as ``net_torque`` has them. Equation (1)."""
+    """Angular acceleration [rad/s^2] of a moving joint; arguments as in ``net_torque``. Equation (1)."""
     damping = viscous_torque(viscous_damping, angular_velocity)
     return net_torque(driving, friction, damping, angle, angular_velocity) / inertia
 
 
 def sliding_friction(angular_velocity: float, dynamic_torque: float) -> float:
-    """Friction torque [N m] of a moving vane, along the angular velocity [rad/s]: it is subtracted. Equation (10).
+    """Friction torque [N m] of a moving vane, with the sign of the angular velocity [rad/s]; subtracted. Equation (10).
 
-    The paper reports the opposite sign beside a friction that is subtracted too, which would drive the motion.
+    The paper reports the opposite sign although the friction is subtracted there too, which would drive the motion.
     """
     return dynamic_torque if angular_velocity > 0.0 else (-dynamic_torque if angular_velocity < 0.0 else 0.0)
 
 
 def holds_still(net_torque: float, static_torque: float, at_lower_stop: bool, at_upper_stop: bool) -> bool:
-    """True where a vane at rest stays at rest: static friction or a stop balances the net torque [N m]."""
+    """Return whether a vane at rest stays at rest: static friction or a stop balances the net torque [N m]."""
     # Equal torques hold: without friction and torque a resting vane rests.
     within = abs(net_torque) <= static_torque
     against_stop = (at_lower_stop and net_torque < 0.0) or (at_upper_stop and net_torque > 0.0)
@@ -213,19 +213,19 @@ def holds_still(net_torque: float, static_torque: float, at_lower_stop: bool, at
 def driving_torque(
     plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float, *, parts: ActuatorFunctions
 ) -> float:
-    """Torque on a vane at rest before friction [N m], positive in plantarflexion. Equations (1), (2)."""
+    """Torque on a vane at rest, before friction [N m], positive in plantarflexion. Equations (1), (2)."""
     actuator = parts.torque(plant, angle, pressure_1, pressure_2)
     gravity = gravity_torque(angle, plant.gravity_torque)
     return torque_less_loads(actuator - gravity - plant.external_torque, angle)
 
 
 def chamber_1_volume(angle: Numeric, angle_min: float, displacement_per_radian: float, dead_volume: float) -> Numeric:
-    """Volume of chamber 1 [m^3], growing with the angle [rad]; equation (4) with a dead volume and a lower stop."""
+    """Volume of chamber 1 [m^3], increasing with the angle [rad]; equation (4) with a dead volume and a lower stop."""
     return dead_volume + displacement_per_radian * (angle - angle_min)
 
 
 def chamber_2_volume(angle: Numeric, angle_max: float, displacement_per_radian: float, dead_volume: float) -> Numeric:
-    """Volume of chamber 2 [m^3], shrinking with the angle [rad]; equation (5) with a dead volume and an upper stop."""
+    """Volume of chamber 2 [m^3], decreasing with the angle [rad]; equation (5) with a dead volume and an upper stop."""
     return dead_volume + displacement_per_radian * (angle_max - angle)
 
 
@@ -237,12 +237,12 @@ def chamber_volumes(plant: PlantParameters, angle: Numeric) -> tuple[Numeric, Nu
 
 
 def chamber_mass(pressure: float, volume: Numeric, gas_product: float) -> Numeric:
-    """Mass [kg] that fills ``volume`` [m^3] at an absolute pressure [Pa]; the inverse of equation (3)."""
+    """Mass [kg] of gas in ``volume`` [m^3] at an absolute pressure [Pa]; the inverse of equation (3)."""
     return pressure * volume / gas_product
 
 
 def pressures_per_mass(plant: PlantParameters, angle: Numeric) -> tuple[Numeric, Numeric]:
-    """Pressures over masses [Pa/kg] of both chambers at an angle [rad], in one division, which costs ten products."""
+    """Pressures divided by masses [Pa/kg] of both chambers at an angle [rad]; one division costs ten products."""
     volume_1, volume_2 = chamber_volumes(plant, angle)
     per_volumes = plant.gas_product / (volume_1 * volume_2)
     return volume_2 * per_volumes, volume_1 * per_volumes
@@ -282,7 +282,7 @@ class BlendedPort(NamedTuple):
 
 
 def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, SinglePort]:
-    """Ports of both chambers for a steady opening [-], -1 to 1: above 0 feeds chamber 1 and vents 2. Equation (8)."""
+    """Ports of both chambers for an opening [-], -1 to 1: positive feeds chamber 1 and vents 2. Equation (8)."""
     conductance = abs(opening) * plant.valve_conductance
     fed, vented = supply_path(conductance), exhaust_path(conductance)
     # An opening of exactly 0 has no conductance: which chamber it takes to be fed does not matter.
@@ -303,7 +303,7 @@ def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, Si
 
 
 def blended_ports(plant: PlantParameters, openings: Openings) -> tuple[BlendedPort, BlendedPort]:
-    """Ports of both chambers for four openings, which may be means over a step. Equation (8)."""
+    """Ports of both chambers for four openings, which may be mean values over a step. Equation (8)."""
     full, back = plant.valve_conductance, plant.relieving
     ambient = plant.atmospheric_pressure
     port_1 = BlendedPort(
@@ -324,7 +324,7 @@ def blended_ports(plant: PlantParameters, openings: Openings) -> tuple[BlendedPo
 
 
 class PortFlow(NamedTuple):
-    """Flow into the chamber [kg/s] and the part of it that comes from the source [kg/s]."""
+    """Flow into the chamber [kg/s], and the part of the flow from the source [kg/s]."""
 
     total: float
     from_source: float
@@ -340,7 +340,7 @@ class PortFlowSlopes(NamedTuple):
 
 
 def admitted_flow(flow: float, is_relieving: float) -> float:
-    """Flow out of a node [kg/s], positive out of it: none back into one that is not relieving. Equation (8)."""
+    """Flow out of a node [kg/s]; 0 for a backflow into a node that is not relieving. Equation (8)."""
     return max(flow, flow * is_relieving)
 
 

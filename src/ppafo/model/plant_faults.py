@@ -1,8 +1,8 @@
-"""Faults of the plant in a walk, and what they do to the ports of both chambers.
+"""Faults of the plant in a walk, and their action on the ports of both chambers.
 
-All act at the ports between valve and chamber, at the command, or at the controller's sample, from a time on; without
-one the numbers of ``SOUND`` change nothing, and a walk that has neither fault nor shut-off is composed without them.
-``fault_catalogue.py`` has what they are called in a file.
+All faults act from a start time on, at the ports between valve and chamber, at the command, or at the sampling of the
+controller. The values of ``SOUND`` change nothing; a walk without faults and shut-off is composed without them.
+``fault_catalogue.py`` has the names of the faults in files.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ class ChamberFaults(NamedTuple):
     """Faults of one chamber, each from its time [s] on, ``NEVER`` for none.
 
     The valve is stuck at an ``opening`` [-], 1 to the supply and -1 to the atmosphere; the hose is off, or kinked to
-    ``kinked_share`` [-] of its conductance; the regulator gives another ``pressure`` [Pa, absolute], creeps by ``rate``
+    ``kinked_share`` [-] of its conductance; the regulator has another ``pressure`` [Pa, absolute], creeps by ``rate``
     [Pa/s], or is frozen to ``frozen_share`` [-] of its flow.
     """
 
@@ -38,9 +38,10 @@ class ChamberFaults(NamedTuple):
 class PlantFaults(NamedTuple):
     """Faults of both chambers and of their common parts, each from its time [s] on, ``NEVER`` for none.
 
-    The valve feeds the other chamber; the bottle empties with ``empty_lag`` [s]; the vane leaks ``leak_factor`` [-]
-    times as much. The valve takes a command once in each ``slow_delay`` [s], the controller runs once in each
-    ``late_delay`` [s], misses ``jitter_share`` [-] of its samples, or is without power for ``brown_out_duration`` [s].
+    With swapped hoses the valve feeds the other chamber; the bottle empties with the time constant ``empty_lag`` [s];
+    the vane leak is multiplied by ``leak_factor`` [-]. The valve takes a command only once per ``slow_delay`` [s]; the
+    controller runs only once per ``late_delay`` [s], misses ``jitter_share`` [-] of its samples, or is without power
+    for ``brown_out_duration`` [s].
     """
 
     chamber_1: ChamberFaults
@@ -62,11 +63,11 @@ class PlantFaults(NamedTuple):
 
 SOUND = PlantFaults(ChamberFaults(), ChamberFaults())
 _NOISE_OF_CONTROLLER = 11
-"""Channel of the noise that says which samples a controller misses; the sensors have channels 0 to 10."""
+"""Noise channel that decides which samples a controller misses; the sensors have channels 0 to 10."""
 
 
 def set_pressure(faults: PlantFaults, chamber: ChamberFaults, pressure: float, room: float, time: float) -> float:
-    """Pressure of a faulty regulator at a time [s], never below the atmosphere ``room``; all [Pa]."""
+    """Pressure of a faulty regulator at a time [s], at least the atmospheric pressure ``room``; all [Pa]."""
     # First the regulator's own faults, then the bottle before it: an empty one takes any of them down with it.
     steady = chamber.pressure if time >= chamber.high_time else pressure
     regulated = steady + chamber.rate * max(time - chamber.creep_time, 0.0)
@@ -88,7 +89,7 @@ def feed_conductance(shut_off: ShutOff, chamber: ChamberFaults, conductance: flo
 
 
 def hose_share(chamber: ChamberFaults, time: float) -> float:
-    """Fraction of its conductance [-] that a hose still has at a time [s]."""
+    """Fraction of the conductance of a hose [-] that is left at a time [s]."""
     return chamber.kinked_share if time >= chamber.kinked_time else 1.0
 
 
@@ -102,7 +103,7 @@ def failed_single_port(
     supply: float,
     time: float,
 ) -> SinglePort:
-    """A port with one open path as faults leave it at a time [s]; ``supply`` [Pa] feeds a stuck valve."""
+    """Port with one open path after faults at a time [s]; a stuck valve is fed by ``supply`` [Pa]."""
     room, is_stuck = plant.atmospheric_pressure, time >= chamber.stuck_time
     # A stuck valve feeds or vents by its own opening, whatever the command would do.
     feeds = (chamber.opening > 0.0) if is_stuck else (port.source_fraction > 0.5)
@@ -130,7 +131,7 @@ def failed_blended_port(
     port: BlendedPort,
     time: float,
 ) -> BlendedPort:
-    """A port with two open paths as faults leave it at a time [s]."""
+    """Port with two open paths after faults at a time [s]."""
     room, fully_open, is_stuck = plant.atmospheric_pressure, plant.valve_conductance, time >= chamber.stuck_time
     source = max(chamber.opening, 0.0) * fully_open if is_stuck else port.source_conductance
     vent = max(-chamber.opening, 0.0) * fully_open if is_stuck else port.vent_conductance
@@ -155,7 +156,7 @@ def failed_single_ports(
     port_2: SinglePort,
     time: float,
 ) -> tuple[SinglePort, SinglePort]:
-    """Ports of both chambers with one open path each, as faults leave them at a time [s]."""
+    """Ports of both chambers with one open path each, after faults at a time [s]."""
     swapped = time >= faults.swapped_time
     own_1, own_2 = swapped_single(port_1, port_2, swapped), swapped_single(port_2, port_1, swapped)
     supply_1, supply_2 = plant.supply_pressure, plant.dorsiflexion_pressure
@@ -166,7 +167,7 @@ def failed_single_ports(
 
 
 def swapped_single(port: SinglePort, other: SinglePort, swapped: bool) -> SinglePort:
-    """The port of a chamber with one open path: its own, or the other chamber's where they are swapped."""
+    """Port with one open path of a chamber: its own, or the other chamber's if the hoses are swapped."""
     return SinglePort(
         conductance=other.conductance if swapped else port.conductance,
         node_pressure=other.node_pressure if swapped else port.node_pressure,
@@ -184,7 +185,7 @@ def failed_blended_ports(
     port_2: BlendedPort,
     time: float,
 ) -> tuple[BlendedPort, BlendedPort]:
-    """Ports of both chambers with two open paths each, as faults leave them at a time [s]."""
+    """Ports of both chambers with two open paths each, after faults at a time [s]."""
     swapped = time >= faults.swapped_time
     own_1, own_2 = swapped_blended(port_1, port_2, swapped), swapped_blended(port_2, port_1, swapped)
     return (
@@ -194,7 +195,7 @@ def failed_blended_ports(
 
 
 def swapped_blended(port: BlendedPort, other: BlendedPort, swapped: bool) -> BlendedPort:
-    """The port of a chamber with two open paths: its own, or the other chamber's where they are swapped."""
+    """Port with two open paths of a chamber: its own, or the other chamber's if the hoses are swapped."""
     return BlendedPort(
         source_conductance=other.source_conductance if swapped else port.source_conductance,
         source_pressure=other.source_pressure if swapped else port.source_pressure,
@@ -208,24 +209,25 @@ FAILED_PORTS: dict[type, Callable[..., tuple[Any, Any]]] = {
     SinglePort: failed_single_ports,
     BlendedPort: failed_blended_ports,
 }
-"""Function of both ports as faults leave them, by the class of the ports."""
+"""Function that applies faults to both ports, by the class of the ports."""
 
 
 def failed_plant(plant: PlantParameters, faults: PlantFaults, time: float) -> PlantParameters:
-    """The plant with the vane leak that it has at a time [s]."""
+    """Plant with the faulty vane leak at a time [s]."""
     factor = faults.leak_factor if time >= faults.leak_time else 1.0
     return plant._replace(leak_conductance=factor * plant.leak_conductance)
 
 
 def is_in_brown_out(faults: PlantFaults, time: float) -> bool:
-    """True where controller and valves have no power at a time [s]."""
+    """Return whether controller and valves are without power at a time [s]."""
     return (time >= faults.brown_out_time) & (time < faults.brown_out_time + faults.brown_out_duration)
 
 
 def is_due(began: float, delay: float, time: float, period: float) -> bool:
-    """True where something that happens once in each ``delay`` since it began does so in this sample; all [s].
+    """Return whether an action that occurs once per ``delay`` is due in the sample at ``time``; all [s].
 
-    It is due in each sample before it ``began``, and in none more often than once in a sample ``period``.
+    Before ``began`` the action is due in each sample. A ``delay`` shorter than the sample ``period`` counts as one
+    period.
     """
     length = max(delay, period)
     # A sample within half a period of its time is due, and one that misses it by rounding (1e-9 of a delay) is not
@@ -235,6 +237,6 @@ def is_due(began: float, delay: float, time: float, period: float) -> bool:
 
 
 def runs_at(faults: PlantFaults, time: float, period: float, seed: int, sample: int) -> bool:
-    """True where the controller runs at a ``sample`` at a time [s]; ``seed`` decides which samples it misses."""
+    """Return whether the controller runs at a ``sample`` at a time [s]; ``seed`` determines the missed samples."""
     missed = (time >= faults.jitter_time) & (unit_noise(seed, sample, _NOISE_OF_CONTROLLER) < faults.jitter_share)
     return is_due(faults.late_time, faults.late_delay, time, period) & (not missed)

@@ -1,14 +1,14 @@
-"""Ports of the physics at which effects act, each as it is without any: what passes through and nothing more.
+"""Ports of the physics at which effects act, each as an identity or a constant without effects.
 
-The plant calls them where its equations have them. An effect gives a law for a port, and a program with that effect
-calls the law instead (``model/effects/kind.py``). A law takes what its port takes, and its own parameters.
+The plant calls a port at its place in the equations. An effect defines a law for a port, and a program with that effect
+calls the law instead (``model/effects/kind.py``). A law takes the arguments of its port, and its own parameters.
 """
 
 from ppafo.model.orifice import FlowCurve
 
 
 def at_valve(command: float) -> float:
-    """Command [-] that the valve follows, given the one that has reached it: -1 to 1, or the one that vents."""
+    """Command [-] that the valve follows, given the command at the valve: -1 to 1, or ``VENT``."""
     return command
 
 
@@ -18,30 +18,30 @@ def opening_time(time: float, is_coil_a: float) -> float:
 
 
 def supply_path(conductance: float) -> float:
-    """Conductance [kg/(s Pa)] from a regulated supply to a chamber, given the open valve's. Equation (8)."""
+    """Conductance [kg/(s Pa)] from a supply to a chamber, given the open valve's conductance. Equation (8)."""
     return conductance
 
 
 def exhaust_path(conductance: float) -> float:
-    """Conductance [kg/(s Pa)] from a chamber to the atmosphere, given the open valve's. Equation (8)."""
+    """Conductance [kg/(s Pa)] from a chamber to the atmosphere, given the open valve's conductance. Equation (8)."""
     return conductance
 
 
 def leakage_path(conductance: float, pressure_1: float, pressure_2: float, curve: FlowCurve) -> float:
-    """Conductance [kg/(s Pa)] of the leak between the chambers, given its orifice's; absolute pressures [Pa].
+    """Conductance [kg/(s Pa)] of the leak between the chambers, given its orifice conductance; absolute pressures [Pa].
 
-    The leak then flows as an orifice of this conductance would, with the flow function of ``curve``.
+    The flow is the flow of an orifice with this conductance and the flow function of ``curve``.
     """
     return conductance
 
 
 def shown_signals(angle: float, pressure_1: float, pressure_2: float) -> tuple[float, float, float]:
-    """Angle [rad] and absolute pressures [Pa] as the sensors of a controller show them, before noise and rounding."""
+    """Readings of a controller's sensors before noise and quantisation: angle [rad] and absolute pressures [Pa]."""
     return angle, pressure_1, pressure_2
 
 
 def rebound(angular_velocity: float) -> float:
-    """Angular velocity [rad/s] after an impact on a stop, given the velocity before it: 0, the vane stays."""
+    """Angular velocity [rad/s] after an impact on a stop, given the velocity before: 0 without effects."""
     return 0.0
 
 
@@ -51,24 +51,24 @@ def friction_at_rest(torque: float, pressure_1: float, pressure_2: float) -> flo
 
 
 def friction_in_motion(torque: float, angular_velocity: float, pressure_1: float, pressure_2: float) -> float:
-    """Size of friction in motion [N m], given the dynamic one; rate [rad/s], absolute pressures [Pa]. Equation (10)."""
+    """Friction torque in motion [N m], without sign, given the dynamic friction torque [N m]. Equation (10)."""
     return torque
 
 
 def load_torque(torque: float, angle: float, rate: float) -> float:
-    """Torque [N m] that a load takes from the joint at an angle [rad] and a rate [rad/s]; it is subtracted.
+    """Load torque [N m] on the joint at an angle [rad] and a rate [rad/s], to be subtracted in equation (1).
 
-    Given what other loads take, 0 without any. Equation (1). What it takes at a rate of 0 friction may hold, as it does
-    the weight of the foot plate; the rest is a drag.
+    ``torque`` is the torque of other loads, 0 without any. The load at a rate of 0 may be carried by static friction,
+    as is the weight of the foot plate; the rest is a drag.
     """
     return torque
 
 
 def gas_density(density: float) -> float:
-    """Density [kg/m^3] of the gas in a chamber, given an ideal gas's at its pressure. Equation (3)."""
+    """Density [kg/m^3] of the gas in a chamber, given the density of an ideal gas at its pressure. Equation (3)."""
     return density
 
 
 def ideal_density(density: float) -> tuple[float, float]:
-    """The inverse of ``gas_density`` [kg/m^3], and how it grows with the density [-]. Equation (3)."""
+    """Inverse of ``gas_density`` [kg/m^3], and its derivative with respect to the density [-]. Equation (3)."""
     return density, 1.0

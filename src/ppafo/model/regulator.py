@@ -1,14 +1,14 @@
-"""Two pressure regulators and the lines behind them, with droop and a largest flow: the supply of a walking device.
+"""Two pressure regulators and their lines, with droop and a largest flow: the supply of a walking device.
 
-The bottle's regulator fills the plantarflexion line. The second regulator sits on the device, behind the first: it
-takes its gas from that line and fills the dorsiflexion line. Each lets through
+The bottle's regulator fills the plantarflexion line. The second regulator is on the device, downstream of the first: it
+takes its gas from that line and fills the dorsiflexion line. The flow through each regulator is
 
     mass flow = clip((set pressure - line pressure) / droop, 0, largest flow),
 
-where the second one cannot regulate to more than its inlet has. A line is a volume of isothermal gas, equation (3);
-gas that a chamber pushes back stays in its line, as no gas flows back through a regulator unless it is a relieving
-one: that lets as much back as through. The lines are stepped with the outflow of the step spread evenly over it: the
-regulator's linear part is solved in closed form, so that a small droop asks for no small step.
+and the second regulator cannot regulate to more than its inlet pressure. A line is a volume of isothermal gas, equation
+(3). Gas that returns from a chamber stays in its line, because no gas flows back through a regulator unless it is a
+relieving one, whose largest flow is the same in both directions. The lines are stepped with a constant outflow during
+the step: the regulator's linear part is solved in closed form, so that a small droop does not require a small step.
 """
 
 from typing import NamedTuple
@@ -19,8 +19,8 @@ from ppafo.model.plant import PlantParameters, chamber_mass
 class SupplyLines(NamedTuple):
     """Droop [Pa s/kg] and largest flow [kg/s] of both regulators, volumes [m^3] of both lines.
 
-    1 is the plantarflexion line behind the bottle's regulator, 2 the dorsiflexion line behind the device's.
-    ``relieving`` is 1 where gas flows back through both regulators, else 0.
+    1 is the plantarflexion line downstream of the bottle's regulator, 2 the dorsiflexion line downstream of the
+    device's. ``relieving`` is 1 where gas flows back through both regulators, else 0.
     """
 
     droop_1: float
@@ -33,7 +33,7 @@ class SupplyLines(NamedTuple):
 
 
 class LineState(NamedTuple):
-    """Gas in both lines, and gas that the bottle's regulator has let through since the start [kg]."""
+    """Gas in both lines [kg], and total gas through the bottle's regulator since the start [kg]."""
 
     mass_1: float
     mass_2: float
@@ -41,7 +41,7 @@ class LineState(NamedTuple):
 
 
 def lines_at_start(plant: PlantParameters, lines: SupplyLines) -> LineState:
-    """Both lines at the pressures that their regulators are set to, and nothing let through yet."""
+    """Both lines at the set pressures of their regulators, with a total of 0."""
     return LineState(
         mass_1=chamber_mass(plant.supply_pressure, lines.volume_1, plant.gas_product),
         mass_2=chamber_mass(plant.dorsiflexion_pressure, lines.volume_2, plant.gas_product),
@@ -50,7 +50,7 @@ def lines_at_start(plant: PlantParameters, lines: SupplyLines) -> LineState:
 
 
 class LineStep(NamedTuple):
-    """Lines after a step, and by how much [Pa] line 1 would have risen in it without the second regulator's draw."""
+    """Lines after a step, and pressure rise of line 1 [Pa] in the step without the flow to the second regulator."""
 
     after: LineState
     inlet_rise: float
@@ -64,10 +64,10 @@ def line_pressures(lines: SupplyLines, gas_product: float, state: LineState) -> 
 def regulated_mass(
     lacking: float, loss: float, stiffness: float, droop: float, largest_flow: float, relieving: float, step: float
 ) -> float:
-    """Mass [kg] through a regulator in a step [s]; below 0 back through a relieving one (1, else 0).
+    """Mass [kg] through a regulator in a step [s]; negative for a backflow through a relieving one (1, else 0).
 
-    ``lacking`` [Pa] is the set pressure less the line's at the beginning; it would grow by ``loss`` [Pa], evenly over
-    the step, if nothing came through, and shrinks by ``stiffness`` [Pa/kg] for what does.
+    ``lacking`` [Pa] is the set pressure minus the line pressure at the start. Without flow through the regulator it
+    would grow by ``loss`` [Pa] during the step; the flow reduces it by ``stiffness`` [Pa/kg].
     """
     steps = step * stiffness / droop
     # 1 / (1 + x + x^2/2) stands for exp(-x): of second order, between 0 and 1, and without a call, so in vector code.
@@ -89,10 +89,10 @@ def step_lines(
     inlet_rise: float,
     step: float,
 ) -> LineStep:
-    """Both lines after a step [s] in which the valves took two masses [kg] from them; set pressures absolute [Pa].
+    """Both lines after a step [s] in which the valves took two masses [kg]; set pressures are absolute [Pa].
 
-    ``inlet_rise`` [Pa] is what is known of line 1's own rise, 0 in a first guess: it matters where the second
-    regulator stands open because its inlet has less than it is set to.
+    ``inlet_rise`` [Pa] is an estimate of line 1's own pressure rise, 0 for a first estimate: it matters where the
+    second regulator is fully open because its inlet pressure is below its set pressure.
     """
     per_mass_1, per_mass_2 = gas_product / lines.volume_1, gas_product / lines.volume_2
     pressure_1, pressure_2 = line_pressures(lines, gas_product, state)

@@ -1,9 +1,9 @@
-"""Sensors of the controller: ideal, or with bandwidth, noise and quantisation; also those of a walk.
+"""Sensors of the controller: ideal, or with bandwidth, noise and quantisation; also the sensors of a walk.
 
-Noise is a pure function of seed, sample number and channel, so that a run gives the same noise alone, in any block
-and on any number of threads. A controller of walking sees two force sensors under the foot beside angle and pressures,
-with faults. One draw a sample says of every sensor with a fault whether its sample is lost: two that lose samples lose
-the same.
+Noise is a pure function of seed, sample number and channel, so that a run has the same noise alone, in any block and on
+any number of threads. A walking controller has two additional force sensors under the foot, and sensors with faults.
+One random number per sample decides the loss of the sample for every faulty sensor: two faulty sensors lose the same
+samples.
 """
 
 from typing import NamedTuple
@@ -13,11 +13,11 @@ from ppafo.model.plant import ActuatorFunctions, PlantParameters
 
 MASK = 0xFFFFFFFF
 ARRIVAL = 40.0
-"""Time over the time constant of a sensor after which it has arrived to rounding."""
+"""Time, in time constants of a sensor, after which the sensor has settled to rounding."""
 
 
 class Measurement(NamedTuple):
-    """Angle [rad], absolute pressures [Pa] and the actuator torque worked out from them [N m]."""
+    """Measured angle [rad] and absolute pressures [Pa], and actuator torque computed from them [N m]."""
 
     angle: float
     pressure_1: float
@@ -26,7 +26,7 @@ class Measurement(NamedTuple):
 
 
 class SensorParameters(NamedTuple):
-    """Standard deviations and quantisation steps of angle [rad] and pressure [Pa] (0 for none), and a seed."""
+    """Standard deviations and quantisation steps of angle [rad] and pressure [Pa] (0 for none), and random seed."""
 
     angle_noise: float
     pressure_noise: float
@@ -36,7 +36,7 @@ class SensorParameters(NamedTuple):
 
 
 def decay_factors(rate: float, step: float) -> tuple[float, float]:
-    """exp(-rate step) and its mean over the step [-], by series at a small fraction of it, doubled up to the whole."""
+    """Factor exp(-rate step) and its mean over the step [-], by series at a small fraction of the step and doubling."""
     # Beyond ARRIVAL exp is 0 to rounding and its mean falls as one over the step: the last line scales it.
     whole = rate * step
     small = -min(whole, ARRIVAL) * SMALLEST_FRACTION
@@ -59,12 +59,12 @@ def follow(rate: float, step: float, shown: float, before: float, now: float) ->
 
 
 def follow_rate(rate: float, shown: float, now: float) -> float:
-    """Rate at which what a first-order sensor shows changes, in its own unit per second; ``rate`` [1/s] 0: never."""
+    """Rate of the reading of a first-order sensor, in its unit per second; 0 for ``rate`` [1/s] 0."""
     return rate * (now - shown)
 
 
 def mix_bits(value: int) -> int:
-    """A 32-bit integer that looks unrelated to ``value`` (0 to 2^32 - 1): xor, shift and multiply, thrice."""
+    """Hash of a 32-bit integer (0 to 2^32 - 1): xor, shift and multiply, three times."""
     value = (value ^ (value >> 16)) * 0x7FEB352D & MASK
     value = (value ^ (value >> 15)) * 0x6C50B47D & MASK
     value = (value ^ (value >> 16)) * 0x45D9F3B & MASK
@@ -72,19 +72,19 @@ def mix_bits(value: int) -> int:
 
 
 def next_word(value: int) -> int:
-    """The 32-bit word that follows one in the sequence of the noise generator."""
+    """Next 32-bit word in the sequence of the noise generator."""
     return mix_bits((value + 0x1E3779B9) & MASK)
 
 
 def halves(value: int) -> int:
-    """Both 16-bit halves of a 32-bit word, added."""
+    """Sum of both 16-bit halves of a 32-bit word."""
     return (value & 0xFFFF) + (value >> 16)
 
 
 def standard_noise(seed: int, sample: int, channel: int) -> float:
-    """Random number [-] of mean 0 and variance 1 for one sample of one channel: twelve uniforms added up.
+    """Random number [-] with mean 0 and variance 1 for one sample of one channel: sum of twelve uniform numbers.
 
-    The sum is within 6 and has an excess kurtosis of -0.1, near enough to normal for a sensor.
+    The sum is within 6 and has an excess kurtosis of -0.1, close enough to normal for a sensor.
     """
     # Six words of two uniforms each, written out: a loop inside would keep the runs from running side by side.
     first = mix_bits(mix_bits(mix_bits(seed & MASK) ^ (sample & MASK)) ^ (channel & MASK))
@@ -98,12 +98,12 @@ def standard_noise(seed: int, sample: int, channel: int) -> float:
 
 
 def unit_noise(seed: int, sample: int, channel: int) -> float:
-    """Random number from 0 to 1 for one sample of one channel, as ``standard_noise`` draws them."""
+    """Random number from 0 to 1 for one sample of one channel, from the generator of ``standard_noise``."""
     return float(mix_bits(mix_bits(mix_bits(seed & MASK) ^ (sample & MASK)) ^ (channel & MASK))) / 4294967296.0
 
 
 def quantise(value: float, resolution: float) -> float:
-    """``value`` rounded to a whole number of ``resolution`` of the same unit (half up); unchanged where that is 0."""
+    """``value`` rounded half up to a multiple of ``resolution`` in the same unit; unchanged for a resolution of 0."""
     # Both sides of a select are computed in vector code: one must not divide by 0. int() cuts towards 0, so each sign
     # has its own half.
     safe = resolution if resolution > 0.0 else 1.0
@@ -125,7 +125,7 @@ def measure(
 ) -> Measurement:
     """Measurement of one sample with noise and quantisation; angle [rad], pressures [Pa absolute].
 
-    The torque is what the actuator of the plant would have at the angle and pressures shown.
+    The torque is computed from the measured angle and pressures.
     """
     seed = int(sensors.seed)
     angle = quantise(angle + sensors.angle_noise * standard_noise(seed, sample, 0), sensors.angle_resolution)
@@ -138,7 +138,7 @@ def measure(
 
 
 class GaitMeasurement(NamedTuple):
-    """Angle [rad], absolute pressures [Pa], actuator torque from them [N m], forces under heel and toes [N]."""
+    """Angle [rad], absolute pressures [Pa], actuator torque computed from both [N m], heel and toe forces [N]."""
 
     angle: float
     pressure_1: float
@@ -149,12 +149,12 @@ class GaitMeasurement(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """Fault of a sensor from ``time`` [s] on: it repeats its last value (``holds`` 1) or shows ``reading``.
+    """Fault of a sensor from ``time`` [s] on: a frozen value (``holds`` 1) or the constant ``reading``.
 
-    With ``distorts`` 1 it shows gain times what is there, plus an offset and a drift [1/s] in its own unit, with a
-    fraction of the other sensor of its kind (``crosstalk``), a first-order lag (``memory``, what is left of its last
-    value after a sample), a fraction of its samples lost, and ``late_samples`` whole samples late. With a ``period``
-    [s] above 0 it is so in the first half of each period only.
+    With ``distorts`` 1 the reading is ``gain`` times the true value, plus an offset and a drift [1/s] in its own unit,
+    with a fraction of the other sensor of its kind (``crosstalk``), a first-order lag (``memory``, the remaining
+    fraction of the last value after a sample), a fraction of lost samples, and a delay of ``late_samples`` samples.
+    With a ``period`` [s] above 0 the fault is active in the first half of each period only.
     """
 
     time: float
@@ -174,8 +174,8 @@ class Fault(NamedTuple):
 class GaitSensors(NamedTuple):
     """Sensors of a walk: response, noise and resolution of the forces [N], fractions of lost samples, and faults.
 
-    ``follow_rate`` [1/s] of the force sensors; ``angle_memory`` and ``pressure_memory`` are what is left of a
-    first-order sensor's last value after one sample, 0 for one that follows at once.
+    ``follow_rate`` [1/s] of the force sensors; ``angle_memory`` and ``pressure_memory`` are the remaining fractions of
+    a first-order sensor's last value after one sample, 0 for a sensor without lag.
     """
 
     follow_rate: float
@@ -196,7 +196,7 @@ class GaitSensors(NamedTuple):
 class GaitSeen(NamedTuple):
     """Last readings: forces under heel and toes [N], angle [rad], absolute pressures [Pa].
 
-    The last three are angle and pressures as a first-order sensor follows them, before noise and steps.
+    The last three fields are the first-order filtered angle and pressures, before noise and quantisation.
     """
 
     heel_force: float
@@ -210,13 +210,13 @@ class GaitSeen(NamedTuple):
 
 
 HALF = 0.5
-"""Fraction of its period in which a fault that comes and goes is there."""
+"""Fraction of its period in which an intermittent fault is active."""
 
 NOTHING_SEEN = GaitSeen._make((0.0,) * len(GaitSeen._fields))
 
 
 def is_active(fault: Fault, time: float) -> bool:
-    """True where a fault acts at a time [s]; one that comes and goes does so in the first half of each period."""
+    """Return whether a fault acts at a time [s]; an intermittent fault acts in the first half of each period."""
     length = fault.period if fault.period > 0.0 else 1.0
     periods = max(0.0, time - fault.time) / length
     away = (periods - float(int(periods)) >= HALF) & (fault.period > 0.0)
@@ -224,9 +224,9 @@ def is_active(fault: Fault, time: float) -> bool:
 
 
 def faulty_reading(fault: Fault, reading: float, other: float, last: float, time: float, draw: float) -> float:
-    """A reading at ``time`` [s] as a faulty sensor gives it, in its unit; ``other`` is the other sensor's.
+    """Reading of a faulty sensor at ``time`` [s], in its unit; ``other`` is the reading of the other sensor.
 
-    ``draw`` from 0 to 1 decides whether the sample is lost.
+    ``draw`` is a random number from 0 to 1 that decides whether the sample is lost.
     """
     mixed = reading + fault.crosstalk * (other - reading)
     # The lag acts last, on what the distorted sensor tends to.
@@ -239,14 +239,14 @@ def faulty_reading(fault: Fault, reading: float, other: float, last: float, time
 
 
 def force_reading(sensors: GaitSensors, force: float, seed: int, sample: int, channel: int) -> float:
-    """A force [N] with noise and steps, never below 0."""
+    """Force [N] with noise and quantisation, at least 0."""
     noisy = force + sensors.force_noise * standard_noise(seed, sample, channel)
     # A force sensor under a foot does not pull.
     return max(quantise(noisy, sensors.force_resolution), 0.0)
 
 
 def hold_if_lost(last: float, reading: float, lost_share: float, seed: int, sample: int, channel: int) -> float:
-    """A reading, or the last one where the sample is lost, in the sensor's unit; ``lost_share`` [-] are lost."""
+    """Reading, or the last reading if the sample is lost, in the same unit; ``lost_share`` [-] is the probability."""
     return last if unit_noise(seed, sample, channel) < lost_share else reading
 
 
@@ -265,7 +265,7 @@ def measure_gait(
     *,
     parts: ActuatorFunctions,
 ) -> tuple[GaitMeasurement, GaitSeen]:
-    """Measurement [SI] of a sample with bandwidth, noise, steps, loss and faults, and what to remember of it."""
+    """Measurement [SI] of a sample with bandwidth, noise, quantisation, loss and faults, and the last readings."""
     seed = int(sensors.seed)
     # A sensor has settled before the walk begins: its reading before the first sample is the same.
     angle_memory = gait_sensors.angle_memory if sample > 0 else 0.0
@@ -312,7 +312,7 @@ def measure_gait(
 
 
 def samples_late(fault: Fault, time: float, sample: int) -> int:
-    """Age, in samples, of the reading that arrives at ``time`` [s], the time of ``sample``."""
+    """Delay, in samples, of the reading that arrives at ``time`` [s], the time of ``sample``."""
     # No reading is older than the first one.
     late = int(fault.late_samples) if is_active(fault, time) else 0
     return min(late, sample)

@@ -1,11 +1,11 @@
-"""The shut-off valve of the safe state: normally closed, with a watchdog that takes the power of all valves away."""
+"""Shut-off valve for the safe state: normally closed, with a watchdog that switches off the power of all valves."""
 
 from typing import NamedTuple
 
 from ppafo.model.declaration import Quantity
 
 NEVER = 1.0e9
-"""Time [s] of what does not happen."""
+"""Time [s] of an event that does not occur."""
 
 SHUT_OFF = (
     Quantity("area", "m^2", "area of the shut-off valve, 0 where none is fitted", 0.0, 0.0, 1.0e-3),
@@ -26,10 +26,10 @@ SHUT_OFF = (
 
 
 class ShutOff(NamedTuple):
-    """Shut-off valve, normally closed 3/2: conductance [kg/(s Pa)], 0 where none is fitted, and delay [s].
+    """Shut-off valve, normally closed 3/2: conductance [kg/(s Pa)], 0 if none is fitted, and delay [s].
 
-    Its watchdog cuts the power of all valves where the controller is silent for longer than
-    ``silence`` [s]; ``NEVER`` where there is none.
+    Its watchdog switches off the power of all valves if the controller is silent for longer than ``silence`` [s];
+    ``NEVER`` if there is none.
     """
 
     conductance: float
@@ -41,9 +41,9 @@ NOT_FITTED = ShutOff(0.0, 0.0, NEVER)
 
 
 class Unpowered(NamedTuple):
-    """Time [s] for which the shut-off valve has been without power, and the controller silent.
+    """Times [s] for which the shut-off valve has been without power and the controller has been silent.
 
-    It has none since the controller stopped, was in a brown-out, or was silent for longer than the watchdog allows.
+    The valve is without power after the controller stops the device, in a brown-out, and after the watchdog acts.
     """
 
     since: float
@@ -54,22 +54,22 @@ POWERED = Unpowered(0.0, 0.0)
 
 
 def vents_line(shut_off: ShutOff, unpowered: Unpowered) -> bool:
-    """True where the shut-off valve has let the line behind it out to the atmosphere."""
+    """Return whether the shut-off valve vents its downstream line to the atmosphere."""
     return (unpowered.since > shut_off.delay) & (shut_off.conductance > 0.0)
 
 
 def is_silenced(shut_off: ShutOff, unpowered: Unpowered) -> bool:
-    """True where the watchdog has taken the power of all valves away."""
+    """Return whether the watchdog has switched off the power of all valves."""
     return unpowered.silent > shut_off.silence
 
 
 def next_unpowered(
     shut_off: ShutOff, unpowered: Unpowered, runs: bool, stopped: bool, brown_out: bool, period: float
 ) -> Unpowered:
-    """Time without power one sample ``period`` [s] on; ``runs`` is true of a controller that is alive.
+    """Time without power one sample ``period`` [s] later; ``runs`` is True if the controller is alive.
 
-    The power is gone where the controller has ``stopped`` the device, and at once in a ``brown_out``. A watchdog that
-    has acted stays: what the controller would do when it comes back is not known.
+    The power is off after the controller has ``stopped`` the device, and at once in a ``brown_out``. A watchdog that
+    has acted stays active, because the state of a returning controller is unknown.
     """
     silenced = is_silenced(shut_off, unpowered)
     silent = unpowered.silent if silenced else (0.0 if runs | brown_out else unpowered.silent + period)

@@ -1,14 +1,15 @@
-"""The gas supply: a bottle of gas, with or without liquid under it, and the regulator behind it.
+"""Gas supply: a bottle of gas, with or without liquid, and its regulator.
 
-First the properties of a real fluid, read from a table: its gas, and where it has one its liquid at the same pressure.
-The table is over temperature and, for the gas, over the fraction of the densest gas that it holds at that temperature:
-saturated vapour where there is a liquid, else a fixed density. Between the nodes all columns run straight, so nothing
-overshoots. The maker of the table says where its numbers come from.
+First the properties of a real fluid, read from a table: its gas and, if it has one, its liquid at the same pressure.
+The table has the temperature and, for the gas, the relative density as coordinates: the density divided by the density
+of the densest gas at that temperature, which is saturated vapour if there is a liquid, else a fixed density. All
+columns are interpolated linearly, so that nothing overshoots. The source of the values is given by the module that
+makes the table.
 
-A bottle has a fixed volume. What it holds has one temperature; liquid and vapour are in equilibrium, so that drawing
-vapour boils liquid, cools it and lowers the pressure. Heat comes from the wall of the bottle, and to the wall from the
-room. When the liquid is used up the rest is a bottle of gas. The gas that leaves takes its enthalpy along:
-``dU/dt = -m_dot h + heat from the wall``. The regulator has no dynamics.
+A bottle has a fixed volume. Its content has one temperature; liquid and vapour are in equilibrium, so that drawing
+vapour boils liquid, which cools the content and lowers the pressure. Heat flows from the wall of the bottle to the
+content, and from the room to the wall. After the liquid is used up the bottle contains gas only. The outflow takes its
+enthalpy along: ``dU/dt = -m_dot h + heat from the wall``. The regulator has no dynamics.
 """
 
 from bisect import bisect_right
@@ -19,17 +20,17 @@ from ppafo.model.orifice import isentropic_flow_function
 
 Column = tuple[float, ...]
 Nodes = tuple[int, float]
-"""Number of the node below a place, and the fraction of the way to the next."""
+"""Index of the lower node, and fraction of the interval to the next node."""
 
 # More halvings than a float has bits, so that the result does not depend on where they began.
 _HALVINGS = 80
 
 
 class FluidTable(NamedTuple):
-    """Nodes of a fluid: ``temperatures`` [K], ``fractions`` of the densest gas [-] from 0 to 1, and values at them.
+    """Table of a fluid: ``temperatures`` [K], ``fractions`` of the densest gas's density [-] from 0 to 1, and values.
 
     By temperature: ``densest`` gas [kg/m^3], ``liquid_densities`` [kg/m^3] and ``liquid_energies`` [J/kg], both empty
-    for a fluid without liquid here. By temperature and share: ``factors`` P/(rho R T) [-], ``energies`` [J/kg].
+    for a fluid without liquid. By temperature and fraction: ``factors`` P/(rho R T) [-], ``energies`` [J/kg].
     """
 
     gas_constant: float
@@ -43,22 +44,22 @@ class FluidTable(NamedTuple):
 
 
 def has_liquid(table: FluidTable) -> bool:
-    """True where the densest gas of the table is vapour over liquid."""
+    """Return whether the densest gas of the table is vapour over liquid."""
     return bool(table.liquid_densities)
 
 
 def densest_gas(table: FluidTable, temperature: float) -> float:
-    """Density [kg/m^3] of the densest gas at a temperature [K]: saturated vapour where the fluid has a liquid."""
+    """Density [kg/m^3] of the densest gas at a temperature [K]: saturated vapour if the fluid has a liquid."""
     return between(table.densest, nodes_around(table, temperature))
 
 
 def liquid_density(table: FluidTable, temperature: float) -> float:
-    """Density [kg/m^3] of the liquid under its own vapour at a temperature [K]."""
+    """Density [kg/m^3] of the saturated liquid at a temperature [K]."""
     return between(table.liquid_densities, nodes_around(table, temperature))
 
 
 def fluid_pressure(table: FluidTable, temperature: float, density: float) -> float:
-    """Absolute pressure [Pa] of gas at a density [kg/m^3]; above the densest gas there is, that gas's pressure."""
+    """Absolute pressure [Pa] of gas at a density [kg/m^3], at most the pressure of the densest gas."""
     nodes = nodes_around(table, temperature)
     # Beyond saturated vapour more gas is more liquid, at the same pressure.
     held = min(density, between(table.densest, nodes))
@@ -67,7 +68,7 @@ def fluid_pressure(table: FluidTable, temperature: float, density: float) -> flo
 
 
 def gas_density(table: FluidTable, temperature: float, pressure: float) -> float:
-    """Density [kg/m^3] of gas at a temperature [K] and an absolute pressure [Pa], by halving; at most the densest."""
+    """Density [kg/m^3] of gas at a temperature [K] and an absolute pressure [Pa], by bisection; at most ``densest``."""
     low, high = 0.0, densest_gas(table, temperature)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
@@ -79,19 +80,19 @@ def gas_density(table: FluidTable, temperature: float, pressure: float) -> float
 
 
 def gas_specific_energy(table: FluidTable, temperature: float, density: float) -> float:
-    """Specific internal energy [J/kg] of gas at a density [kg/m^3]; beyond the densest gas there is, that gas's."""
+    """Specific internal energy [J/kg] of gas at a density [kg/m^3]; beyond the densest gas, its energy."""
     return across(table.energies, table, nodes_around(table, temperature), density)
 
 
 def nodes_around(table: FluidTable, temperature: float) -> Nodes:
-    """Place of a temperature [K] among the table's; the ends of the table hold outside it."""
+    """Nodes of the table around a temperature [K]; the end nodes outside of the table."""
     return place_among(table.temperatures, temperature)
 
 
 def across(rows: tuple[Column, ...], table: FluidTable, nodes: Nodes, density: float) -> float:
-    """Value of some rows at a place among the temperatures and a density [kg/m^3], straight in both.
+    """Value of some rows at given temperature nodes and a density [kg/m^3], by bilinear interpolation.
 
-    What runs straight is the fraction of the densest gas.
+    The second coordinate is the density divided by the density of the densest gas.
     """
     index, weight = nodes
     fraction = min(density / between(table.densest, nodes), 1.0)
@@ -100,13 +101,13 @@ def across(rows: tuple[Column, ...], table: FluidTable, nodes: Nodes, density: f
 
 
 def between(column: Column, nodes: Nodes) -> float:
-    """Value of a column at a place among its nodes, in its own unit."""
+    """Linear interpolation of a column at given nodes, in the unit of the column."""
     index, weight = nodes
     return (1.0 - weight) * column[index] + weight * column[index + 1]
 
 
 def place_among(nodes: Column, at: float) -> Nodes:
-    """Place of a number among nodes of its own unit; the ends hold outside them."""
+    """Nodes around a number, in the same unit; the end nodes outside of their range."""
     index = min(max(bisect_right(nodes, at) - 1, 0), len(nodes) - 2)
     weight = (at - nodes[index]) / (nodes[index + 1] - nodes[index])
     return index, min(max(weight, 0.0), 1.0)
@@ -117,7 +118,7 @@ _MAXIMUM_HALVINGS = 60
 
 
 class BottleWall(NamedTuple):
-    """Heat capacity of the wall [J/K], and heat per kelvin [W/K] from the wall to the content and room to wall."""
+    """Heat capacity of the wall [J/K], and heat transfer [W/K] from wall to content and from room to wall."""
 
     wall_heat_capacity: float
     content_heat_transfer: float
@@ -142,7 +143,7 @@ class BottleContent(NamedTuple):
 
 
 class BottleRates(NamedTuple):
-    """Time derivatives of ``BottleState``, and what crosses the border: enthalpy out and heat from the room, both W."""
+    """Time derivatives of ``BottleState``, and power [W] over the boundary: outflow enthalpy and heat from the room."""
 
     mass_rate: float
     content_energy_rate: float
@@ -152,10 +153,10 @@ class BottleRates(NamedTuple):
 
 
 class Regulator(NamedTuple):
-    """A regulator: set pressure [Pa absolute], how it falls with the flow [Pa s/kg], and what it needs.
+    """Regulator: set pressure [Pa absolute], droop [Pa s/kg], pressure margin [Pa] and seat area [m^2].
 
-    ``pressure_margin`` [Pa] is inlet above outlet; ``seat_area`` [m^2] is the fully open seat, area times discharge
-    coefficient.
+    ``pressure_margin`` is the smallest inlet pressure minus outlet pressure; ``seat_area`` is the fully open seat, area
+    times discharge coefficient.
     """
 
     set_pressure: float
@@ -180,7 +181,7 @@ def bottle_content(table: FluidTable, mass: float, volume: float, temperature: f
 
 
 def liquid_mass(table: FluidTable, mass: float, volume: float, temperature: float) -> float:
-    """Liquid [kg] in a bottle of a volume [m^3], from the densities of both phases; 0 where all is gas."""
+    """Liquid [kg] in a bottle of a volume [m^3], from the densities of both phases; 0 without liquid."""
     return _liquid_beside(table, mass, volume, nodes_around(table, temperature))
 
 
@@ -194,7 +195,7 @@ def _liquid_beside(table: FluidTable, mass: float, volume: float, nodes: Nodes) 
 
 
 def content_energy(table: FluidTable, mass: float, volume: float, temperature: float) -> float:
-    """Internal energy [J] of the content of a bottle, at the reference of the table."""
+    """Internal energy [J] of the content of a bottle, relative to the reference state of the table."""
     nodes = nodes_around(table, temperature)
     liquid = _liquid_beside(table, mass, volume, nodes)
     gas = across(table.energies, table, nodes, mass / volume)
@@ -205,7 +206,7 @@ def content_energy(table: FluidTable, mass: float, volume: float, temperature: f
 def content_temperature(table: FluidTable, mass: float, volume: float, energy: float) -> float:
     """Temperature [K] of a content with an internal energy [J]: the inverse of ``content_energy``.
 
-    The ends of the table where the energy lies beyond them.
+    The end temperatures of the table for energies outside of its range.
     """
     nodes = table.temperatures
     below, above = 0, len(nodes) - 1
@@ -241,7 +242,7 @@ def content_temperature(table: FluidTable, mass: float, volume: float, energy: f
 def bottle_rates(
     content: BottleContent, state: BottleState, draw: float, wall: BottleWall, room_temperature: float
 ) -> BottleRates:
-    """Rates of a bottle under a draw of vapour [kg/s]: balances of mass, and of energy of content and wall."""
+    """Rates of a bottle for an outflow of vapour [kg/s]: balances of mass, and of energy of content and wall."""
     to_content = wall.content_heat_transfer * (state.wall_temperature - content.temperature)
     from_room = wall.room_heat_transfer * (room_temperature - state.wall_temperature)
     outflow = draw * content.outflow_enthalpy
@@ -255,17 +256,17 @@ def bottle_rates(
 
 
 def regulated_pressure(regulator: Regulator, mass_flow: float) -> float:
-    """Absolute pressure [Pa] behind a regulator that can regulate: its set pressure less the droop of a flow [kg/s]."""
+    """Absolute pressure [Pa] downstream of a working regulator: set pressure minus the droop at a flow [kg/s]."""
     return regulator.set_pressure - regulator.droop * mass_flow
 
 
 def delivered_pressure(regulator: Regulator, bottle_pressure: float, mass_flow: float) -> float:
-    """Absolute pressure [Pa] behind a regulator: regulated, or where the bottle has too little, bottle less margin."""
+    """Absolute pressure [Pa] downstream of a regulator: regulated, or bottle pressure minus margin if that is lower."""
     return min(regulated_pressure(regulator, mass_flow), bottle_pressure - regulator.pressure_margin)
 
 
 def pressure_reserve(regulator: Regulator, bottle_pressure: float, mass_flow: float) -> float:
-    """Pressure [Pa] that a bottle has above what its regulator needs for a flow [kg/s]; below 0 it cannot hold it."""
+    """Bottle pressure minus the required inlet pressure of the regulator at a flow [kg/s], in [Pa]."""
     return bottle_pressure - regulator.pressure_margin - regulated_pressure(regulator, mass_flow)
 
 
@@ -276,7 +277,7 @@ def regulator_flow_limit(
     heat_capacity_ratio: float,
     gas_constant: float,
 ) -> float:
-    """Largest flow [kg/s] that a regulator passes at its set pressure: its seat fully open. Equations (6), (7)."""
+    """Largest flow [kg/s] of a regulator at its set pressure, with its seat fully open. Equations (6), (7)."""
     # A set pressure above the bottle's gives no flow, not an error: the bottle is nearly empty then.
     ratio = min(regulator.set_pressure / bottle_pressure, 1.0)
     choked = choked_flow_constant(heat_capacity_ratio, gas_constant, temperature)

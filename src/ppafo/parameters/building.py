@@ -45,9 +45,9 @@ from ppafo.units.shown import counted_from, shown_in, shown_text
 from ppafo.wording import nearest_name, one_line
 
 _SAME = 1.0e-9
-"""Angles [rad] this near are one, written in two ways."""
+"""Angle difference [rad] below which two angles count as the same."""
 _COVERED = 1.01
-"""A supply this much beyond the pressures of a table is still covered by it."""
+"""Ratio by which the supply may exceed the pressures of a table."""
 _BESIDE_ANOTHER = "; the other supply is above it, and both must be on the same side of the atmosphere"
 SUPPLIES = PRESSURE_PATH, SECOND_PRESSURE_PATH
 Reader = Callable[[str, Iterable[Quantity]], dict[str, float]]

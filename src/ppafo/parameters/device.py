@@ -17,7 +17,7 @@ from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.units.shown import counted_from, shown_in, shown_text
 
 VANE = "vane"
-"""The kind of actuator that is the paper's; see the catalogue of actuators."""
+"""Kind of the paper's actuator in the catalogue of actuators."""
 
 
 class _Holding(Protocol):

@@ -20,7 +20,7 @@ ATMOSPHERE_PATH = "supply.atmospheric_pressure"
 PRESSURE_PATH, SECOND_PRESSURE_PATH = "supply.pressure", "supply.dorsiflexion_pressure"
 TORQUE_CONSTANT_PATH, DISPLACEMENT_PATH = "actuator.torque_constant", "actuator.displacement_per_radian"
 SAME_PRESSURE = 1.0e-6
-"""Relative difference below which two pressures are one that was written in two units."""
+"""Relative difference below which two pressures count as the same pressure in two units."""
 _LEVEL, _GAUGE = "Pa_a", "_g"
 _COUNTS_FROM_ATMOSPHERE = ("supply.", "initial.", "reference.")
 
@@ -111,7 +111,7 @@ def follows(source: str, gap: float = 0.0, when_set: bool = False) -> LinkedDefa
 
 
 Graph = Mapping[str, tuple[LinkedDefault, ...]]
-"""Links by the path of what follows; of several the first whose sources change counts. Sources stand before those."""
+"""Links by path of the follower; the first link whose sources change is used. Sources precede their followers."""
 
 
 def counts_from(path: str, atmosphere: float) -> float:

@@ -14,13 +14,13 @@ Floats = NDArray[np.float64]
 
 
 _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
-"""Kind of quantity of a metric by its unit in SI: masses among the metrics are masses of gas."""
+"""Kind of quantity of a metric by its SI unit: a mass among the metrics is a mass of gas."""
 _ON_AXES = {"psi_g": "psig", "psi_a": "psia", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
-"""Units that an axis writes in a form of their own."""
+"""Units with a different form on an axis."""
 _PRESSURE_KINDS = {"_g": " gauge", "_a": " absolute"}
-"""Words on an axis for the ending of a pressure unit."""
+"""Words for the suffix of a pressure unit on an axis."""
 _METRIC = ".4g"
-"""Digits of a metric."""
+"""Number format of a metric."""
 
 
 def si_unit(quantity: str) -> str:

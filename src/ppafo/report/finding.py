@@ -26,21 +26,21 @@ if TYPE_CHECKING:
 
 T_co = TypeVar("T_co", covariant=True)
 Cell = str | float | ConfidenceInterval | None
-"""A number in SI, an estimate with its interval, a text, or None where there is nothing to say."""
+"""Number in SI units, estimate with its confidence interval, text, or None for an empty cell."""
 NOTHING = "-"
-"""The text of a cell in which there is nothing to say."""
+"""Text of an empty cell."""
 MARK = "*"
 """Mark before a highlighted row."""
 REPORT = "report.html"
 FORMATS = ("png", "svg")
-"""Formats of a figure in a folder."""
+"""File formats of a figure in a folder."""
 _UNIT_IN_BRACKETS = re.compile(r"\([^(]*\)$")
 _ORIGINS = {
     "simulated": "Every run is of the model; nothing on this page was measured.",
     "synthetic": "The recordings are synthetic: the simulated test bench made them, nothing was measured.",
     "measured": "",
 }
-"""Statement of a page on the origin of its numbers, by kind."""
+"""Statement on the origin of the numbers of a page, by kind."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -113,7 +113,7 @@ class Kind:
 
 
 PLAIN = Kind()
-"""A plain number, or a text."""
+"""Kind of dimensionless numbers, and of texts."""
 TIME = Kind("Time", "s", "time")
 
 

@@ -58,27 +58,27 @@ class Panel:
 
 
 _TOP = 0.28
-"""Inches above the panels, in which the figure says that it is simulated."""
+"""Space above the panels for the kind of the numbers, such as "simulated" [inches]."""
 _LINE = 0.17
-"""Inches of a line of the note, and of names above all panels."""
+"""Line height of the note, and of a legend above all panels [inches]."""
 _UNDER_NAMES = 0.08
-"""Inches from these names to the panels."""
+"""Space between that legend and the panels [inches]."""
 _LETTERS, _FEWEST_LETTERS, _KIND = 11.0, 24, 1.0
-"""Letters of a title on an inch, the fewest on a line, and inches that its kind of numbers takes beside it."""
+"""Letters of a title per inch, least letters per line, and width of the kind of the numbers [inches]."""
 _ENTRY, _ENTRY_LETTERS = 0.53, 14.5
-"""Inches of an entry of a legend without its name, and letters of names on an inch."""
+"""Width of a legend entry without its name [inches], and letters of names per inch."""
 _ROW, _ABOVE = 13.0, 6.0
-"""Points of a row of a legend, and from the axes to a title."""
+"""Height of a legend row, and distance from the axes to a title [points]."""
 _LABEL_LETTERS, _AXIS_ROOM = 13.0, 0.55
-"""Letters of a label on an inch of its axis, and inches of the height of a panel that its axis does not have."""
+"""Letters of an axis label per inch, and part of the panel height outside the axis [inches]."""
 _DASHED_SHAPES = ("line", "bars")
-"""Shapes that have the dashes of their colours beside others."""
+"""Shapes with dashes that depend on their colour."""
 _TITLE_SIZE, _SMALLEST_TITLE = 11.0, 0.72
-"""Points of a title, and the fraction of them that it has at least."""
+"""Font size of a title [points], and smallest relative size of a shortened title."""
 _MARKUP = re.compile(r"\\[a-z]+|[${}_^]")
-"""Characters of a formula in a title that are not letters on the page."""
+"""Pattern of the markup in a title, which takes no space on the page."""
 _TITLE_LINE = 0.2
-"""Inches of a line of the title."""
+"""Line height of the title [inches]."""
 _OF_LEGEND: Mapping[str, Any] = {
     "borderaxespad": 0.1,
     "handlelength": 2.2,
@@ -86,9 +86,9 @@ _OF_LEGEND: Mapping[str, Any] = {
     "labelspacing": 0.2,
     "borderpad": 0.2,
 }
-"""Words of Matplotlib for a legend above the panels."""
+"""Matplotlib keywords of a legend above the panels."""
 _AREA = {"alpha": 0.15, "linewidth": 0}
-"""Words of Matplotlib for a band, unless it has its own."""
+"""Default Matplotlib keywords of a band."""
 
 
 def _line(axes: "Axes", mark: Mark, x: Any, y: Any) -> None:

@@ -33,11 +33,11 @@ if TYPE_CHECKING:
 
 FIGURE_FORMATS = ("png", "svg", "pdf")
 _SIZE = (5.4, 1.5)
-"""Inches of a panel with its title."""
+"""Size of a panel with its title [inches]."""
 _HEADROOM = 0.06
-"""Air above and below what is drawn, as a fraction of the axis."""
+"""Margin above and below the data, as a fraction of the axis."""
 _MAXIMUM_TICKS = 5
-"""Steps between ticks of a value axis at most."""
+"""Largest number of intervals between ticks of a value axis."""
 
 _ANGLE, _COMMAND = Kind("Ankle angle", "rad", "angle"), Kind("Valve command (-1 to 1)")
 _COMMAND_THAT_VENTS = Kind("Valve command (-1 to 1; 2 vents both chambers)")

@@ -37,9 +37,9 @@ _LOOKS = {
     "circles": _ReadingStyle(BLACK, 90, {"marker": "o", "markersize": 3.6, "markeredgewidth": 0.7, **_HOLLOW}),
     "dots": _ReadingStyle(BLACK, 400, {"marker": ".", "markersize": 2.6, "linestyle": ""}),
 }
-"""Looks of readings by name."""
+"""Styles of measured points by name."""
 _ROUNDING = 1.0e-9
-"""Residual over the range of the samples that is none."""
+"""Residual relative to the range of the samples that counts as zero."""
 
 
 def readings_mark(label: str, x: Floats, y: Floats, look: str = "measured") -> Mark:

@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _LARGEST = 1e9
-"""No atmosphere [Pa absolute] and no time [s] is as large."""
+"""Upper limit for the atmosphere [Pa absolute] and for times [s] in a document."""
 _LONGEST_SHOWN = 60
-"""Characters of a key, a value or a word that a message or figure repeats."""
+"""Largest number of characters of a key, value or word in a message or figure."""
 _LONGEST_REMARK = 500
-"""Characters of what a document says of the end of a run."""
+"""Largest number of characters of a document's message on the end of a run."""
 _END_OF_WALK = 5.0
-"""Seconds at the end of a walk that are drawn, some strides: a minute of them is a black bar."""
+"""Duration drawn from the end of a walk [s]: a few strides, since a longer one would be unreadable."""
 
 
 @checked

@@ -20,9 +20,9 @@ VERMILION = "#D55E00"
 GREEN = "#009E73"
 ORANGE = "#E69F00"
 PURPLE = "#A33F77"
-"""Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
+"""Colours that are distinguishable with any kind of colour vision (Okabe and Ito, 2008)."""
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, BLACK, GREY)
-"""The order in which lines of one kind take colours."""
+"""Order of the colours of lines of one kind."""
 DASHES = MappingProxyType(
     {
         VERMILION: (0, (6, 1.5, 1.2, 1.5)),
@@ -32,9 +32,9 @@ DASHES = MappingProxyType(
         GREY: (0, (6, 1.2, 1.2, 1.2, 1.2, 1.2)),
     }
 )
-"""Dashes of a colour beside lines of other colours, as half of these colours are one grey; others are solid."""
+"""Dashes by colour for lines of several colours, half of which are equal in greyscale; other colours are solid."""
 MARKERS = MappingProxyType({VERMILION: "s", GREEN: "^", ORANGE: "D", PURPLE: "v", BLACK: "P", GREY: "X"})
-"""Marker of a colour beside others, a circle of one that is not named."""
+"""Marker by colour; the default is a circle."""
 
 
 class DrawingStyle(NamedTuple):
@@ -51,16 +51,16 @@ CHAMBER_1 = DrawingStyle(GREEN, marker="^")
 CHAMBER_2 = DrawingStyle(PURPLE, line="-.", marker="v")
 REFERENCE = DrawingStyle(BLACK, line="--")
 REFERENCE_2 = DrawingStyle(BLACK, line=":")
-"""Style of what is wanted of a second quantity in the same panel."""
+"""Style of a second reference in the same panel."""
 EXPERIMENT = DrawingStyle(GREY, marker=".")
-"""Style of measurements, from a bench or from the simulated test bench."""
+"""Style of measurements, from a real or a simulated test bench."""
 ACTUAL = DrawingStyle(BLUE)
-"""Style of a device irrespective of its valve."""
+"""Style of a device regardless of its valve."""
 _VALVES = MappingProxyType({"proportional": PROPORTIONAL, "solenoid": SOLENOID, "solenoid_recycling": SOLENOID})
 PAGE_COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
-"""Curves of the page that simulates, on white: numbers 1 to 4 of its style sheet."""
+"""Colours of curves on the page that simulates, on white: numbers 1 to 4 of its style sheet."""
 PAGE_LOOKS = MappingProxyType({kind: PAGE_COLOURS.index(look.colour) + 1 for kind, look in _VALVES.items()})
-"""Index of the page's colour for the curves of each kind of valve."""
+"""Index of the page's colour for each kind of valve."""
 
 
 def look_of_valve(kind: str) -> DrawingStyle:
@@ -69,7 +69,7 @@ def look_of_valve(kind: str) -> DrawingStyle:
 
 
 RESOLUTION = 150
-"""Dots per inch of a PNG file."""
+"""Resolution of a PNG file [dots per inch]."""
 _SETTINGS: Any = MappingProxyType(
     {
         "font.family": "sans-serif",

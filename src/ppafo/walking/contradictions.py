@@ -25,10 +25,10 @@ from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import Wearer
 
 COMPRESSION = 1.6
-"""Highest pressure in a chamber over the supply pressure, with room: up to 1.38 in the shipped walks."""
+"""Limit of the chamber pressure relative to the supply pressure, with a margin: at most 1.38 in the shipped walks."""
 
 _IN_FILES = {"m": "m"}
-"""Units in which files of walks have segments of a leg, which everything else has in millimetres."""
+"""Units of leg segments in walk files; other lengths are in millimetres."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +69,10 @@ _IS_BAD = {"below": operator.ge, "above": operator.le, "at most": operator.gt, "
 
 
 _OF_DEVICE = ("actuator.angle_max", "actuator.angle_min")
-"""Stops of the device, which no key of a walk file gives."""
+"""End stops of the device, which cannot be set by a key of a walk file."""
 _PHASES = np.linspace(0.0, 1.0, 200, endpoint=False)
 _BEYOND_STOP = math.radians(5.0)
-"""Angle by which a gait may go beyond a stop [rad]: no better is the zero of most recordings known."""
+"""Angle [rad] by which a gait may exceed an end stop: the accuracy of the angle zero in most known recordings."""
 
 
 class _Contradiction(NamedTuple):

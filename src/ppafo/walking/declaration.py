@@ -36,7 +36,7 @@ SUMMARY = "the device on a leg that walks along a prescribed gait"
 """Description of the motion of a walk."""
 
 THRESHOLDS = next(iter(TIMINGS))
-"""The estimator of the gait phase of a walk file that names none."""
+"""Default gait phase estimator of a walk file."""
 
 LARGEST_SEED = 2**32 - 1
 SEED = Quantity("seed", "", "seed of noise and lost samples, a whole number", 1.0, 0.0, float(LARGEST_SEED))
@@ -64,7 +64,7 @@ WALK_SENSORS = (
     Quantity("pressure_lost_share", "1", "fraction of the pressure samples that are lost", 0.0, 0.0, 1.0),
 )
 FORCES = tuple(quantity.name for quantity in WALK_SENSORS if quantity not in SENSORS)
-"""Settings of sensors that no vane has."""
+"""Sensor settings that exist in a walk only: force sensors."""
 
 _FAULTY = {
     "heel": ("N", "N", "N/s", 1.0e6),
@@ -73,7 +73,7 @@ _FAULTY = {
     "pressure_1": ("Pa_a", "Pa_d", "Pa/s", 1.0e9),
     "pressure_2": ("Pa_a", "Pa_d", "Pa/s", 1.0e9),
 }
-"""Units of the reading, its offset and its drift, and the largest reading, by the sensor that can fail."""
+"""Values by sensor that can fail: units of reading, offset and drift, and the largest reading."""
 FAULTY = tuple(_FAULTY)
 
 
@@ -199,7 +199,7 @@ OF_A_WALK = DeclaredContent(
     appended={path: (BOTTLE, own) for path, own in BOTTLE_OVERRIDES.items()},
     check_motion=_check_motion,
 )
-"""Possible content of the file of a walk. Gait and task sequence are at top level or, as its motion, in [motion]."""
+"""Possible content of a walk file. Gait and task sequence are at top level or in the table [motion]."""
 
 
 def walk_file(document: Mapping[str, Any]) -> type[BaseModel]:

@@ -21,39 +21,39 @@ from ppafo.walking.preparation import rocker_on_heel
 from ppafo.walking.wearer import HeelRocker, Wearer
 
 FLAT_FROM, FLAT_TO = 0.15, 0.35
-"""Phases between which every foot stands flat; the angle of the foot is taken from there."""
+"""Phases [strides] between which the foot stands flat; the angle of the flat foot is taken from this interval."""
 
 USUAL_HEEL_RISE, LATEST_HEEL_RISE = 0.6, 0.95
-"""Shares of the stance at which the heel rises where the angles do not show it, and at the latest."""
+"""Fraction of the stance at which the heel rises: default if the angles do not show it, and upper limit."""
 
 EVENT_PHASES = np.linspace(0.0, 1.0, 1001)[150:]
-"""Phases at which events are looked for, from the first flat foot on."""
+"""Phases [strides] at which events are searched, from the first flat foot on."""
 
 CLEARANCE_FROM, CLEARANCE_TO = 0.2, 0.9
-"""Shares of the swing between which the toes must clear the ground."""
+"""Fractions of the swing between which the toes must clear the ground."""
 
 ANKLE_HEIGHT_FRACTION = 0.039 / 0.246
-"""Height of the ankle over the sole as a fraction of the shank's length: both as fractions of the stature in figure
-4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009."""
+"""Ankle height above the sole divided by shank length; both are given as fractions of the stature in figure 4.1 of
+Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009."""
 
 MID_SWING_CLEARANCE = 0.015
-"""Healthy toes over the ground in mid-swing [m]; 1 to 2 cm (Winter 1992, Phys Ther 72:45)."""
+"""Healthy toe clearance in mid-swing [m]; 1 to 2 cm (Winter 1992, Phys Ther 72:45)."""
 
 HAND_OVER = 0.02
-"""Difference of height [m] within which toes and heel both tell how high the ankle is in the swing, at most. Assumed:
-the ankle of a person has no kink; it is 0.9 cm higher than needed where both would touch."""
+"""Largest difference of height [m] over which the ankle path in swing is blended between toes and heel. Assumed: it
+avoids a kink of the ankle path; the ankle is 0.9 cm higher than needed where both would touch."""
 
 DEFAULT_SPEED = 1.3
-"""Walking speed [m/s] where the gait has none; only for the length of the strides in pictures."""
+"""Walking speed [m/s] of a gait without a speed; used for the stride length in figures only."""
 
 _GRID = np.linspace(0.0, 1.0, 1001)
 
 ROLL_ANGLES = tuple(math.radians(degrees) for degrees in range(2, 16))
-"""Tilts [rad] at which the lever of the ground force may have risen half of the way."""
+"""Tilts [rad] tried as the tilt at which the lever of the ground force has risen by half."""
 
 
 LONGER_THAN_A_FOOT = 1.0e3
-"""Lever [m] where nothing was measured: the lever of the heel bounds it."""
+"""Lever [m] used without a measurement; the actual bound is the heel lever."""
 
 
 SERIES = {
@@ -64,7 +64,7 @@ SERIES = {
     "knee_forward": "knee_forward",
     "knee_up": "knee_up",
 }
-"""Curves that the engine takes, and that vary between people, by their field of ``GaitSeries``."""
+"""Curves used by the engine, which vary between people, by field of ``GaitSeries``."""
 
 
 def gait_series(gait: Gait) -> GaitSeries:
@@ -217,12 +217,13 @@ def heel_rocker(gait: Gait, wearer: Wearer) -> HeelRocker:
 
 
 def fit_rocker(gait: Gait) -> tuple[float, float, float]:
-    """The lever over the tilt of the measured foot while it comes down on its heel alone, by least squares.
+    """Return the heel lever as a function of foot tilt, fitted by least squares to the landing on the heel alone.
 
-    These are the lever [m] nearly flat, its gain [m] far up, and the tilt [rad] at half the gain. They come from the
-    measured moment, which horizontal forces are part of, or without one from the centre of pressure. A heel that is
-    still up when the toes of the measured foot take over keeps the last lever. The lever of the heel itself
-    bounds it, and stands in where nothing was measured.
+    The result is the lever of the nearly flat foot [m], the increase of the lever for a raised foot [m], and the tilt
+    at half of the increase [rad]. The lever is the measured ankle moment, which includes horizontal forces, divided by
+    the vertical force, or else the centre of pressure. If the heel is still raised when the toes of the measured foot
+    take over the load, the last lever remains. Without a measurement the lever is ``LONGER_THAN_A_FOOT``, to be
+    bounded by the heel lever of the wearer.
     """
     not_measured = LONGER_THAN_A_FOOT, 0.0, ROLL_ANGLES[0]
     if gait.vertical_force is None:

@@ -56,4 +56,4 @@ class WalkKind:
 
 
 WALK_KIND = WalkKind(WALK)
-"""The motion of a scenario that walks along a gait."""
+"""Motion kind of a scenario that walks along a prescribed gait."""

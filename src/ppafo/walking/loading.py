@@ -85,7 +85,7 @@ from ppafo.wording import one_line
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 DEFAULT_PERIOD = 1.0e-3
 DEFAULT_DURATION, BOTTLE_DURATION = 60.0, 600.0
-"""Length of a walk [s], and of one on a bottle, unless given or ended by the bottle before."""
+"""Default duration of a walk [s], and of a walk on a bottle, which may end it earlier."""
 
 _TURN = 2.0 * math.pi
 
@@ -122,7 +122,7 @@ def load_walk(
 ) -> Scenario:
     """Load a walk as a scenario in SI units.
 
-    The subject of a gait that the file or ``gait`` names is the default wearer.
+    The default wearer is the subject of the gait named in the file or by ``gait``.
 
     Arguments:
         scenario: name of a walk, or a .toml file
@@ -386,7 +386,7 @@ def _duration(reading: DocumentReader, scenario: Scenario) -> float:
 
 
 WALKING = Layout(FILE, OF_A_WALK, walk_file, walk_file, build_walk)
-"""Scenarios whose motion is a walk."""
+"""Layout of scenarios whose motion is a walk."""
 
 
 def lag_of_bandwidth(bandwidth: float) -> float:

@@ -86,11 +86,11 @@ def person_remarks(scenario: Scenario) -> list[str]:
 
 
 SHORTEST_STRIDES = 5
-"""Strides of a walk at least: two of them are the controller's to learn in."""
+"""Least number of strides of a walk; the controller adapts during the first two."""
 SHORTEST_TASK_SEQUENCE = 1.0
-"""Time of a walk on a task sequence at least [s]."""
+"""Shortest duration of a walk along a task sequence [s]."""
 LONGEST_MINUTES = 60.0
-"""Minutes of a walk at most."""
+"""Longest duration of a walk [min]."""
 
 PLACES: Mapping[str, tuple[str, ...]] = {
     **{f"wearer.{quantity.name}": ("motion", "wearer", quantity.name) for quantity in WEARER},
@@ -115,7 +115,7 @@ PLACES: Mapping[str, tuple[str, ...]] = {
     },
     **{f"shut_off.{quantity.name}": ("motion", "shut_off", quantity.name) for quantity in SHUT_OFF},
 }
-"""The attributes, or keys, that lead to the numbers of a walk that other scenarios have not."""
+"""Attributes or keys that lead to the numbers of a walk that other scenarios do not have, by path."""
 
 
 def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:

@@ -26,17 +26,17 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.wearer import BodyScale, Wearer, draw_bounded_normal, draw_builds, scaled
 
 LEVEL_FRACTION = 0.5
-"""Fraction of a curve's variance that moves it as a whole; the rest goes to the harmonics by their power. Assumed: a
-gait file has one deviation for each curve."""
+"""Fraction of a curve's variance that shifts its mean; the rest is distributed over the harmonics by their power.
+Assumed: a gait file has a single deviation for each curve."""
 
 _AT_ONCE = 1000
-"""People whose events are found together, so that memory stays small."""
+"""Number of people whose events are computed in a batch, to limit memory."""
 
 THRESHOLD_VARIATION = 0.15
-"""Standard deviation of thresholds over their values: how a fitter sets them, and how a sensor sits. Assumed."""
+"""Relative standard deviation of the thresholds between fitters and sensor positions [-]. Assumed."""
 
 START_VARIATION = 0.03
-"""Standard deviation of the fraction of the stride at which the push-off begins. Assumed."""
+"""Standard deviation of the start of the push-off [strides]. Assumed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -56,11 +56,11 @@ from ppafo.walking.task_sequence import PlannedSequence, TaskSequence, plan_task
 from ppafo.walking.wearer import BodyScale, leg_parameters
 
 NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
-"""A controller of walking makes its own."""
+"""Reference of a walk: none, because a walking controller generates its own."""
 FASTEST_FOOT = 5.0
-"""Angular velocity of the ankle [rad/s] up to which loads of a walk are followed; it comes to that in push-off."""
+"""Angular velocity of the ankle [rad/s] up to which loads must be resolved; it occurs in push-off."""
 SMALL_TURN = 0.01
-"""rad, over which the stiffness of a load is seen."""
+"""Angle difference [rad] for the numerical stiffness of a load."""
 TINY = 1.0e-30
 
 

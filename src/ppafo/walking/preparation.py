@@ -24,16 +24,16 @@ from ppafo.simulation.plan import WHOLE, StepCounts, state_with_volumes
 from ppafo.walking.wearer import HeelRocker
 
 LOWEST_ANGLE, HIGHEST_ANGLE = math.radians(60.0), math.radians(115.0)
-"""Angles that the ankle keeps to in walking; the step is made for the chambers between them."""
+"""Range of the ankle angle in walking [rad]; the time step is chosen for the chambers in this range."""
 
 STEPS_PER_FILLING = 15.0
-"""Steps while the fastest of these chambers fills: at 1 kHz metrics then are good to 1 % (docs/decisions/0008)."""
+"""Steps per filling time of the smallest chamber: at 1 kHz metrics are accurate to 1 % (docs/decisions/0008)."""
 
 _TURN = 2.0 * math.pi
 
 DISTORTED, FROZEN = "distorted", "frozen"
 DISTORTING = ("time", "period", "gain", "offset", "drift", "crosstalk", "lag", "lost_share", "delay")
-"""Numbers of a distorted sensor, in the order of ``distorting_fault``; the angle has no crosstalk, which is 0."""
+"""Parameters of a distorted sensor, in the order of ``distorting_fault``; the angle sensor has no crosstalk."""
 
 
 def rocker_on_heel(flat: float, rise: float, half: float, heel_lever: float) -> HeelRocker:

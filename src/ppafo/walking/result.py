@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _REQUEST_ROW = "controller_state.request.torque"
-"""Row of a torque-following controller for the requested torque."""
+"""Path of the row for the requested torque of a torque-following controller."""
 
 REMEDY = "the step may be too long, or a value unrealistic: try a smaller run.step, and check the wearer"
 
@@ -153,7 +153,7 @@ def _task_sequence_channels(
 
 
 WALK_FORMAT = "ppafo walk"
-"""Format name in the results of walks on disk, by which analyses recognise them."""
+"""Format name in saved walk results, by which analyses recognise them."""
 
 
 def _units_of(walked: "WalkResult | Scenario", *_: Any) -> Mapping[str, str]:

@@ -17,28 +17,28 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
 
 SAFE_ROW = "controller_state.safety.level"
-"""Row of an event-based controller for its assistance level: full, paused or stopped."""
+"""Path of the row for the assistance level of an event-based controller: full, lift-only, paused or stopped."""
 
 SILENT_ROW = "unpowered.silent"
-"""Row of the time for which the controller has been silent, with a shut-off valve that has a watchdog."""
+"""Path of the row for the time since the last controller signal, for a shut-off valve with a watchdog."""
 
 SILENT = FaultFlag(
     "silent_controller", STOPPED, "the controller takes no samples: the watchdog has shut the supply off", (), ()
 )
-"""Flag of the watchdog, which no controller can raise."""
+"""Fault flag of the watchdog, which controllers cannot raise."""
 
 VENTINGS_ROW = "controller_state.safety.ventings"
-"""Row that counts reductions of help (lift-only, pause, stop)."""
+"""Path of the row that counts reductions of assistance (lift-only, pause, stop)."""
 
 FINDING_ROW = "controller_state.safety.finding"
-"""Row of the last fault flag that reduced the help, with the readings at that time."""
+"""Path of the row for the last fault flag that reduced the assistance, with the readings at that time."""
 
 _WORDS = {LIFTS: "lift-only (no push-off) from", PAUSED: "paused at", STOPPED: "stopped for good at"}
 _RETURNS = {HELPS: "help came back", LIFTS: "the foot is lifted again"}
 _NAMES = {HELPS: "help", LIFTS: "lift", PAUSED: "pause", STOPPED: "stop"}
 _UNITS = {"heel_force": "N", "toe_force": "N", "angle": "rad", "pressure_1": "Pa_a", "pressure_2": "Pa_a"}
 SHOWN = 5
-"""Events that are listed one by one; of more the first ones are, and all are in the file."""
+"""Largest number of events printed individually; the file contains all events."""
 
 
 def failure_times(configuration: Scenario) -> dict[str, float]:

@@ -11,17 +11,17 @@ from ppafo.model import contact as ground
 from ppafo.model.helping import SWING
 
 EVENTS = ("heel strike", "toes on", "heel off", "toes off")
-"""Events of a stride, in order; 'toes on' is the foot that has come down flat."""
+"""Events of a stride, in order; at 'toes on' the foot has come down flat."""
 
 Samples = NDArray[np.intp]
 
 TOO_FAR = 0.25
-"""Largest distance [strides] between a true event and the known one that is taken for it."""
+"""Largest distance [strides] between a true event and the detection matched with it."""
 
 _AFTER = {ground.HEEL: 0, ground.FLAT: 1, ground.TOE: 2, ground.SWING: 3}
 _STATE = "controller_state."
 PHASE_ROW = f"{_STATE}phase.phase"
-"""Row of a controller that detects phases, for the phase."""
+"""Path of the row for the phase, of a controller that detects phases."""
 EVENT_ROW, FRACTION_ROW = "clock.event", "clock.fraction"
 """Suffixes of the rows for the last event and the phase in the stride, of a predicting controller."""
 

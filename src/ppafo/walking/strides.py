@@ -21,10 +21,10 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.task_sequence import PlannedSequence
 
 PHASES = np.linspace(0.0, 1.0, 101)
-"""Phases from heel strike to heel strike at which curves are averaged."""
+"""Phases [strides] from heel strike to heel strike at which curves are averaged."""
 
 LOADED_HEEL = 0.1
-"""Body weights under the heel above which a push in plantarflexion is counted as one on a loaded heel."""
+"""Force under the heel [body weights] above which the heel counts as loaded during a plantarflexion push."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ from ppafo.wording import nearest_name
 FILE = TomlKind("task sequence", "task-sequence", resources.files("ppafo.walking") / "task_sequences", ScenarioError)
 
 SLOWEST, FASTEST = 0.4, 1.6
-"""Walking speeds of a task sequence [m/s]."""
+"""Range of walking speeds in a task sequence [m/s]."""
 
 SPEED = Quantity("speed", "m/s", "walking speed; the gait's unless given", None, SLOWEST, FASTEST)
 CADENCE = Quantity("cadence", "1/s", "steps of both legs in a time, in place of a speed", None, 0.5, 4.0)
@@ -57,29 +57,29 @@ KINDS: dict[str, tuple[str, tuple[Quantity, ...]]] = {
     "scuff": ("one stride in which the toes touch the ground in mid-swing", (CONTACT,)),
     "stumble": ("one stride of another time, shorter or longer in its middle", (TIME, LENGTH)),
 }
-"""Kinds of segment: what the wearer does, and the values that it takes."""
+"""Kinds of segment: description and values."""
 
 _STANDING = ("stand", "rest", "stop")
 _NEED_WALKING = ("stop", "scuff", "stumble")
 _OPTIONAL = (*_PACE, SLOPE)
-"""Values that may be left out."""
+"""Optional values of a segment."""
 
 Numbers = Any
-"""A float, or an array (wearers,): the arithmetic is the same."""
+"""Float, or array (wearers,): the same arithmetic applies to both."""
 
 STANDING_LOAD, RESTING_LOAD = 0.5, 0.1
-"""Body weights on the foot in standing, shared by both feet, and in sitting: shank and foot, and what rests of the
-thigh. The second is assumed; the segments alone are 0.061 (Winter 2009, table 4.1)."""
+"""Force on the foot [body weights]: in standing, with both feet loaded equally, and in sitting, from shank, foot and a
+part of the thigh. The second is assumed; the segments alone are 0.061 (Winter 2009, table 4.1)."""
 
 TIGHTEST, STEP_WIDTH = 0.5, 0.1
-"""Smallest radius of a turn, and distance between the lines on which both feet walk [m]. Assumed."""
+"""Smallest radius of a turn, and lateral distance between the feet [m]. Assumed."""
 
 LOADING_TIME = 1.0
-"""Time [s] in which the load changes between standing and sitting, or half the segment. Assumed."""
+"""Time [s] for the change of load between standing and sitting, at most half of the segment. Assumed."""
 
 TOES_DOWN = math.radians(10.0)
-"""Angle of the healthy foot below the flat one where it meets a stair. Assumed. A device may hold the foot higher; only
-the forefoot is on the stair all the same."""
+"""Angle [rad] by which the toes of the healthy foot point down, relative to flat, at contact with a stair. Assumed. A
+device may hold the foot at another angle; only the forefoot is on the stair in any case."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,23 +64,23 @@ def walk(
 ) -> WalkResult:
     """Simulate a walk for ``minutes`` [min]: a scenario that is a walk, the name of a shipped one, or a file.
 
-    Unless ``minutes`` are given it is as long as the file says, or its task sequence, or one minute where there is
-    none, and up to ten on a bottle, which may end it before.
+    The default duration is stated in the file, or it is the duration of the task sequence, or otherwise one minute,
+    and ten minutes on a bottle, which may end the walk earlier.
 
     Arguments:
-        scenario: a Scenario that is a walk, the name of a shipped one, or a .toml file; what follows changes one that
-            is given by name or file
-        overrides: values to change, texts or a dictionary as of ``simulate``
+        scenario: a Scenario that is a walk, the name of a shipped one, or a .toml file; the arguments up to ``bottle``
+            need a name or a file
+        overrides: values to change, as texts or as a dictionary, as in ``simulate``
         gait: name or file of a gait in place of the scenario's
         task_sequence: name or file of a task sequence in place of the scenario's
         bottle: name or file of a bottle in place of the scenario's
         minutes: length of the walk [min]
         plugins: modules of your own, files or names, whose objects files may name
-        progress: called with the minutes done and those in all, part by part
+        progress: called repeatedly with the minutes done and the total number of minutes
 
     Returns:
-        a WalkResult: recording, strides and metrics in SI units. A walk that diverges has that status, and what was
-        recorded up to the time of failure
+        a WalkResult: recording, strides and metrics in SI units. A diverged walk has the status "diverged" and the
+        recording up to the time of failure
 
     Raises:
         ScenarioError: a scenario that cannot be used, or is no walk
@@ -224,13 +224,13 @@ def with_device_off(configuration: Scenario) -> Scenario:
 
 
 ANKLE_RANGE = math.radians(45.0), math.radians(140.0)
-"""Range [rad] of an ankle without a device: 45 deg in dorsiflexion, of a loaded foot, to 50 deg in plantarflexion.
+"""Ankle range [rad] without a device: 45 deg in dorsiflexion, of a loaded foot, to 50 deg in plantarflexion.
 
-The second is a usual norm of passive motion; the first is assumed, beyond what any gait here asks.
+The second is a usual norm of passive motion; the first is assumed, beyond the range of any gait here.
 """
 
 _NO_CHAMBER = 1.0e-3
-"""Volume [m^3] that stands for no chamber: at rest, and too large for its gas to ask for short steps."""
+"""Chamber volume [m^3] of a leg without a device: gas at rest, in a volume large enough not to require short steps."""
 
 
 def without_device(configuration: Scenario) -> Scenario:
@@ -274,10 +274,10 @@ def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
 
 
 MAXIMUM_WEARERS = 1_000_000
-"""Wearers of a population at most."""
+"""Largest number of wearers of a population."""
 
 STEPS_AT_ONCE = 1.0e8
-"""Steps of all wearers of one group together, a few seconds."""
+"""Total number of steps of a group of wearers that is simulated at once, a few seconds of computing time."""
 
 SHOWN = {
     "gas": ("Gas per stride", "gas mass", 3),
@@ -290,7 +290,7 @@ SHOWN = {
     "stride_time": ("Stride time", "time", 3),
     "stance_share": ("Stance", "fraction", 1),
 }
-"""Title, kind of quantity, and digits behind the point of what is known of every wearer."""
+"""Title, kind of quantity and number of decimals of the quantities shown for every wearer."""
 
 
 @dataclass(frozen=True, slots=True)

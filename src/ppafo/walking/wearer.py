@@ -1,11 +1,11 @@
-"""Who wears the device: segments of one leg and the ankle, in SI units, and how wearers differ.
+"""Wearer of the device: segments of one leg and the ankle, in SI units, and the variation between wearers.
 
-A person is scaled in mass and length. A segment keeps its fraction of the body mass, its fraction of the body's length,
-and where its mass lies in it (as in table 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th ed.
-2009). So masses go with body mass, lengths with stature, and inertias with mass times length squared; the fractions are
-those of the wearer that is scaled. Tissue stays as it is. Where a walk file does not say who walks, it is the subject
-of the gait, or the paper's where no gait is named. Where it gives the stature, each segment that it does not give
-follows body mass and stature.
+A person is scaled in mass and length. Each segment keeps its fraction of the body mass, its fraction of the stature and
+the relative position of its mass centre (as in table 4.1 of Winter, Biomechanics and Motor Control of Human Movement,
+4th ed. 2009). Masses are therefore proportional to body mass, lengths to stature, and inertias to mass times length
+squared; the fractions are taken from the original wearer. The tissue of the ankle is not scaled. The default wearer of
+a walk file is the subject of the named gait, or the paper's subject if no gait is named. If the file states the
+stature, all segments without a stated value are scaled with body mass and stature.
 """
 
 from collections.abc import Callable, Mapping
@@ -25,22 +25,22 @@ from ppafo.simulation.declaration import FOOT
 from ppafo.simulation.document import DocumentReader, value_at
 
 SHANK_SHARE = 0.246
-"""Knee to ankle as a share of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th
-ed. 2009. The paper prints a shank of 0.46 m and no stature, which makes 1.87 m."""
+"""Shank length as a fraction of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement,
+4th ed. 2009. The paper states a shank of 0.46 m and no stature, which results in 1.87 m."""
 
 MASS_VARIATION = 0.166
 STATURE_VARIATION = 0.039
-"""Standard deviation over mean of body mass and stature: 85.5 +- 14.2 kg and 1756 +- 69 mm for men in ANSUR II (Gordon
+"""Relative standard deviations of body mass and stature: 85.5 +- 14.2 kg and 1756 +- 69 mm for men in ANSUR II (Gordon
 et al. 2014, NATICK/TR-15/007)."""
 
 CORRELATION = 0.5
-"""Between body mass and stature. Assumed: the survey's table of means does not give it."""
+"""Correlation between body mass and stature. Assumed: the survey's table of means does not contain it."""
 
 MAXIMUM_DEVIATIONS = 2.5
-"""Draws further from the mean than this are taken at this distance."""
+"""Limit of random draws [standard deviations]; larger deviations are clipped."""
 
 _SAME = 1.0e-3
-"""Share of the body mass, or of the stature, that is rounding."""
+"""Relative difference of body masses or statures that is due to rounding."""
 
 _STATURE = (FOOT["shank_length"].default or 0.0) / SHANK_SHARE
 _KEEPS_GAIT = (
@@ -48,7 +48,7 @@ _KEEPS_GAIT = (
 )
 
 STATURES = (1.45, 2.0)
-"""Statures [m] of nearly all adults, in which the fractions of segments were measured."""
+"""Range of statures [m] of nearly all adults, for which the segment fractions were measured."""
 
 
 class HeelRocker(NamedTuple):
@@ -65,9 +65,10 @@ class HeelRocker(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Wearer:
-    """Leg of a person; fields without a number here are declared with the foot of a leg alone.
+    """Leg of a person, in SI units; fields without a declaration here are declared in ``FOOT``.
 
-    Defaults: the paper's subject (after equation (12)); what it does not print is said in docs/decisions/0008.
+    Default values are of the paper's subject (after equation (12)); docs/decisions/0008 explains values that the paper
+    does not state.
     """
 
     body_mass: Annotated[float, Number("kg", "mass of the body", 72.5, 10.0, 300.0)]
@@ -100,7 +101,7 @@ class Wearer:
 
 _DECLARED = FOOT | {quantity.name: quantity for quantity in quantities_of(Wearer)}
 WEARER = tuple(_DECLARED[number.name] for number in fields(Wearer))
-"""Numbers of ``[wearer]``, in the order of the fields."""
+"""Declarations of the numbers of ``[wearer]``, in the order of the fields."""
 
 SCALING = {
     "body_mass": (1, 0),
@@ -114,7 +115,7 @@ SCALING = {
     "heel_lever": (0, 1),
     "toe_lever": (0, 1),
 }
-"""Powers of body mass and of stature with which the numbers of a leg go from one person to another."""
+"""Exponents of body mass and of stature with which the numbers of a leg scale between people."""
 
 
 def scaled(leg: Wearer | LegParameters, mass: Any, stature: Any) -> dict[str, Any]:
@@ -186,7 +187,7 @@ _SHARES: Mapping[str, float] = {
     name: getattr(_PAPER, name) / (_PAPER.body_mass**of_mass * _PAPER.stature**of_stature)
     for name, (of_mass, of_stature) in SCALING.items()
 }
-"""Numbers of the leg of the paper's subject over the powers of its body mass and its stature."""
+"""Numbers of the paper subject's leg divided by the powers of body mass and stature from ``SCALING``."""
 
 # Constants of their own, for the functions below are translated to C.
 _SHANK_CENTRE, _FOOT_CENTRE = _SHARES["shank_mass_centre"], _SHARES["foot_mass_centre"]
@@ -302,10 +303,10 @@ def read_wearer(reading: DocumentReader, gait: Gait, is_named: bool) -> Wearer:
 
 
 SCALED_MASS = (0.6, 1.7)
-"""Body masses, as multiples of the gait's subject, over which moment and force are scaled without a remark.
+"""Range of body masses, relative to the gait's subject, in which moment and force are scaled without a remark.
 
-About the 2nd to the 98th percentile of adults seen from a subject in their middle: 45 to 120 kg from 72 kg. Children
-walk otherwise, and not only with less mass.
+About the 2nd to the 98th percentile of adults for a subject in their middle: 45 to 120 kg for 72 kg. Children do not
+only have less mass but walk differently.
 """
 
 

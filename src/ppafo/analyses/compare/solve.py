@@ -207,7 +207,7 @@ def _on_task(
     metrics: Sequence[str],
     confidence: float,
 ) -> OnTask:
-    """Return the results of a task; with draws, also paired statistics against the baseline and the best one."""
+    """Return the results of a task; with draws, also paired statistics and probabilities of being the best."""
     first = next(case for case in cases if case.configuration == baseline)
     pairs: dict[str, list[Paired]] = {}
     for case in cases:

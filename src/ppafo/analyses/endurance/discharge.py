@@ -31,9 +31,9 @@ from ppafo.walking.bottle.course import WALKED, SupplyBalance
 
 TIME_IS_UP = "time is up"
 Stop = Literal["supply", "frozen", "time"]
-"""Reason for the end of a run: supply pressure not maintained, fluid table left in the cold, time limit reached."""
+"""Reason for the end of a run: supply pressure not maintained, cold end of the property table, or time limit."""
 _NEXT_TO_NOTHING = 0.01
-"""Fraction of a full bottle: less than this left to be had from a warm bottle is called empty."""
+"""Usable gas at room temperature, as a fraction of a full bottle, below which the bottle is called empty."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,13 +105,13 @@ def ending(bottle: Bottle, draw: GasDemand, mass: float, content: BottleContent,
 
 
 MAXIMUM_STRETCHES = 2000
-"""Walks and rests of a schedule at most: each is a solution of its own."""
+"""Largest number of walking and resting intervals of a schedule; each is integrated separately."""
 SAMPLES = 1001
-"""Samples of a course."""
+"""Number of samples of the recording."""
 _RELATIVE, _ABSOLUTE = 1e-7, (1e-10, 1e-4, 1e-6, 1e-10, 1e-4, 1e-4)
-"""Tolerances of the solver: relative [-], and absolute ones of each part of the state, in its SI unit."""
+"""Tolerances of the solver: relative [-], and absolute for each component of the state, in its SI unit."""
 _ABOVE_FREEZING = 0.02
-"""Kelvin above the cold end of the table at which a run stops, so that the end is approached and not sat on."""
+"""Temperature [K] above the cold end of the property table at which a run stops, to stay within the table."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,9 +12,9 @@ from ppafo.signals.recording import Floats
 from ppafo.units.shown import shown_text
 
 PEAK_WINDOW = 0.1
-"""Seconds over which the largest flow of a recording is averaged; lines and regulator even out what is shorter."""
+"""Averaging window [s] for the largest flow of a recording; lines and regulator smooth shorter peaks."""
 _MOST_RETURNED = 0.1
-"""Fraction of the gas used that may flow back: it waits in the line before the valve, and the next stride takes it."""
+"""Largest fraction of the gas that may flow back; it stays in the line upstream of the valve for the next stride."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,21 +18,21 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import bottle_life
 
 BETWEEN_RESTS = 600.0
-"""Time of walking between two rests [s], unless it is given."""
+"""Default walking time between two rests [s]."""
 STRIDE_TIME = 1.1
-"""Time of one stride [s], unless it is given."""
+"""Default stride time [s]."""
 LONGEST = 24.0 * 3600.0
-"""Time that is simulated at most [s], unless it is given: a day."""
+"""Default of the longest simulated time [s]: one day."""
 WITHOUT_REST = Schedule(LONGEST, 0.0, LONGEST)
 
 
 @checked
 def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -> Endurance | None:
-    """Duration of a bottle when the walk continues without rest; None where the walk took no gas.
+    """Return the duration of a bottle when the walk continues without rest, or None if the walk took no gas.
 
-    The same device, without faults, walks on the bottle until that ends it, as ``ppafo walk --bottle`` does;
-    ``bottle`` is its own, or the paper's, unless given. A stride is one of the leg with the device, or a whole
-    task sequence.
+    The same device, without faults, walks on the bottle until the bottle is exhausted, as with ``ppafo walk --bottle``.
+    The default of ``bottle`` is the bottle of the walk, or else the paper's. A stride is one of the leg with the
+    device, or a whole task sequence.
 
     >>> import ppafo
     >>> endurance = ppafo.endurance_of_walk(ppafo.walk("solenoid", minutes=0.1))

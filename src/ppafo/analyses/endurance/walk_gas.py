@@ -20,9 +20,9 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WALK_FORMAT
 
 WALK_FILE = "walk.json"
-"""The file of a folder that a walk was written into, which says what was walked."""
+"""File in the result folder of a walk that describes the walk."""
 _LEAST_GAS = -1.0e-12
-"""Gas [kg] above which a walk that takes none may come out below 0: rounding of its totals."""
+"""Lower limit of the gas use [kg], slightly negative because of rounding."""
 
 
 @dataclass(frozen=True, slots=True)

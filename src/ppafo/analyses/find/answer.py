@@ -16,7 +16,7 @@ from ppafo.report.style import BLACK, GREEN, GREY, VERMILION
 
 @dataclass(frozen=True, slots=True)
 class FindSample:
-    """A tried value and its metric.
+    """Tried value and its metric.
 
     ``value``: tried value [SI]
     ``metric``: metric at this value [SI]; nan if the run failed

@@ -35,7 +35,7 @@ _Metric = Annotated[Text, Field(description="name of a metric, such as 'rms_erro
 
 
 class SearchRange(StrictTable):
-    """Searched parameter with its bounds."""
+    """Searched parameter: path, bounds with units, and linear or logarithmic spacing."""
 
     path: Annotated[Text, Field(description="as for --set, such as 'controller.proportional_gain'")]
     minimum: _Value

@@ -50,7 +50,7 @@ _OVER_TIME = (
 )
 _TORQUE = Kind("", "N m", "torque", ".3g")
 _FAR_ABOVE = 2.0
-"""Largest pressure in a chamber over its supply, both absolute, above which it is said; healthy wearers stay below."""
+"""Ratio of absolute chamber pressure to supply pressure above which it is remarked; healthy wearers stay below."""
 
 
 @in_units(lambda worn: worn.scenario.device.shown)
@@ -148,7 +148,7 @@ _NUMBERS = (
     ),
     ShownNumber(name="counted_strides", title="Strides with these means", quantity="", digits=0),
 )
-"""Metrics as the table of a walk shows them."""
+"""Metrics in the table of a walk."""
 _EXPLAINED = (
     "'Without' is the same wearer without a device: no plate, torque or friction, and the ankle's own range of motion. "
     "'Healthy' is the gait itself. The swing has no ground: of toes that reach it only that they would drag is known. "

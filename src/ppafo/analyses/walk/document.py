@@ -80,7 +80,7 @@ class ShownNumber(NamedTuple):
 
 
 WOULD_DRAG = "would drag"
-"""Remark on toes that would penetrate the ground."""
+"""Text for toes that would penetrate the ground."""
 
 
 def number_texts(shown: ShownNumber, values: Iterable[float | str | None]) -> tuple[str | None, ...]:

@@ -73,7 +73,7 @@ def walk_with_and_without(
 
 
 _LONG_WALK = 12.0
-"""Minutes above which a walk reports how far it is."""
+"""Duration [min] above which a walk reports its progress."""
 
 
 def _reporter(report: Report, noun: str, above: float) -> Callable[[float, float], None]:

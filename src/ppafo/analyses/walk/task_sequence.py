@@ -31,7 +31,7 @@ _NUMBERS = (
     ShownNumber(name="flat_push", title="push, heel loaded", quantity="torque", digits=1),
     ShownNumber(name="safe_time", title="less help at", quantity="time", digits=2),
 )
-"""Numbers of a segment, and lowest toes without the device, as the table shows them."""
+"""Numbers of a segment in the table, and lowest toes without the device."""
 _CAPTION = (
     "The task sequence over time. Grey: every other segment. 'Without' is the same task sequence without a device."
 )
@@ -45,9 +45,9 @@ _EXPLAINED = (
     "of the stance stay the same at every speed.",
 )
 _SAME_TIME = 0.05
-"""Time [s] by which a recording may end before its task sequence: its samples."""
+"""Time [s] by which a recording may end before its task sequence, because of its sampling."""
 _SAME_SPEED = 1.0e-9
-"""Difference of speeds [m/s] that is the rounding of another unit."""
+"""Difference of speeds [m/s] that is due to rounding in unit conversion."""
 _MEAN_CAPTION = (
     "Mean over the strides at an even speed on level ground, of all speeds together, with the standard deviation as a "
     "band."

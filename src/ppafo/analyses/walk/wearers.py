@@ -19,7 +19,7 @@ from ppafo.walking.walk import OUTCOMES, SHOWN, TRAITS, Population, WearerQuanti
 from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""Fractions of the wearers that are below what the table shows."""
+"""Quantiles in the table, as fractions of the wearers."""
 WEARERS_FORMAT = "ppafo wearers"
 WEARERS_SCHEMA_VERSION = 1
 _WEARERS_CAPTION = (

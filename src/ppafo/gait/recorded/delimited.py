@@ -15,7 +15,7 @@ from ppafo.storage.files import read_bytes
 from ppafo.storage.text_table import doubled, number_in, said_of_doubled, told_apart, without_copies
 
 UNSEEN = ("", "nan", "-nan", "n/a", "na", "null")
-"""Cells of a sample that was not recorded, in small letters."""
+"""Cells of a missing value, in lower case."""
 
 
 class Cells(NamedTuple):
@@ -97,7 +97,7 @@ class PerFrame(NamedTuple):
 
 
 Clock = str | PerFrame
-"""Clock of a table: its column of time, or frames at a rate."""
+"""Clock of a table: name of the time column, or frames at a rate."""
 
 
 def table_of(

@@ -21,19 +21,19 @@ from ppafo.gait.recorded.walk import LOADS, CurveColumns, Signal, low_pass, with
 from ppafo.wording import count_of
 
 LOADED, UNLOADED = 0.05, 0.03
-"""Body weights: above the first the foot is on the ground, below the second it is off it."""
+"""Thresholds of the force [body weights]: the foot is on the ground above the first, and off it below the second."""
 
 SHORTEST_CONTACT = 0.1
-"""Seconds; a shorter contact, or a shorter time off the ground, is noise of the force plate."""
+"""Duration [s] below which a contact, or a time off the ground, is noise of the force plate."""
 
 _SMOOTH = 6.0
-"""Hz; the shank is smoothed by this before its events are looked for."""
+"""Cut-off frequency [Hz] of the low pass for the shank angle before events are searched."""
 _SHORTEST_STRIDE = 0.5
-"""Seconds between two heel strikes of one foot."""
+"""Shortest time between two heel strikes of one foot [s]."""
 _TOP = 0.35
-"""Fraction of the range of the shank angle, from above, in which heel strikes lie."""
+"""Heel strikes lie in this upper fraction of the range of the shank angle."""
 _DEEPEST = np.radians(-15.0)
-"""Before the swing the shank leans back further than this."""
+"""Shank angle [rad] that the backward lean before the swing must exceed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,10 +149,10 @@ def heel_strikes(events: str, walk: Mapping[str, Signal]) -> list[float]:
 
 
 _LEAST_LEAN = 0.5
-"""Fraction of the range of the shank angle by which the shank leans forward over its own contact; over the other
-foot's it swings back."""
+"""Least decrease of the shank angle over a contact of the same foot, relative to its range [-]; over a contact of the
+other foot the angle increases."""
 _LEAST_LEAN_OF_PART = 0.1
-"""Fraction of the range by which the shank leans forward over a contact that the record cuts."""
+"""Least decrease of the shank angle, relative to its range [-], over a contact cut by an end of the record."""
 
 
 def force_of_plates(
@@ -196,15 +196,15 @@ def _is_own(start: float | None, end: float | None, plate: Signal, shank: Signal
 
 
 _RATE = 200.0
-"""Samples a second at which two ends of a cycle are compared."""
+"""Sampling rate [Hz] for the comparison of the ends of a cycle."""
 _SHORTEST = 0.5
-"""Seconds of a stride."""
+"""Shortest stride [s]."""
 
 LONGEST = 1.5
-"""Strides that a record of one cycle has at most; a longer one has strides to count."""
+"""Largest length of a record of one cycle [strides]; strides are counted in a longer record."""
 
 _MISFIT = 0.06
-"""Root mean square of what start and end may differ by where they overlap, values and rates, over their ranges; two
+"""Largest RMS difference between start and end in their overlap, of values and rates relative to their ranges [-]; two
 strides of one healthy walk differ by 0.03."""
 
 
@@ -275,11 +275,11 @@ def _repeat(signal: Signal, span: tuple[float, float], period: float, is_load: b
 
 
 _NEAR = 0.15
-"""Seconds between a strike or an off seen in the shank and by a plate, for both to be the same."""
+"""Largest time difference [s] between an event found from the shank and the same event on a plate."""
 _ABOUT_STANCE = 0.05
-"""Fraction of the stride at either end of the stance that a load need not cover."""
+"""Interval at both ends of the stance [strides] that a load need not cover."""
 _COVERED = 0.9
-"""Fraction of the rest of the stance on the plate, for the load to be the stride's."""
+"""Fraction of the remaining stance that must be on the plate for a load to count in a stride."""
 
 
 def strides_within(signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
@@ -301,9 +301,9 @@ def lost_in(signal: Signal, stride: Stride) -> int:
 
 
 _LEAST_OF_CYCLE = 0.75
-"""Shortest stride in a cycle, as a fraction of the cycle."""
+"""Shortest stride in a cycle, relative to the period of the cycle [-]."""
 LEAST_STRIDES = 2
-"""Least number of strides by default; a walk past a plate and one cycle have one."""
+"""Default of the least number of strides; it is 1 for a walk past a plate and for one cycle."""
 
 FORCE, SHANK, FILE = "vertical_force", "shank_angle", "events of the file"
 

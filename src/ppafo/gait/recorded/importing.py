@@ -281,11 +281,11 @@ def _gait(
 
 
 _COARSE_RATE = 50.0
-"""Samples a second; below it an event is known to no better than a hundredth of a stride."""
+"""Sampling rate [Hz] below which the error of an event exceeds a hundredth of a stride."""
 _NOISY_FORCE = 0.02
-"""Body weights, standard deviation in swing; the events are at 0.05 and 0.03."""
+"""Standard deviation of the force in swing [body weights] above which it is remarked; events are at 0.05 and 0.03."""
 _WITHIN_SWING = 0.1
-"""Fraction of the swing at either end in which the foot may still touch the plate."""
+"""Fraction of the swing at both ends in which the foot may still touch the plate."""
 
 
 def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> list[str]:

@@ -32,7 +32,7 @@ _Flexion = Literal["plantarflexion", "dorsiflexion"]
 
 
 class ShankMap(StrictTable):
-    """Shank angle: a sum of columns, or two markers and the axes of the laboratory."""
+    """Shank angle: a sum of columns, or computed from two markers and the laboratory axes."""
 
     terms: _Terms | None = None
     unit: _Unit = None
@@ -52,9 +52,9 @@ class ShankMap(StrictTable):
 
 
 class AngleMap(StrictTable):
-    """Ankle angle: a sum of columns, or two markers of the foot, whose line turns against the shank.
+    """Ankle angle: a sum of columns, or the angle between the line of two foot markers and the shank.
 
-    With markers the zero is the foot that stands flat, and ``neutral`` is taken off as it is from columns.
+    With markers, the zero is the flat foot; ``neutral`` is subtracted in both cases.
     """
 
     terms: _Terms | None = None
@@ -90,7 +90,7 @@ class MomentMap(StrictTable):
 
 
 class ForceMap(StrictTable):
-    """Vertical ground reaction on this foot, in N or, as a plain number '-', in body weights."""
+    """Vertical ground reaction on this foot, in N, or in body weights with the unit '-'."""
 
     terms: _Terms
     unit: _Unit = None
@@ -106,7 +106,7 @@ class PressureMap(StrictTable):
 
 
 class KneeMap(StrictTable):
-    """Knee in the sagittal plane: its position in m or its acceleration in m/s^2, or hip and thigh instead."""
+    """Knee in the sagittal plane: position in m or acceleration in m/s^2, or hip position and lean of the thigh."""
 
     forward: _Terms
     up: _Terms
@@ -234,7 +234,7 @@ class ImportSettings:
 
 
 _OPTIONS = {"columns": "--map", "least_strides": "--minimum-strides", "longest_gap": "--fill-gaps"}
-"""Options of ``ppafo gait import`` that are not called as the settings."""
+"""Options of ``ppafo gait import`` with names different from the settings."""
 
 
 def setting_text(name: str, value: float | None = None, shown: str = "") -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 _NEAR_WORD, _NEAR_WHOLE = 0.75, 0.85
 _PLUG_IN = re.compile(r"[RL][A-Z]\w*")
-"""A marker or an output of Plug-in Gait, by its side and its name."""
+"""Pattern of a Plug-in Gait marker or output: side and name."""
 _AXIS = re.compile(r"(.*)\.([xyz])")
 
 

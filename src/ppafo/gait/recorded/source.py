@@ -106,7 +106,7 @@ def _is_there(mapped: object, table: MotionTable) -> bool:
 
 
 _SAME = 0.02
-"""Fraction by which two statements of one body mass may differ without a remark."""
+"""Relative difference up to which two statements of the body mass count as equal."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,24 +17,24 @@ from ppafo.gait.recorded.walk import LOADS, Signal
 from ppafo.signals.recording import Floats
 
 LARGEST_STRIDE_CHANGE = 0.25
-"""Fraction of the median stride time; a stride that differs by more has a missed event, or is not steady walking."""
+"""Largest relative deviation from the median stride time; a larger one is a missed event or unsteady walking."""
 LONGEST_HELD = 0.1
-"""Seconds that a column may keep one value within the strides."""
+"""Longest time [s] for which a column may be constant within the strides."""
 
 _ABOUT_STANCE = 0.05
-"""Fraction of the stride at either end of the stance in which a load may rest too."""
+"""Interval at both ends of the stance [strides] in which a load may be constant too."""
 _COARSE = 0.001
-"""Fraction of the range; a sensor with coarser steps keeps a value where its curve turns round."""
+"""Resolution relative to the range [-] above which a sensor counts as coarse and may be constant at a turning point."""
 _STEPS_OF_REST = 3.0
-"""Smallest steps by which such a sensor may enter and leave a value at which the leg rests."""
+"""Largest change, in smallest increments, before and after a constant value of a coarse sensor at a turning point."""
 ODD_SHAPE, ODD_PHASE, ODD_AGAINST_OTHERS = 0.25, 0.4, 4.0
-"""A stride is odd whose curve is off the median one by these fractions of its range, RMS over the stride or at any one
-phase, and by as many times the median distance of all strides. Impaired walking varies more, but then in every stride.
-"""
+"""Limits for an odd stride: distance of its curve from the median curve relative to the range, as RMS over the stride
+and at any one phase, and relative to the median distance of all strides. Impaired walking varies more, but in every
+stride."""
 _FEWEST_TO_COMPARE = 3
-"""Strides of which one can be unlike the others."""
+"""Least number of strides for the detection of an odd one."""
 _MOST_ODD = 0.4
-"""Fraction of the strides; where more are odd, none is the exception."""
+"""Fraction of odd strides above which no stride is rejected."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,11 +12,11 @@ from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
 
 STRIKE, OFF = "foot strike", "foot off"
-"""Kinds of events."""
+"""Kinds of events: heel strike and toe-off."""
 
 AXES = "xyz"
 _COORDINATES = (".x", ".y", ".z")
-"""Ends of the columns of a marker, ``LABEL.x``."""
+"""Suffixes of the columns of a marker, ``LABEL.x``."""
 
 
 def bare_label(label: str) -> str:
@@ -60,7 +60,7 @@ class MotionTable:
 
 
 _LARGEST_JUMP = 3.0
-"""Times the median interval; a longer one is a gap, not jitter of the clock."""
+"""Interval, in median intervals, above which it is a gap and not jitter of the clock."""
 
 
 def cut_table(
@@ -103,7 +103,7 @@ def cut_table(
 
 
 MOST_ACCELERATION = 50.0
-"""Acceleration [m/s^2] that no marker on a leg has as it begins to move from rest."""
+"""Acceleration [m/s^2] that a marker on a leg does not reach when it starts to move from rest."""
 _LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
@@ -154,7 +154,7 @@ def _held(at: Floats, furthest: float) -> NDArray[np.bool_]:
 
 
 LONGEST_FILLED = 0.25
-"""Seconds; over a quarter of a stride no curve can be drawn through what was not seen."""
+"""Longest gap [s] that may be filled; beyond a quarter of a stride, interpolation is not possible."""
 
 
 def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> MotionTable:

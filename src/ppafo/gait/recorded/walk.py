@@ -34,11 +34,11 @@ from ppafo.units import parse_quantity, to_si
 from ppafo.wording import one_line
 
 _MINIMUM_SAMPLES = 20
-"""Samples without which a low pass has no inside."""
+"""Least number of samples for the low pass."""
 _ORDER = 2
-"""Order of the Butterworth low pass, which is passed twice."""
+"""Order of the Butterworth low pass, which is applied twice."""
 _DOUBLE_PASS = (2.0**0.5 - 1.0) ** 0.25
-"""A filter passed twice has its -3 dB lower by this; so it is designed higher (Winter, Biomechanics, section 2.4)."""
+"""Ratio of the -3 dB frequencies of two passes and of a single pass (Winter, Biomechanics, section 2.4)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,10 +104,10 @@ def low_pass(signal: Signal, cut_off: float) -> Signal:
 
 
 LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
-"""Curves that are not measured off a force plate, which is no gap."""
+"""Curves that are undefined while the foot is off a force plate, which does not count as a gap."""
 
 _MOST_SHOWN, _LONGEST_SAID = 12, 160
-"""Names of columns that a message shows, and letters of them, and of a remark."""
+"""Limits of a message: number of column names, and characters of the names and of a remark."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -217,10 +217,10 @@ def _whole(name: str) -> str:
 
 
 _SLOW = np.radians(25.0)
-"""Radians a second; a foot that turns less while the shank leans forward stands flat."""
+"""Angular velocity [rad/s] below which the foot stands flat while the shank leans forward."""
 
 _LEAST_FLAT = 0.1
-"""Seconds of flat foot that there must be to take the zero of the angle from."""
+"""Least duration of flat foot [s] for the zero of the ankle angle."""
 
 
 def between_markers(
@@ -267,14 +267,14 @@ def foot_markers_angle(columns: CurveColumns, mapped: AngleMap, shank: Signal) -
 
 
 THIGH_FRACTION = 0.245
-"""Hip to knee as a fraction of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th
-ed. 2009."""
+"""Thigh length as a fraction of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement,
+4th ed. 2009."""
 
 _LENGTHS = (0.2, 0.7)
 _HIP_HEIGHT = 0.3
-"""Metres; a hip that is further below the origin stands upside down, as no laboratory has its origin above a hip."""
+"""Depth of the hip below the origin [m] above which the sign is wrong; laboratories have no origin above the hip."""
 _FASTEST_BACK = 0.2
-"""Metres a second that a walker may lose on a treadmill, over the whole recording."""
+"""Largest backward speed [m/s] on a treadmill, averaged over the recording."""
 
 
 def knee_signals(
@@ -447,9 +447,9 @@ def walk_signals(
 
 
 _SHORTEST_WALK = 1.0
-"""Seconds; a shorter record may be of a part of a stride, in which the shank turns little."""
+"""Duration [s] below which a record may contain a part of a stride only, with little rotation of the shank."""
 _LEAST_UPRIGHT = 0.5
-"""Fraction of its length by which a shank is longest along the vertical, on average over a walk."""
+"""Least vertical component of the mean shank relative to its length [-]."""
 
 
 def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
@@ -497,9 +497,9 @@ _UNITS = {
     "vertical_force": ("", "N", "N/kg"),
     "centre_of_pressure": ("m",),
 }
-"""Units in SI of the curves that a map names, the package's own first."""
+"""SI units of the curves in a map, the package's own unit first."""
 _POSITIVE = ("ankle_in_front", "plantarflexion", "up", "forward")
-"""Directions that count above 0 in the package."""
+"""Positive directions in the package."""
 
 
 def _curve_of(name: str, columns: CurveColumns, mapped: Any, body_mass: float) -> Signal:

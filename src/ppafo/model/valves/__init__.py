@@ -1,1 +1,1 @@
-"""Valves: how a command becomes openings between the chambers, the source and the atmosphere."""
+"""Valves: openings between chambers, source and atmosphere as functions of a command."""

@@ -1,6 +1,6 @@
 """Declaration of a valve: meaning of its command, and its two forms for an engine.
 
-A command goes from -1 to 1 as equation (8) says; one value stands for free motion.
+A command is from -1 to 1, as in equation (8); one further value, ``VENT``, stands for free motion.
 """
 
 import math
@@ -15,10 +15,10 @@ from ppafo.model.plant import BlendedPort, Openings, PlantParameters, PortFlow, 
 
 @dataclass(frozen=True, slots=True)
 class JoiningPath:
-    """A path of a valve from one chamber to the other: its opening over the valve's full area, 0 to 1, twice.
+    """Path of a valve from one chamber to the other: its opening divided by the full area, 0 to 1, in two forms.
 
-    ``opening(shown)`` holds during a step, from what the valve shows the plant; ``instant(parameters, state, command)``
-    at an instant, for the reference solver.
+    ``opening(shown)`` is constant during a step, from the valve output; ``instant(parameters, state, command)`` is the
+    opening at an instant, for the reference solver.
     """
 
     opening: Callable[[Any], float]
@@ -29,20 +29,20 @@ class JoiningPath:
 class ValveModel:
     """Compiled side of a valve.
 
-    ``parameters`` and ``state`` are NamedTuple classes of floats; ``prepare(settings)`` makes the first from
-    the declared settings; ``initial()`` the second, as the class itself does whose fields have defaults.
-    ``advance(parameters, state, command, time, step)`` returns what the valve shows the plant during the step, and the
-    next state. ``shown`` is the class of what it shows, a float or a NamedTuple; ``connect(plant, shown)`` turns that
-    into ports of the class ``port``; ``port_flow`` and ``port_flow_slopes`` are the functions of that kind of port.
-    ``jumps`` is True for a valve that changes abruptly by itself inside a step, as ``next_event`` and ``settle`` say:
-    the step is then done in parts between those changes. ``shift(state, next_state)`` is the relative
-    change of the opening of a valve that moves inside a step, None for one that stands still between two changes.
-    ``command_delay(settings)`` is the dead time [s] before a
-    command reaches the valve. ``joint`` is the path of a valve that also joins the chambers with each other.
+    ``parameters`` and ``state`` are NamedTuple classes of floats. ``prepare(settings)`` makes the parameters from the
+    declared settings; ``initial()`` makes the state, and is the class itself if its fields have defaults.
+    ``advance(parameters, state, command, time, step)`` returns the valve output during the step, and the next state.
+    ``shown`` is the class of the output, a float or a NamedTuple; ``connect(plant, shown)`` converts the output to
+    ports of the class ``port``; ``port_flow`` and ``port_flow_slopes`` are the functions of that kind of port.
+    ``jumps`` is True for a valve that switches by itself within a step, as given by ``next_event`` and ``settle``: the
+    step is then divided at the switching times. ``shift(state, next_state)`` is the relative change of the opening of a
+    valve that moves within a step, None for a valve that stands still between two switchings.
+    ``command_delay(settings)`` is the dead time [s] before a command reaches the valve. ``joint`` is the path of a
+    valve that also joins the chambers with each other.
 
-    The reference solver sees the same valve in continuous time: ``instant(parameters, state, command)`` returns the
+    The reference solver uses the same valve in continuous time: ``instant(parameters, state, command)`` returns the
     openings at an instant, ``rates(parameters, state, command)`` the time derivatives of the state,
-    ``next_event(parameters, state, command, time)`` when something changes abruptly (1e9 or more for never), and
+    ``next_event(parameters, state, command, time)`` the time of the next abrupt change (1e9 or more for never), and
     ``settle(parameters, state, command, time)`` the state after the abrupt changes that are due.
     """
 
@@ -67,7 +67,7 @@ class ValveModel:
 
 
 def valve_problem(valve: ValveModel) -> str:
-    """Return where a valve and its function ``connect`` say two things of what it shows or of its ports, else empty."""
+    """Describe a contradiction between a valve and its ``connect`` function in the output or the ports; else empty."""
     hints = list(get_type_hints(valve.connect).values())
     if len(hints) != 3:
         ports = f"tuple[{_name(valve.port)}, {_name(valve.port)}]"
@@ -85,16 +85,17 @@ def _name(kind: Any) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ValveKind:
-    """A valve as the catalogue knows it: name, what it is, its settings beside the orifice's, and its models.
+    """Valve in the catalogue: name, summary, settings besides the orifice's, and models.
 
     ``settings`` is a NamedTuple class that declares the settings, each an ``Annotated[float, Number(...)]``.
 
-    ``lag(settings)`` is the time [s] after which its flow has followed a command, None for the dead time alone.
+    ``lag(settings)`` is the time [s] after which the flow has followed a command, None if this is the dead time.
 
-    One that ``vents_at_rest`` joins both chambers to the atmosphere at a command of 0, where others are closed.
+    ``vents_at_rest`` is True for a valve that connects both chambers to the atmosphere at a command of 0, at which
+    others are closed.
 
-    ``choose(settings)`` returns the simplest model that is exact for the settings. It may look only at which of them
-    are 0: runs of an ensemble with zeros in the same settings share one model.
+    ``choose(settings)`` returns the simplest model that is exact for the settings. It may only distinguish settings
+    that are 0: runs of an ensemble with zeros in the same settings share one model.
     """
 
     name: str
@@ -106,19 +107,19 @@ class ValveKind:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """Quantities that its settings declare."""
+        """Quantities that the settings declare."""
         return quantities_of(self.settings)
 
 
 def never(valve: Any, state: Any, command: float, time: float) -> float:
-    """Time [s] of the next change of a valve that changes with its command alone: none between two commands."""
+    """Time [s] of the next event of a valve that changes with its command only: never between two commands."""
     return math.inf
 
 
 # Beyond full opening, so that one number says both, and no rounding of -1 to 1 comes near it.
 VENT = 2.0
-"""Joins both chambers to the atmosphere: solenoids off; a proportional valve needs a vent valve for it."""
+"""Command that vents both chambers: solenoids off; a proportional valve needs a vent valve for this command."""
 
 # Half-way between full opening and VENT: either may pass through sums of floats.
 VENTS_ABOVE = 1.5
-"""Commands above this vent."""
+"""Commands above this value vent."""

@@ -1,8 +1,8 @@
 """Proportional spool valve: ideal, or with dead band, dead time, slew limit and second-order spool, in that order.
 
-The requested opening runs at most at the slew limit towards the command; the spool follows it with
-x'' = w^2 (r - x) - 2 d w x'. A step of the spool, of any length, is exact; it ends
-where the requested opening arrives.
+The requested opening moves towards the command, at most at the slew limit; the spool follows it with
+x'' = w^2 (r - x) - 2 d w x'. A step of the spool, of any length, is exact; a step ends when the requested opening
+reaches the command.
 """
 
 import math
@@ -28,18 +28,18 @@ NO_SLEW_LIMIT = 1.0e12
 SAME_INSTANT = 1.0e-11
 TINY = 1.0e-300
 ARRIVAL = 30.0
-"""Time over the slower time constant of a spool after which it has arrived to rounding."""
+"""Time, in slower time constants of a spool, after which the spool has settled to rounding."""
 
 
 class IdealProportional(NamedTuple):
-    """Parameters of a valve that follows its command at once: dead band [-], opening per command beyond it [-]."""
+    """Parameters of a valve without dynamics: dead band [-], and opening per command beyond the dead band [-]."""
 
     dead_band: float
     gain: float
 
 
 class NoValveState(NamedTuple):
-    """An ideal valve remembers only what it shows: its opening from -1 to 1. It starts closed."""
+    """State of an ideal valve: its opening from -1 to 1, closed at the start."""
 
     opening: float = 0.0
 
@@ -54,7 +54,10 @@ class MovingProportional(NamedTuple):
 
 
 class SpoolStep(NamedTuple):
-    """Next x, next x' and mean x of a free spool, by x and by x'; x is an offset from the requested opening."""
+    """Transition factors of a free spool over a step: next x, next x' and mean x, per initial x and x'.
+
+    x is the offset of the opening from the requested opening.
+    """
 
     next_by_opening: float
     next_by_rate: float
@@ -65,9 +68,9 @@ class SpoolStep(NamedTuple):
 
 
 class SpoolState(NamedTuple):
-    """Requested opening behind the slew limit, opening of the spool, both from -1 to 1, and its rate [1/s].
+    """Requested opening after the slew limit, opening of the spool, both from -1 to 1, and its rate [1/s].
 
-    It starts at rest in the middle.
+    The spool starts at rest in mid-position.
     """
 
     requested: float = 0.0
@@ -76,7 +79,7 @@ class SpoolState(NamedTuple):
 
 
 def opening_of_command(command: float, dead_band: float) -> float:
-    """Opening [-], -1 to 1, that a command asks for: nothing inside the dead band, all at full command."""
+    """Opening [-], -1 to 1, for a command [-]: 0 inside the dead band, full opening at full command."""
     size = max(min(abs(command), 1.0) - dead_band, 0.0) / (1.0 - dead_band)
     return size if command >= 0.0 else -size
 
@@ -84,14 +87,14 @@ def opening_of_command(command: float, dead_band: float) -> float:
 def advance_ideal(
     valve: IdealProportional, state: NoValveState, command: float, time: float, step: float
 ) -> tuple[float, NoValveState]:
-    """Opening during the step [-], -1 to 1, of a valve without dynamics."""
+    """Opening during the step [-], -1 to 1, of a valve without dynamics, and its state."""
     size = max(min(abs(command), 1.0) - valve.dead_band, 0.0) * valve.gain
     opening = size if command >= 0.0 else -size
     return opening, NoValveState(opening)
 
 
 def towards_chamber_1(opening: float, next_opening: float, mean: float) -> float:
-    """Mean over a step of the positive part of an opening [-]; exact where it runs straight or keeps its sign."""
+    """Mean of the positive part of an opening over a step [-]; exact for a linear opening or a constant sign."""
     higher = max(opening, next_opening)
     lower = min(opening, next_opening)
     crosses = higher > 0.0 and lower < 0.0
@@ -104,7 +107,7 @@ def towards_chamber_1(opening: float, next_opening: float, mean: float) -> float
 def advance_moving(
     valve: MovingProportional, state: SpoolState, command: float, time: float, step: float
 ) -> tuple[Openings, SpoolState]:
-    """Mean openings [-] in a step [s] and the spool at its end; the request changes its rate at the beginning only."""
+    """Mean openings [-] in a step [s], and the spool at its end; the request changes its rate at the start only."""
     settled = settle_moving(valve, state, command, time)
     target = opening_of_command(command, valve.dead_band)
     # The request moves at the slew limit, with the sign by two selects, 0 at the target.
@@ -145,7 +148,7 @@ def shift_of_spool(state: SpoolState, next_state: SpoolState) -> float:
 
 
 def openings_of(opening: float) -> Openings:
-    """Fractions [-] of the full area for an opening from -1 to 1 (clipped); above 0 feeds chamber 1. Equation (8)."""
+    """Fractions [-] of the full area for an opening from -1 to 1 (clipped); positive feeds chamber 1. Equation (8)."""
     clipped = max(-1.0, min(1.0, opening))
     # One spool: what opens chamber 1 to the source opens chamber 2 to the atmosphere.
     towards_1 = max(clipped, 0.0)
@@ -154,22 +157,22 @@ def openings_of(opening: float) -> Openings:
 
 
 def instant_ideal(valve: IdealProportional, state: NoValveState, command: float) -> Openings:
-    """Openings [-] at an instant of a valve that follows its command at once."""
+    """Openings [-] at an instant of a valve without dynamics."""
     return openings_of(opening_of_command(command, valve.dead_band))
 
 
 def rates_ideal(valve: IdealProportional, state: NoValveState, command: float) -> NoValveState:
-    """Rates [1/s]: none, nothing moves by itself."""
+    """Rates [1/s] of the state, which are 0."""
     return NoValveState(0.0)
 
 
 def settle_ideal(valve: IdealProportional, state: NoValveState, command: float, time: float) -> NoValveState:
-    """Opening [-] that the command requests, taken at once."""
+    """State with the opening [-] that the command requests."""
     return NoValveState(opening_of_command(command, valve.dead_band))
 
 
 def instant_moving(valve: MovingProportional, state: SpoolState, command: float) -> Openings:
-    """Openings [-] at an instant."""
+    """Openings [-] of the moving valve at an instant."""
     return openings_of(state.opening)
 
 
@@ -185,13 +188,13 @@ def rates_moving(valve: MovingProportional, state: SpoolState, command: float) -
 
 
 def next_moving_event(valve: MovingProportional, state: SpoolState, command: float, time: float) -> float:
-    """Time [s] at which the requested opening arrives at the command."""
+    """Time [s] at which the requested opening reaches the command."""
     target = opening_of_command(command, valve.dead_band)
     return math.inf if target == state.requested else time + abs(target - state.requested) / valve.slew_limit
 
 
 def settle_moving(valve: MovingProportional, state: SpoolState, command: float, time: float) -> SpoolState:
-    """The state with the requested opening [-] at its target, where it has arrived or no slew limit holds it."""
+    """State with the requested opening [-] at its target, if it has reached the target or there is no slew limit."""
     target = opening_of_command(command, valve.dead_band)
     if abs(target - state.requested) > SAME_INSTANT * valve.slew_limit:
         return state
@@ -199,11 +202,12 @@ def settle_moving(valve: MovingProportional, state: SpoolState, command: float, 
 
 
 def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
-    """Exact step [s] of a free spool with an undamped angular frequency [rad/s], to rounding.
+    """Exact transition over a step [s] of a free spool with an undamped angular frequency [rad/s], to rounding.
 
-    Series of exp and of its mean at a small fraction of the step, doubled until they hold for the whole. A function
-    of the matrix A of x and x'/w is ``p + q A``, so all of it is on pairs of numbers, without a library function.
-    Where a spool has long arrived the series would not converge; the step ends there, and only the mean goes on.
+    Series of the exponential and its mean at a small fraction of the step, doubled up to the whole step. A function of
+    the matrix A of x and x'/w is ``p + q A``, so that all operations are on pairs of numbers, without a library
+    function. For a spool that settled long before the end of the step the series would not converge; the step is cut
+    there, and only the mean is continued.
     """
     # Slower time constant times w: 1/d of an underdamped spool, at most 2 d of an overdamped one.
     slower = max(1.0 / damping_ratio, 2.0 * damping_ratio)
@@ -240,7 +244,7 @@ def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
 
 
 class ProportionalSettings(NamedTuple):
-    """Dead band, dead time, and how the spool moves."""
+    """Settings of a proportional valve: dead band, dead time, spool dynamics and slew limit."""
 
     dead_band: Annotated[float, Number("", "smallest command that opens the valve", 0.0, 0.0, 0.99)]
     delay: Annotated[float, Number("s", "dead time between command and spool", 0.0, 0.0, 0.2)]
@@ -273,7 +277,7 @@ def dead_time(settings: ProportionalSettings) -> float:
 
 
 def spool_lag(settings: ProportionalSettings) -> float:
-    """Time [s] until the opening has followed a command that has reached the spool: its way, also at the slew limit."""
+    """Time [s] until the opening has followed a command at the spool, including the travel at the slew limit."""
     # Mean delay of a second-order system: 2 d / w.
     frequency, slew_limit = settings.spool_frequency, settings.slew_limit
     spool = 2.0 * settings.spool_damping_ratio / (2.0 * math.pi * frequency) if frequency > 0.0 else 0.0
@@ -282,7 +286,7 @@ def spool_lag(settings: ProportionalSettings) -> float:
 
 
 def lag(settings: ProportionalSettings) -> float:
-    """Time [s] until the opening has followed a command: dead time, spool, and the way at the slew limit."""
+    """Time [s] until the opening has followed a command: dead time, spool, and travel at the slew limit."""
     return settings.delay + spool_lag(settings)
 
 
@@ -328,7 +332,7 @@ MOVING = ValveModel(
 
 
 def choose(settings: ProportionalSettings) -> ValveModel:
-    """The ideal model where nothing moves, else the moving one, from ``settings`` [SI]."""
+    """Ideal model without dynamics, else the moving model, from ``settings`` [SI]."""
     # A delay needs the moving model too: its command arrives inside a step.
     at_once = settings.spool_frequency == 0.0 and settings.slew_limit == 0.0 and settings.delay == 0.0
     return IDEAL if at_once else MOVING

@@ -1,8 +1,8 @@
-"""Pair of solenoid valves: each joins its chamber to the source when energised and to the atmosphere when not.
+"""Pair of solenoid valves: each connects its chamber to the source when energised and to the atmosphere when not.
 
-A command above 0 energises valve A (chamber 1), below 0 valve B (chamber 2), 0 neither: both chambers vent and the
-foot moves freely. A coil accepts a change at most once in every switching interval; the change reaches the flow after
-the opening or closing delay, and is lost if the coil is commanded otherwise before that.
+A positive command energises valve A (chamber 1), a negative one valve B (chamber 2), 0 neither: both chambers vent and
+the foot moves freely. A coil accepts a change at most once per switching interval; the flow changes after the opening
+or closing delay, and the change is lost if the coil gets another command before that.
 """
 
 from dataclasses import replace
@@ -25,7 +25,7 @@ SwitchingInterval = Annotated[float, Number("s", "shortest time between two swit
 
 
 class PairPositions(NamedTuple):
-    """1 where a valve joins its chamber to the source, 0 where to the atmosphere. Both start off."""
+    """Positions of both valves: 1 connected to the source, 0 to the atmosphere. Both start off."""
 
     position_a: float = 0.0
     position_b: float = 0.0
@@ -42,7 +42,7 @@ class TimedSolenoid(NamedTuple):
 class Coil(NamedTuple):
     """Coil of an on/off valve: present flow (0 or 1), commanded flow, time of the command and of the response [s].
 
-    It starts as one that was switched off long ago: the first order is taken at once, whatever the interval.
+    The initial coil was switched off long ago: it accepts the first command at once, whatever the interval.
     """
 
     position: float = 0.0
@@ -59,21 +59,21 @@ class PairState(NamedTuple):
 
 
 def coil_commands(command: float) -> tuple[float, float]:
-    """Commands [-] of valves A and B, equation (14)'s two voltages: 1 energised, 0 not, as both are to vent."""
+    """Commands [-] of valves A and B, equation (14)'s two voltages: 1 energised, 0 not; both 0 to vent."""
     return (1.0 if command > 0.0 and command < VENTS_ABOVE else 0.0), (1.0 if command < 0.0 else 0.0)
 
 
 def advance_ideal(
     valve: EmptyRow, state: PairPositions, command: float, time: float, step: float
 ) -> tuple[PairPositions, PairPositions]:
-    """Positions [-] during the step [s] of a pair that follows its command at once."""
+    """Positions [-] during the step [s] of a pair without delays, and the state."""
     position_a, position_b = coil_commands(command)
     positions = PairPositions(position_a, position_b)
     return positions, positions
 
 
 def connect_positions(plant: PlantParameters, shown: PairPositions) -> tuple[SinglePort, SinglePort]:
-    """Ports of both chambers for a pair that stands still; one full area each. Equation (8)."""
+    """Ports of both chambers for constant positions; one full area each. Equation (8)."""
     open_a = shown.position_a > 0.5
     open_b = shown.position_b > 0.5
     node_1 = plant.supply_pressure if open_a else plant.atmospheric_pressure
@@ -97,14 +97,14 @@ def connect_positions(plant: PlantParameters, shown: PairPositions) -> tuple[Sin
 
 
 def accept_time(coil: Coil, switching_interval: float, time: float) -> float:
-    """Time [s] at which a coil takes a new order that stands at ``time``."""
+    """Time [s] at which a coil accepts a new command given at ``time``."""
     return max(time, coil.accepted_time + switching_interval)
 
 
 def command_coil(valve: TimedSolenoid, coil: Coil, wanted: float, time: float, opening_delay: float) -> Coil:
-    """A coil at ``time`` [s] with an order waiting: the flow moves if it is due, then the order is taken if it may be.
+    """Coil at ``time`` [s] with a pending command: the flow changes if due, then the command is accepted if possible.
 
-    A change that is still waiting when the coil is commanded otherwise is lost.
+    A pending change is lost when the coil gets another command.
     """
     # The due change first: an order at the same instant would otherwise cancel a flow that has already moved.
     position = coil.target if coil.change_time <= time + SAME_INSTANT else coil.position
@@ -121,14 +121,14 @@ def command_coil(valve: TimedSolenoid, coil: Coil, wanted: float, time: float, o
 
 
 def next_coil_event(valve: TimedSolenoid, coil: Coil, wanted: float, time: float) -> float:
-    """Time [s] at which a coil next takes a waiting order or its flow changes; huge for never."""
+    """Time [s] at which a coil next accepts a pending command or its flow changes; huge for never."""
     order = accept_time(coil, valve.switching_interval, time) if wanted != coil.target else FOREVER
     change = coil.change_time if coil.position != coil.target else FOREVER
     return min(order, change)
 
 
 def settle_timed(valve: TimedSolenoid, state: PairState, command: float, time: float) -> PairState:
-    """Both coils after the changes and orders that are due at ``time`` [s]."""
+    """Both coils after the changes and commands that are due at ``time`` [s]."""
     wanted_a, wanted_b = coil_commands(command)
     return PairState(
         command_coil(valve, state.coil_a, wanted_a, time, opening_time(valve.opening_delay, 1.0)),
@@ -137,7 +137,7 @@ def settle_timed(valve: TimedSolenoid, state: PairState, command: float, time: f
 
 
 def next_timed_event(valve: TimedSolenoid, state: PairState, command: float, time: float) -> float:
-    """Time [s] at which a coil next takes a waiting order or its flow changes; huge for never."""
+    """Time [s] at which a coil next accepts a pending command or its flow changes; huge for never."""
     wanted_a, wanted_b = coil_commands(command)
     event_a = next_coil_event(valve, state.coil_a, wanted_a, time)
     return min(event_a, next_coil_event(valve, state.coil_b, wanted_b, time))
@@ -146,36 +146,36 @@ def next_timed_event(valve: TimedSolenoid, state: PairState, command: float, tim
 def advance_timed(
     valve: TimedSolenoid, state: PairState, command: float, time: float, step: float
 ) -> tuple[PairPositions, PairState]:
-    """Positions [-] during one part [s] of a step, at whose beginning all that is due happens, and both coils."""
+    """Positions [-] during one part [s] of a step, after all changes that are due at its start, and both coils."""
     settled = settle_timed(valve, state, command, time)
     return PairPositions(settled.coil_a.position, settled.coil_b.position), settled
 
 
 def instant_ideal(valve: EmptyRow, state: PairPositions, command: float) -> Openings:
-    """Openings [-] at an instant of a pair that follows its command at once."""
+    """Openings [-] at an instant of a pair without delays."""
     position_a, position_b = coil_commands(command)
     return Openings(source_1=position_a, vent_1=1.0 - position_a, source_2=position_b, vent_2=1.0 - position_b)
 
 
 def rates_ideal(valve: EmptyRow, state: PairPositions, command: float) -> PairPositions:
-    """Rates [1/s]: none, nothing moves by itself."""
+    """Rates [1/s] of the positions, which are 0."""
     return PairPositions(0.0, 0.0)
 
 
 def settle_ideal(valve: EmptyRow, state: PairPositions, command: float, time: float) -> PairPositions:
-    """Positions [-] that the command requests, taken at once."""
+    """Positions [-] that the command requests."""
     position_a, position_b = coil_commands(command)
     return PairPositions(position_a, position_b)
 
 
 def instant_timed(valve: TimedSolenoid, state: PairState, command: float) -> Openings:
-    """Openings [-] at an instant."""
+    """Openings [-] of the pair with delays at an instant."""
     position_a, position_b = state.coil_a.position, state.coil_b.position
     return Openings(source_1=position_a, vent_1=1.0 - position_a, source_2=position_b, vent_2=1.0 - position_b)
 
 
 def rates_timed(valve: TimedSolenoid, state: PairState, command: float) -> PairState:
-    """Rates [1/s]: none, nothing moves between two events."""
+    """Rates [1/s] of the state, which are 0 between two events."""
     still = Coil(position=0.0, target=0.0, accepted_time=0.0, change_time=0.0)
     return PairState(still, still)
 
@@ -191,12 +191,12 @@ def prepare_timed(settings: Any) -> TimedSolenoid:
 
 
 def no_dead_time(settings: Any) -> float:
-    """Dead time of the command [s]: none, the delays belong to the coils."""
+    """Dead time of the command [s]: 0, because the delays belong to the coils."""
     return 0.0
 
 
 def lag(settings: TimedSolenoid) -> float:
-    """Time [s] until a valve has let go: its delay, and how long a coil waits for the next switching."""
+    """Time [s] until a valve has closed: its closing delay plus the wait for the next possible switching."""
     return settings.closing_delay + settings.switching_interval
 
 
@@ -236,7 +236,7 @@ TIMED = replace(
 
 
 def choose(settings: TimedSolenoid) -> ValveModel:
-    """The ideal model where no time [s] matters, else the timed one."""
+    """Ideal model if all times [s] are 0, else the model with delays."""
     return TIMED if any(value > 0.0 for value in settings) else IDEAL
 
 

@@ -1,10 +1,10 @@
-"""Pair of solenoid valves with a third one between the chambers: the gas of plantarflexion powers dorsiflexion.
+"""Pair of solenoid valves and a third one between the chambers, so that plantarflexion gas powers dorsiflexion.
 
-When the flow of valve A (chamber 1) leaves the source, the third valve opens for the joining time and both of the pair
-are shut off: gas goes from chamber 1 to chamber 2 until their pressures meet, and the vane, whose chambers then have
-one pressure, moves freely. When the chambers part, chamber 1 vents, and chamber 2, if valve B is energised, keeps what
-it has got for the holding time, or until valve B lets it go; then valve B tops it up. The third valve has the area of
-the others. Without a joining time it is the pair of ``solenoid``.
+When valve A (chamber 1) is de-energised and its flow leaves the source, the third valve opens for the joining time and
+both valves of the pair are shut: gas flows from chamber 1 to chamber 2 until their pressures are equal, and the vane
+moves freely. After the third valve closes, chamber 1 vents. If valve B is energised, chamber 2 keeps its gas for the
+holding time, or until valve B is de-energised; then valve B fills it up from the supply. The third valve has the area
+of the others. Without a joining time the valve is the pair of ``solenoid``.
 """
 
 from dataclasses import replace
@@ -18,7 +18,7 @@ from ppafo.model.valves.solenoid import NEVER, SAME_INSTANT, Coil, PairPositions
 
 
 class RecyclingSolenoid(NamedTuple):
-    """The pair, how long the chambers stay joined, and how long chamber 2 then keeps its gas [s]."""
+    """Parameters of the pair, joining time of the chambers, and subsequent holding time of chamber 2 [s]."""
 
     pair: TimedSolenoid
     joining_time: float
@@ -26,9 +26,9 @@ class RecyclingSolenoid(NamedTuple):
 
 
 class RecyclingState(NamedTuple):
-    """Both coils, 1 while the chambers are joined, 1 while chamber 2 keeps its gas, and when either ends [s].
+    """Both coils, 1 while the chambers are joined, 1 while chamber 2 keeps its gas, and end times of both states [s].
 
-    It starts with coils that were switched off long ago and chambers that are not joined.
+    At the start the coils are off for long and the chambers are not joined.
     """
 
     pair: PairState = PairState()
@@ -39,7 +39,7 @@ class RecyclingState(NamedTuple):
 
 
 class RecyclingPositions(NamedTuple):
-    """1 where a valve joins its chamber to the source, 0 where to the atmosphere; joint and hold as in the state."""
+    """Positions of both valves, 1 to the source, 0 to the atmosphere; ``joined`` and ``keeps_gas`` as in the state."""
 
     position_a: float
     position_b: float
@@ -48,7 +48,7 @@ class RecyclingPositions(NamedTuple):
 
 
 def settle(valve: RecyclingSolenoid, state: RecyclingState, command: float, time: float) -> RecyclingState:
-    """Coils and joint after the changes and orders that are due at ``time`` [s]."""
+    """State after the changes and commands that are due at ``time`` [s]."""
     pair = solenoid.settle_timed(valve.pair, state.pair, command, time)
     feeds_1, feeds_2 = pair.coil_a.position > 0.5, pair.coil_b.position > 0.5
     # The moment at which the flow of valve A, not its order, leaves the source.
@@ -69,7 +69,7 @@ def settle(valve: RecyclingSolenoid, state: RecyclingState, command: float, time
 
 
 def next_event(valve: RecyclingSolenoid, state: RecyclingState, command: float, time: float) -> float:
-    """Time [s] at which a coil takes a waiting order, its flow changes, or joint or hold end; huge for never."""
+    """Time [s] of the next event: a coil accepts a command, a flow changes, joining or holding ends; huge for never."""
     event = solenoid.next_timed_event(valve.pair, state.pair, command, time)
     event = min(event, state.release_time) if state.keeps_gas > 0.5 else event
     return min(event, state.parting_time) if state.joined > 0.5 else event
@@ -78,7 +78,7 @@ def next_event(valve: RecyclingSolenoid, state: RecyclingState, command: float, 
 def advance(
     valve: RecyclingSolenoid, state: RecyclingState, command: float, time: float, step: float
 ) -> tuple[RecyclingPositions, RecyclingState]:
-    """Positions [-] during one part [s] of a step, at whose beginning all that is due happens, and the state."""
+    """Positions [-] during one part [s] of a step, after all changes that are due at its start, and the state."""
     settled = settle(valve, state, command, time)
     pair = settled.pair
     shown = RecyclingPositions(
@@ -91,7 +91,7 @@ def advance(
 
 
 def connect(plant: PlantParameters, shown: RecyclingPositions) -> tuple[SinglePort, SinglePort]:
-    """Ports of both chambers, shut while these are joined, and chamber 2's while it keeps its gas. Equation (8)."""
+    """Ports of both chambers: shut while joined, and chamber 2's also while it keeps its gas. Equation (8)."""
     port_1, port_2 = solenoid.connect_positions(plant, PairPositions(shown.position_a, shown.position_b))
     share_1 = 1.0 - shown.joined
     share_2 = share_1 * (1.0 - shown.keeps_gas)
@@ -117,7 +117,7 @@ def joined_opening(shown: RecyclingPositions) -> float:
 
 
 def instant(valve: RecyclingSolenoid, state: RecyclingState, command: float) -> Openings:
-    """Openings [-] at an instant."""
+    """Openings [-] of the pair at an instant."""
     pair = solenoid.instant_timed(valve.pair, state.pair, command)
     share_1 = 1.0 - state.joined
     share_2 = share_1 * (1.0 - state.keeps_gas)
@@ -135,13 +135,13 @@ def joined_at_instant(valve: RecyclingSolenoid, state: RecyclingState, command: 
 
 
 def rates(valve: RecyclingSolenoid, state: RecyclingState, command: float) -> RecyclingState:
-    """Rates [1/s]: none, nothing moves between two events."""
+    """Rates [1/s] of the state, which are 0 between two events."""
     still = Coil(position=0.0, target=0.0, accepted_time=0.0, change_time=0.0)
     return RecyclingState(PairState(still, still), joined=0.0, keeps_gas=0.0, parting_time=0.0, release_time=0.0)
 
 
 class RecyclingSettings(NamedTuple):
-    """Delays of the pair, and for how long the chambers are joined and chamber 2 keeps its gas."""
+    """Settings: delays of the pair, joining time of the chambers, and holding time of chamber 2."""
 
     opening_delay: solenoid.OpeningDelay
     closing_delay: solenoid.ClosingDelay
@@ -177,7 +177,7 @@ MODEL = replace(
 
 
 def choose(_settings: RecyclingSettings) -> ValveModel:
-    """Return the model of this valve, of which there is one."""
+    """Return the only model of this valve."""
     return MODEL
 
 

@@ -1,7 +1,7 @@
-"""A proportional valve with a vent valve behind it, which vents both chambers when the command says so.
+"""Proportional valve with a downstream vent valve, which vents both chambers on command.
 
-A spool valve alone cannot let the foot move: in its middle it locks the gas in both chambers. The vent valve has the
-area of the proportional one and follows at once.
+A spool valve alone cannot release the foot: in mid-position it locks the gas in both chambers. The vent valve has the
+area of the proportional one and no dynamics.
 """
 
 from dataclasses import replace
@@ -14,7 +14,7 @@ from ppafo.model.valves.proportional import IdealProportional, MovingProportiona
 
 
 class VentedOpening(NamedTuple):
-    """Opening of the proportional valve from -1 to 1, and 1 where the vent valve vents."""
+    """Opening of the proportional valve from -1 to 1, and 1 if the vent valve is open."""
 
     opening: float
     vents: float
@@ -26,7 +26,7 @@ def spool_command(command: float) -> float:
 
 
 def vent_chambers(openings: Openings, command: float) -> Openings:
-    """Openings [-] with both chambers vented where the command says so."""
+    """Openings [-], with both chambers vented if the command requests it."""
     # The vent valve acts at once: it has neither delay nor spool.
     vents = command > VENTS_ABOVE
     return Openings(
@@ -47,7 +47,7 @@ def advance_ideal(
 
 
 def connect_ideal(plant: PlantParameters, shown: VentedOpening) -> tuple[SinglePort, SinglePort]:
-    """Ports of both chambers, by equation (8), with the vent valve open or shut."""
+    """Ports of both chambers, by equation (8), with the vent valve open or closed."""
     port_1, port_2 = single_ports(plant, shown.opening)
     vents = shown.vents > 0.5
     full, room = plant.valve_conductance, plant.atmospheric_pressure
@@ -68,12 +68,12 @@ def connect_ideal(plant: PlantParameters, shown: VentedOpening) -> tuple[SingleP
 
 
 def instant_ideal(valve: IdealProportional, state: NoValveState, command: float) -> Openings:
-    """Openings [-] at an instant."""
+    """Openings [-] of the ideal valve at an instant."""
     return vent_chambers(proportional.instant_ideal(valve, state, spool_command(command)), command)
 
 
 def settle_ideal(valve: IdealProportional, state: NoValveState, command: float, time: float) -> NoValveState:
-    """Opening [-] that the command requests, taken at once."""
+    """State with the opening [-] that the command requests."""
     return proportional.settle_ideal(valve, state, spool_command(command), time)
 
 
@@ -86,7 +86,7 @@ def advance_moving(
 
 
 def instant_moving(valve: MovingProportional, state: SpoolState, command: float) -> Openings:
-    """Openings [-] at an instant."""
+    """Openings [-] of the moving valve at an instant."""
     return vent_chambers(proportional.instant_moving(valve, state, spool_command(command)), command)
 
 
@@ -96,12 +96,12 @@ def rates_moving(valve: MovingProportional, state: SpoolState, command: float) -
 
 
 def next_moving_event(valve: MovingProportional, state: SpoolState, command: float, time: float) -> float:
-    """Time [s] at which the requested opening arrives at the command."""
+    """Time [s] at which the requested opening reaches the command."""
     return proportional.next_moving_event(valve, state, spool_command(command), time)
 
 
 def settle_moving(valve: MovingProportional, state: SpoolState, command: float, time: float) -> SpoolState:
-    """The state with the requested opening [-] at its target, where it has arrived."""
+    """State with the requested opening [-] at its target, if it has reached the target."""
     return proportional.settle_moving(valve, state, spool_command(command), time)
 
 
@@ -125,5 +125,5 @@ MOVING = replace(
 
 
 def choose(settings: proportional.ProportionalSettings) -> ValveModel:
-    """The ideal model where nothing moves, else the moving one, from ``settings`` [SI]."""
+    """Ideal model without dynamics, else the moving model, from ``settings`` [SI]."""
     return IDEAL if proportional.choose(settings) is proportional.IDEAL else MOVING

@@ -182,7 +182,7 @@ def check_rotation(evidence: Evidence) -> Iterator[AuditFinding]:
 
 _VOLUME = ("actuator.displacement_per_radian", "actuator.dead_volume_1")
 _LEAST, _MOST = 0.6, 1.1
-"""Fraction of the measured gas that a filling may hold: the rest leaks across the vane while the task lasts."""
+"""Accepted ratio of the gas of one filling to the measured gas use; the rest leaks across the vane during the task."""
 
 
 def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:

@@ -69,7 +69,7 @@ class AuditFinding:
 GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
 
 _SMALLEST, _LARGEST = 1e-20, 1e20
-"""SI magnitudes beyond which a number is a slip, and products of numbers leave the range of floating point."""
+"""Limits of SI magnitudes: numbers beyond are typing errors, and their products would overflow."""
 
 
 class ReportedRange(NamedTuple):

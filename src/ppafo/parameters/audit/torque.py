@@ -237,13 +237,13 @@ def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Sever
 # Does the set give the torques that other publications report of the device, at rest and within one push-off?
 
 _ROOM = 0.1
-"""Relative room of a torque that is published with one or two digits."""
+"""Relative tolerance of a torque published with one or two digits."""
 _REACHED = 0.9
-"""Fraction of the torque whose time counts: the rest comes ever more slowly."""
+"""Fraction of the torque that defines the filling time; the final value is approached asymptotically."""
 _PUSH_OFF = 0.2
 """Time [s] of push-off: from 42 to 61 % of the built-in gait's stride of 1.04 s."""
 _TOE_OFF = math.radians(110.0)
-"""Angle [rad] that the vane has reached by then: 20 deg of plantarflexion."""
+"""Angle [rad] of the vane at toe-off: 20 deg of plantarflexion."""
 _PARTS = 200
 
 

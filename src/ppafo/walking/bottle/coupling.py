@@ -28,7 +28,7 @@ from ppafo.walking.bottle.course import DIVERGED, UNITS, WALKED, EndKind, Supply
 from ppafo.walking.bottle.supply import BottleSupply
 
 REGULATED, _LINE = "line_state.regulated_mass", "line_state.mass_1"
-"""Rows of the gas that went through the regulator of a line, and of that in it [kg]."""
+"""Paths of the rows for the gas through a line's regulator, and for the gas in the line [kg]."""
 
 _PARAMETERS = (
     "plant.gas_product",
@@ -37,22 +37,22 @@ _PARAMETERS = (
     "plant.supply_pressure",
     "lines.largest_flow_1",
 )
-"""Parameters of the lanes that follow the supply."""
+"""Parameters of the program that depend on the state of the supply."""
 
 _STRIDES = 2.0
-"""Strides in which the line must once come near the set pressure."""
+"""Number of strides within which the line pressure must once reach the required level."""
 
 _LARGEST_DRAW = 0.05
-"""Share of the gas in the bottle that may leave between two meetings: what it offers stays until the next one."""
+"""Fraction of the gas in the bottle that may be drawn between two data exchanges, while the supply is constant."""
 
 _LEAST_FLOW = 1.0e-12
-"""Flow [kg/s] that a regulator which passes nothing is taken to pass, so that nothing is divided by zero."""
+"""Smallest flow [kg/s] assumed for the regulator, to avoid a division by zero."""
 _RESTING = 5.0
-"""Seconds between two states of a bottle that is kept of a rest."""
+"""Interval between two states of a bottle during a rest [s]."""
 _ABOVE_FREEZING = 0.02
-"""Temperature [K] over the lowest of the fluid's table from which its content freezes."""
+"""Difference [K] to the lowest temperature of the property table below which the fluid counts as freezing."""
 _OPEN = 0.999
-"""Share of the seat that is open from which no ice is what makes the flow too small."""
+"""Fraction of the seat area that is open, above which ice is not the cause of an insufficient flow."""
 
 
 class Schedule(NamedTuple):

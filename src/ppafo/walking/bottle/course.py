@@ -27,7 +27,7 @@ UNITS = {
     "regulated_pressure": "Pa",
     "seat_open": "-",
 }
-"""Values of a supply by name, with their units."""
+"""Series of a supply by name, with their units."""
 
 
 class SupplyEnding(NamedTuple):

@@ -27,7 +27,7 @@ LEAST_TORQUE = Quantity("least_torque", "1", "torque that ends the walk, over th
 COUPLING = Quantity("coupling", "s", "time between two exchanges of bottle and device", 0.1, 1.0e-3, 1.0)
 _SET_PRESSURE = "regulator.set_pressure"
 BOTTLE_OVERRIDES = {path if path.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{path}": path for path in PATHS}
-"""Values of the bottle's own file that an override may set, ``bottle.volume`` or ``bottle.regulator.area``, by path."""
+"""Values of the bottle file that overrides may set, such as ``bottle.volume`` or ``bottle.regulator.area``, by path."""
 
 BOTTLE_NUMBERS = (FILL, TEMPERATURE, LEAST_TORQUE, COUPLING)
 
@@ -40,14 +40,14 @@ _FOLLOWS = {
 """Remedies that slow the response of a part of the supply."""
 
 _OWN = tuple(f"{SUPPLY_LINE}.plantarflexion.{name}" for name in ("droop", "largest_flow"))
-"""Settings that the bottle's own regulator replaces."""
+"""Settings of the supply line that are replaced by the bottle's regulator."""
 
 _SAME_GAS = 1.0e-2
-"""Fraction by which the gas constants of bottle and device may differ: the same species from two sources."""
+"""Relative difference up to which the gas constants of bottle and device count as equal: same species, two sources."""
 _SAME_PRESSURE = 2.0e-3
-"""Fraction by which two pressures may differ that are said to be the same: rounding of units."""
+"""Relative difference up to which two pressures count as equal, for rounding in unit conversion."""
 _FASTEST = 1.0e3
-"""Rate [1/s] up to which a walk follows what warms and cools: within a millisecond, the step of the lanes."""
+"""Largest thermal rate [1/s] that a walk can resolve: a time constant of a millisecond, the step of the simulation."""
 
 
 @dataclass(frozen=True, slots=True)

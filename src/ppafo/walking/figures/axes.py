@@ -7,11 +7,11 @@ from ppafo.report.style import GREY
 GAS = Kind("Gas taken", "kg", "gas mass")
 TOES = Kind("Toe height above ground", "m", "body length")
 GROUND = Mark("level", y=0.0, colour=GREY, style={"linewidth": 0.8})
-"""The height at which the toes touch."""
+"""Line at the height of the ground."""
 THIN = {"linewidth": 0.8}
-"""Look of a curve that swings in every stride."""
+"""Style of a curve that oscillates in every stride."""
 _LONG = 120.0
-"""Time [s] above which the axis is in minutes."""
+"""Duration [s] above which the time axis is in minutes."""
 
 
 def time_axis(end: float) -> Kind:

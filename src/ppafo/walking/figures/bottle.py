@@ -25,11 +25,11 @@ _TEMPERATURES = (
     ("outlet_temperature", "gas behind it", ORANGE),
     ("gas_temperature", "gas at the device", GREEN),
 )
-"""Rows of the supply, with their names in the legend and colours."""
+"""Series of the supply, with legend label and colour."""
 _MASSES = (("bottle_mass", "total gas", BLUE), ("liquid_mass", "liquid", GREEN))
-"""Rows of the supply, with their names in the legend and colours; a gas that has no liquid has no row of it."""
+"""Series of the supply, with legend label and colour; a gas without a liquid phase has no liquid series."""
 _LEAST_TORQUE = 0.1
-"""Torque [N m] up to which the axis goes at least."""
+"""Smallest upper limit of the torque axis [N m]."""
 
 
 def bottle_figure(result: WalkResult) -> "Figure":

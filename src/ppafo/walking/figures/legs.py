@@ -36,15 +36,15 @@ if TYPE_CHECKING:
     from matplotlib.patches import Polygon
 
 GHOST = "#5a5a5a"
-"""The healthy foot: dark enough to be seen on a coloured one, in front of which it is drawn."""
+"""Colour of the healthy foot: dark enough to be visible in front of a coloured foot."""
 DRAGS = "#a4001d"
 DRAG_LIMIT = -0.01
-"""Toes below the ground by more than this [m] are shown as dragging; hip and knee could give less."""
+"""Toe height [m] below which the toes are drawn as dragging; hip and knee could compensate for less."""
 
 
 _STRIP_SIZE = (10.4, 3.75)
 _FRAMES = 10
-"""Legs of the picture of one stride."""
+"""Number of legs in the picture of one stride."""
 _SLOT = 0.62
 """Width of the ground under one frame [m]."""
 
@@ -54,19 +54,19 @@ _HEIGHTS = (1.75, 0.7, 0.7, 0.7, 1.35)
 _PERCENT = 100.0 * PHASES
 _STRIP_FRAMES = 8
 _NARROW, _NARROWEST = 9.0, 2.5
-"""Percent of the stride below which a block's name stands upright, and below which it is left out."""
+"""Width of a block [percent of the stride] below which its name is vertical, and below which the name is left out."""
 
 _ANIMATION_SIZE, _RESOLUTION = (7.2, 4.6), 90
 _STRIDES, _PER_STRIDE = 2, 30
 _COLOURS = 48
-"""Colours of the animation's palette."""
+"""Number of colours in the palette of the animation."""
 _NEARLY_WHITE = 248
-"""Level from 0 to 255 above which all three make white, so that the background has one colour."""
+"""Level (0 to 255) of all three colour channels above which a pixel is made white, for a uniform background."""
 _SLOWED = 2.0
-"""Duration of the animation over the duration of the walk [-]."""
+"""Duration of the animation divided by the duration of the walk [-]."""
 _VIEW = (-0.62, 0.62, -0.12, 0.78)
 _TICK = 0.35
-"""Distance of the marks on the ground [m]."""
+"""Distance between the marks on the ground [m]."""
 
 _CHAMBERS = (("pressure_1", "plantarflexion", CHAMBER_1), ("pressure_2", "dorsiflexion", CHAMBER_2))
 """Channel, name and colour of each chamber."""

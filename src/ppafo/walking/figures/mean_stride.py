@@ -30,13 +30,13 @@ _CHANNELS = {
     PRESSURE: ("pressure_1", "pressure_2"),
     TOES: ("toe_height",),
 }
-"""Panels from top to bottom, and the channels in each of them that are drawn for every walk."""
+"""Panels from top to bottom, each with the channels that are drawn for every walk."""
 
 
 def walk_figure(walks: Mapping[str, Any]) -> "Figure":
     """Return the figure of the mean stride of one or two walks of the same wearer, beside the healthy gait.
 
-    ``walks`` are ``WalkResult`` by name, whose own ``plot`` draws this figure.
+    ``walks`` are objects ``WalkResult`` by name; the method ``plot`` of a result draws this figure.
     """
     first = next(iter(walks.values()))
     gait = walk_of(first.scenario).gait

@@ -14,14 +14,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _QUANTILES = {0.05: "--", 0.5: "-", 0.95: "--"}
-"""Fractions of the wearers, with the line that is drawn for each."""
+"""Quantiles of the wearers, each with its line style."""
 _OUTCOMES = ("gas", "positive_push_off_work", "net_push_off_work", "toe_clearance")
 _PAIRS = (("stride_time", "gas"), ("body_mass", "positive_push_off_work"))
 """Pairs of a trait and an outcome."""
 _BINS = 40
-"""Bins of a histogram at most; of few wearers there are fewer, about the root of their number."""
+"""Largest number of bins of a histogram; for few wearers about the square root of their number."""
 _MAXIMUM_POINTS = 2000
-"""Wearers that are drawn as points at most; of more an even selection."""
+"""Largest number of wearers drawn as points; of more wearers, an evenly spaced subset is drawn."""
 _OWN = {"linestyle": "", "marker": "o", "markersize": 6, "clip_on": False, "zorder": 5}
 
 

@@ -27,16 +27,16 @@ _PHASES = {
     PUSH_OFF: ("push-off", "#8fbfe0"),
     SWING: ("swing", "#cf8146"),
 }
-"""Name and colour of each phase in the strip under the torque; they differ in grey too."""
+"""Name and colour of each phase in the strip below the torque; the colours also differ in greyscale."""
 _SHADED, _LESS_HELP = "#f3f3f3", "#cc3311"
 _LETTER = 0.0135
-"""Fraction of the task sequence that a letter of a segment's name takes; a name without that room stands upright."""
+"""Width of a letter as a fraction of the task sequence; a name that does not fit is written vertically."""
 _ROOM = 2.2
-"""Height of the panel of the pace over its curve, for the names of the segments above it."""
+"""Height of the pace panel relative to its curve, to make room for the names of the segments."""
 _STRIP, _STRIP_GAP = 0.18, 0.05
-"""Height of the strip of phases and its distance below the torque, as fractions of the torque's range."""
+"""Height of the phase strip and its distance below the torque, as fractions of the range of the torque."""
 _LEAST_RANGE = 1.0e-3
-"""Range of the torque [N m] that the strip has its height of where the torque is 0 throughout."""
+"""Smallest range of the torque [N m] for the height of the strip, used if the torque is always 0."""
 
 
 def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":

@@ -26,19 +26,19 @@ _LEVELS = {
     PAUSED: ("pause", "#e3bb63"),
     STOPPED: ("stop", "#c07777"),
 }
-"""Name and colour of each assistance level, darker the less there is, so that they differ in grey too."""
+"""Name and colour of each assistance level, darker for less assistance, to differ in greyscale."""
 _PHASES = ("swing", "heel", "free", "push")
-"""Names of the phases, whose numbers count from 0."""
+"""Names of the phases, which are numbered from 0."""
 _NAMED_STRETCH = 0.06
-"""Fraction of the walk from which a stretch at one assistance level is wide enough for its name."""
+"""Shortest interval at one assistance level that gets a label, as a fraction of the walk."""
 _APART = 0.2
-"""Fraction of the walk within which failures have one label; others are in two rows in turn."""
+"""Failures within this fraction of the walk share a label; the other labels alternate between two rows."""
 _ROW = 0.16
-"""Distance of the two rows of labels, as a fraction of the panel."""
+"""Distance between the two rows of labels, as a fraction of the panel height."""
 _TURNS = 0.6
-"""Fraction of the walk from which on a label stands left of its line, so that it stays inside."""
+"""Fraction of the walk after which a label is placed to the left of its line, to stay inside the panel."""
 _ROOM = 1.4
-"""Height of the panel of the gas over its curve, for the labels above it."""
+"""Height of the gas panel relative to its curve, to make room for the labels."""
 
 
 def whole_walk_figure(result: WalkResult) -> "Figure":

@@ -218,7 +218,7 @@ def limit_of(trials: Trials, valve: Part, tried: Trial) -> Limit:
 
 
 def ceiling_pressure(problem: SizingProblem) -> float:
-    """Return the pressure [Pa absolute] below which clipping of the peak exceeds the error limit; equation (2)."""
+    """Return the pressure [Pa absolute] below which the clipped peak alone exceeds the error limit; equation (2)."""
     from scipy.optimize import brentq
 
     atmosphere = problem.atmosphere

@@ -22,10 +22,10 @@ _NAME = re.compile(r"(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?")
 _TIMES = {"time": "s", "t": "s", "time_s": "s", "time_ms": "ms"}
 
 _COUNTERS = ("", "index", "frame", "frame#", "framenumber", "frame number", "sample")
-"""Names of columns that count rows, in small letters; the first is pandas' index."""
+"""Column names of row counters, in lower case; the first is pandas' index."""
 
 _LONGEST_SHOWN = 40
-"""Letters of a name that a message shows."""
+"""Largest number of characters of a name in a message."""
 
 
 def _recognises(path: str | Path) -> bool:

@@ -27,7 +27,7 @@ from ppafo.storage.files import read_bytes
 from ppafo.storage.trc import read_trc
 
 PLATE = "force plate "
-"""Columns ``force plate 1.x``, ``.y``, ``.z`` [N]: the plate's force in the axes of the laboratory."""
+"""Prefix of the columns ``force plate 1.x``, ``.y``, ``.z`` [N]: force on a plate in laboratory axes."""
 
 _AXIS_KEYS = {"forward", "vertical"}
 
@@ -50,10 +50,10 @@ _HEELS = ("hee", "heel", "calc", "calcstudy")
 _TOES = ("toe", "toetip", "toestudy", "mt2")
 
 _LEAST_WAY = 0.5
-"""Metres; a marker that goes further shows the direction of walking, a shorter way is a treadmill's."""
+"""Travel of a marker [m] above which it shows the direction of walking; on a treadmill the travel is shorter."""
 
 _MOST_OBLIQUE = 25.0
-"""Degrees between walk and axis; the lean of the shank is short by 10 % there."""
+"""Largest angle [deg] between walk and axis, at which the lean of the shank is underestimated by 10 %."""
 
 
 def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Convention:
@@ -222,18 +222,18 @@ _FACTORS = {
     "moment": {"N m/kg": 1.0, "N mm/kg": 1.0e-3, "N m": None, "N mm": None},
     "force": {"N/kg": 1.0, "N": None, "": 9.8, "percent": 0.098},
 }
-"""Factor from the unit to N m/kg or N/kg; None where it is the body mass."""
+"""Factor from a unit to N m/kg or N/kg; None if the factor is the inverse of the body mass."""
 
 
 _PLAUSIBLE = {"moment": (0.35, 2.6), "force": (5.5, 20.0)}
-"""Peaks of walking in N m/kg and N/kg, narrow enough for no two units to fit up to a body mass of 130 kg."""
+"""Plausible peaks in walking, N m/kg and N/kg; up to a body mass of 130 kg only one unit fits."""
 
 
 def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tuple[str, list[str]]:
     """Return the unit of a column of ``kind`` "moment" or "force", and a remark if it differs from the file's.
 
-    The stated unit is used if the values are plausible for walking in that unit; otherwise the only plausible unit is
-    used.
+    The stated unit is used if the values are plausible for walking in that unit, or in no unit; otherwise the only
+    plausible unit is used.
     """
     values = np.abs(table.columns[name][np.isfinite(table.columns[name])])
     stated = table.units.get(name, "")

@@ -15,7 +15,7 @@ from ppafo.storage.matlab import MATLAB_SUFFIX, read_matlab
 
 _TIMES = ("time", "t", "tout")
 _OPENSIM = re.compile(r"ankle_angle_[rl].*|.*_force_v[xyz]|.*_moment|pelvis_.*")
-"""Labels that are OpenSim's."""
+"""Pattern of OpenSim's labels."""
 _DEGREES = re.compile(r"inDegrees\s*=\s*(yes|no)", re.IGNORECASE)
 _THREE = re.compile(r"(?P<name>.*)\(:,(?P<number>[123])\)")
 

@@ -30,13 +30,13 @@ from ppafo.signals.recording import Floats
 from ppafo.wording import one_line
 
 _NEXUS_MOTION, _NEXUS_DEVICES = ("Trajectories", "Model Outputs"), "Devices"
-"""Blocks of a Nexus export: markers, angles and moments of models; force plates and other analog channels."""
+"""Blocks of a Nexus export: first markers, model angles and moments; then force plates and other analog channels."""
 _LENGTHS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm"}
 _MOTIVE_ROWS = 3
-"""Rows above the axes of a Motive export: types, names and quantities at least."""
+"""Least number of rows above the axes of a Motive export: types, names and quantities."""
 _DFLOW = {"Pos": "m", "Cop": "m", "For": "N", "Mom": "N m"}
 _NUMBER = re.compile(r"[+-]?\.?\d|nan", re.IGNORECASE)
-"""Start of a cell with a number."""
+"""Pattern of the start of a numeric cell."""
 _DFLOW_COLUMN = re.compile(r"(.+)\.(Pos|Cop|For|Mom)([XYZ])")
 
 
