@@ -213,7 +213,7 @@ class Result:
 
 
 def simulate(scenario: Scenario) -> Result:
-    """Run one scenario. A run that diverges is a Result with that status, up to the time of failure."""
+    """Run one scenario; a run that diverges gives a Result with that status, up to the time of failure."""
     return results_of(scenario, [plan_run(scenario)])[0]
 
 
