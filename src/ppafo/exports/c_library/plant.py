@@ -250,7 +250,7 @@ def with_api(alone: PlantAlone) -> PlantAlone:
 
 
 def _as_clock(alone: PlantAlone) -> tuple[str, ...]:
-    """Names of the other times equal to the input interval: each command applies to exactly one of these."""
+    """Names of the other time settings that must equal the input interval: controller period and output interval."""
     return tuple(c_identifier(path) for path in (SAMPLES, "run.output_interval") if path != alone.clock)
 
 

@@ -248,7 +248,7 @@ _PARTS = 200
 
 
 def check_published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield, for each published torque, a comparison with the torque at the supply, and in walking with the fill time.
+    """Yield a comparison of each published torque with the torque at supply pressure, and in walking of the filling time.
 
     Agreement gives a note, disagreement a warning. Yields nothing without published torques.
     """
