@@ -44,7 +44,7 @@ _LABELS = {
 def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides = (), plugins: Plugins = ()) -> bytes:
     """Interactive page, one file of HTML, that simulates scenarios again as their numbers are changed.
 
-    Scenarios with the same kind of motion share a tab, which opens with the first two of them.
+    Scenarios with the same kind of motion share a tab. The first two scenarios of a tab are displayed initially.
 
     Arguments:
         scenarios: names or files of scenarios and walks

@@ -114,7 +114,7 @@ def in_units(units: Callable[..., Mapping[str, str]]) -> Callable[[Callable[P, R
 
 
 def pressure_units(level: str) -> dict[str, str]:
-    """Return the display units of pressure levels and differences, by SI unit, for levels in ``bar_g``, say."""
+    """Return the display units of pressure levels and differences, by SI unit, for a level unit such as ``bar_g``."""
     unit, kind = split_pressure_kind(level)
     return {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
 

@@ -223,7 +223,7 @@ _SUPPLY = "supply.pressure"
 
 
 def check_ideal_gas(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a note on the error of the ideal gas law at supply pressure, a warning where it exceeds 5 %."""
+    """Yield a note on the error of the ideal gas law at supply pressure, a warning if the error exceeds 5 %."""
     gas, pressure = evidence.gas(), evidence.number(_SUPPLY)
     virial = SECOND_VIRIAL.get(evidence.text("gas.species") or "")
     if gas is None or pressure is None or virial is None:
