@@ -46,8 +46,8 @@ def load_scenario(
         scenario: name of a shipped scenario or walk, or a .toml file
         overrides: texts whose path starts in the scenario, ``run.duration=1 s``, or in its device,
             ``valve.area=12.6mm^2``, or a dictionary of such paths, in which a number is in SI
-        parameter_set: a ParameterSet, a name or a file in place of the set that the scenario names; what the scenario
-            changes in its device is changed in this one
+        parameter_set: a ParameterSet, a name or a file that replaces the set named in the scenario; the scenario's
+            changes of its device apply to this set
         plugins: modules of your own, files or names, whose objects files may name:
             ``["laws.py"]`` for ``kind = "laws:KIND"``
 

@@ -22,7 +22,7 @@ def evaluate(
     """Return every metric [SI] that the channels of a recording allow, by name; none for a single sample.
 
     Arguments:
-        recording: a Recording, or a file, a result folder, a pandas DataFrame or an xarray Dataset that holds one
+        recording: a Recording, or a file, a result folder, a pandas DataFrame or an xarray Dataset with one
         columns: a column map of a file with other columns, or the name of one
 
     Returns:

@@ -233,7 +233,7 @@ class World:
         return self
 
     def lanes(self, count: int) -> Environments:
-        """Return ``count`` environments on compiled lanes."""
+        """Return ``count`` environments that run side by side."""
         return Environments(self.episodes.program, self.episodes.clock, self.task, count, self.judging)
 
     def begin(

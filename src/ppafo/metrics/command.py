@@ -105,7 +105,7 @@ ASKED = MeterKind("asked", RequestedTorqueSums, start_asked, update_asked)
 
 
 def asked_samples(recording: Recording) -> Masks:
-    """Mark the samples with a requested torque (samples,): all of a task; in a walk according to the gait phase."""
+    """Mark the samples with a requested torque (samples,): all samples of a task; in a walk by phase and command."""
     if "controller_phase" not in recording:
         return np.ones(len(recording), dtype=np.bool_)
     return np.asarray((recording["command"] <= VENTS_ABOVE) & (recording["controller_phase"] != MID_STANCE))

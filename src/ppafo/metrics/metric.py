@@ -169,7 +169,7 @@ def for_each_reference(kinds: tuple[MetricKind, ...], rename: Callable[[str, str
 
 
 def controlled_in(recording: Recording) -> ControlledQuantity | None:
-    """Return the controlled quantity of the reference in a recording; None without a reference."""
+    """Return the quantity that the reference in a recording prescribes; None without a reference."""
     return next((kind for kind in CONTROLLED.values() if kind.reference in recording), None)
 
 

@@ -25,9 +25,9 @@ class SettledSums(NamedTuple):
     ``squares`` is the sum of squared errors, ``total`` the sum of errors, ``taken`` the number of samples, ``swing``
     the reversal state of the error, ``lowest_error`` and ``highest_error`` the extremes of the error, ``command`` the
     reversals of the command, and ``lowest_angle`` and ``highest_angle`` the extremes of the angle [rad]. ``begun`` is
-    the initial controlled value, ``lowest`` and ``highest`` its extremes. ``met_upwards`` and ``met_downwards`` are 1
-    once the value has been at or below, or at or above the reference; ``top`` and ``bottom`` are the extremes since
-    then.
+    the initial controlled value, ``lowest`` and ``highest`` its extremes. ``met_upwards`` is 1 once the value has been
+    at or below the reference, and ``top`` the highest value since then; ``met_downwards`` and ``bottom`` are the
+    opposite.
     """
 
     squares: float

@@ -55,13 +55,12 @@ class StrideTotals(NamedTuple):
 
 
 class CurrentStride(NamedTuple):
-    """Current stride.
+    """Stride in progress.
 
-    ``is_whole`` is 1 for a stride that started with a heel strike, which the first one of a walk did not. ``on_toes``
-    is 1 for a stride that started with a landing on the toes, which the totals ``at_strike`` already include.
-    ``at_strike`` are the totals since the start of the walk at the heel strike. ``lacked_help`` is 1 after a sample
-    with reduced assistance. ``squared_errors`` [(N m)^2] is the sum of squared torque errors over ``push_off_samples``
-    samples.
+    ``is_whole`` is 1 for a stride that started with a heel strike; the first one of a walk did not. ``on_toes`` is 1
+    for a stride that started with a landing on the toes. ``at_strike`` are the totals since the start of the walk at
+    the heel strike, including such a landing. ``lacked_help`` is 1 after a sample with reduced assistance.
+    ``squared_errors`` [(N m)^2] is the sum of squared torque errors over ``push_off_samples`` samples in push-off.
     """
 
     is_whole: float

@@ -43,7 +43,7 @@ _DEEPEST = 12
 _LONGEST = 64
 """Number of elements up to which a list is stored itself; of a longer list the hash is stored."""
 _Enclosing = tuple[int, ...]
-"""Identities of the enclosing values, which stop the recursion for a value that contains itself."""
+"""Identities of the enclosing values, to detect a value that contains itself."""
 
 
 def controller_document(controller: PythonController) -> dict[str, Any]:

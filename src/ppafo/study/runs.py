@@ -216,7 +216,7 @@ def oscillating(rows: Mapping[str, Floats], scenario: Scenario) -> NDArray[np.bo
 
 
 def settled(rows: Rows, metric: str) -> Floats:
-    """Return a metric for evaluation: the final error of an oscillating loop is replaced by a larger RMS error."""
+    """Return a metric for evaluation; for an oscillating loop, the final error becomes the RMS error if larger."""
     companions = ONE_INSTANT.get(metric, ())
     if not companions or not set(companions) <= set(rows):
         return rows[metric]
