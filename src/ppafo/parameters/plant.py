@@ -20,7 +20,7 @@ class Restriction(NamedTuple):
 
 
 def area_restriction(orifice: Orifice, gas: Gas, linear_ratio: float) -> Restriction:
-    """Return the paper's orifice for a gas, with linear flow above the ratio ``linear_ratio`` [-]. Equations (6), (7)."""
+    """Return the paper's orifice for a gas, with linear flow above ratio ``linear_ratio`` [-]; equations (6), (7)."""
     conductance = area_conductance(
         orifice.area,
         orifice.discharge_coefficient,

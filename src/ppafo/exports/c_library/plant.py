@@ -208,7 +208,7 @@ def half_open(scenario: Scenario) -> Scenario:
 
 
 def with_api(alone: PlantAlone) -> PlantAlone:
-    """Return a plant whose library has the API for its inputs."""
+    """Return the plant with a library API that takes its inputs at each step."""
     names = [variable.name for variable in alone.inputs]
     by_name = {name: name for name in names}
     # An example whose command does something.

@@ -186,7 +186,7 @@ _LEAST, _MOST = 0.6, 1.1
 
 
 def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield the gas of one filling at the middle of the range: a note if the measured gas agrees, else a warning.
+    """Yield the gas of one filling at mid-range: a note if the measured gas use agrees, otherwise a warning.
 
     Yields nothing if the set reports no gas use of a single filling.
     """
