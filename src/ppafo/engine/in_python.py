@@ -442,7 +442,7 @@ MATH = SimpleNamespace(
 
 class _GoingOn(ast.NodeTransformer):
     def __init__(self, _function: FunctionType) -> None:
-        """Any function can go on."""
+        """Accept any function, because every function can be rewritten in this way."""
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         self.generic_visit(node)

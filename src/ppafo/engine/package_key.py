@@ -29,7 +29,7 @@ _PLAIN = (bool, int, float, str)
 
 
 class Key(NamedTuple):
-    """Inputs of a text.
+    """Inputs that determine a composed text.
 
     Attributes:
         described: description of the components of the program

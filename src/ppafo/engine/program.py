@@ -1,4 +1,4 @@
-"""Program: the components (valve, controller, gas, ...) that one compiled model consists of."""
+"""Program: combination of the components (valve, controller, gas, ...) of one compiled model."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

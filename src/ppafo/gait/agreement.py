@@ -3,7 +3,7 @@
 Healthy walking relates the curves to each other. Just after toe-off the ankle has its peak plantarflexion, followed by
 the rearmost position of the shank; ankle moment and vertical force end the push-off at the same time. While the foot is
 flat, the ankle rotates with the shank. The largest push-off moment is the force times the length of the forefoot. An
-impaired gait may differ in each of these relations, so an unusual curve is remarked and not rejected. An ankle that
+impaired gait may differ in each of these relations, so an unusual curve causes a remark, not an error. An ankle that
 fits better half a stride later, however, belongs to the other foot.
 
 Numbers in brackets are the ranges of 13 recorded strides: 11 of one walker overground and both legs of another on a
@@ -93,7 +93,7 @@ def _smooth(values: Floats, name: str) -> Floats:
 def delay_remarks(walk: MeanStride) -> list[str]:
     """Return remarks on curves of a mean stride that are delayed relative to the force or, without force, to the shank.
 
-    Curves from the same file as the reference share its clock and are not remarked.
+    Curves from the same file as the reference share its clock and get no remark.
     """
     share = walk.stance_share
     # Of the shank the largest lean backwards, which is its minimum.

@@ -113,10 +113,16 @@ class GaitCurve:
 class Gait:
     """Stride of one wearer, as curves over the phase; a curve that was not recorded is None.
 
-    ``body_mass`` [kg] and ``stature`` [m] (None if unknown) are of the subject. ``stride_time`` is in [s],
-    ``stance_share`` is the fraction of the stride until toe-off [-], and ``walking_speed`` is in [m/s], None if it was
-    not recorded. ``stride_time_deviation`` [s] and ``stance_share_deviation`` [-] are standard deviations between
-    strides, 0 if unknown. ``recorded_speed`` [m/s] is the speed of the recording, if it differs from ``walking_speed``.
+    The module docstring defines units and signs of the curves.
+
+    - ``body_mass``, ``stature``: body mass [kg] and stature [m] of the subject; the stature is None if unknown
+    - ``walking_speed``: walking speed [m/s], None if it was not recorded
+    - ``stride_time``: stride time [s]
+    - ``stance_share``: fraction of the stride until toe-off [-]
+    - ``stride_time_deviation``, ``stance_share_deviation``: standard deviations between strides [s] and [-], 0 if
+      unknown
+    - ``strides``: number of strides in the mean
+    - ``recorded_speed``: speed of the recording [m/s], if it differs from ``walking_speed``
     """
 
     name: str

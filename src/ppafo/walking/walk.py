@@ -317,10 +317,15 @@ TRAITS: dict[str, WearerQuantity] = {
 class Population:
     """Wearers and the outcomes of their walks, each an array (wearers,) by name, in SI units.
 
-    ``diverged`` is the number of wearers whose simulation diverged; they are excluded from ``outcomes`` and ``traits``.
-    ``vented`` is the number of wearers whose controller stopped permanently, ``paused`` the number of other wearers
-    with reduced assistance for a while. ``fault_flags`` counts the wearers of both groups by their last fault flag, the
-    most frequent first.
+    - ``scenario``: walk of the first wearer
+    - ``minutes``: duration of each walk [min]
+    - ``seed``: random seed of the wearers
+    - ``traits``, ``outcomes``: traits of the wearers, and outcomes of their walks, without wearers whose simulation
+      diverged
+    - ``diverged``: number of wearers whose simulation diverged
+    - ``vented``: number of wearers whose controller stopped permanently
+    - ``paused``: number of other wearers with reduced assistance for a while
+    - ``fault_flags``: number of vented and paused wearers by their last fault flag, the most frequent first
     """
 
     scenario: Scenario

@@ -55,7 +55,7 @@ class HeelRocker(NamedTuple):
     """Heel rocker: lever of the ground force behind the ankle as a function of foot tilt.
 
     ``flat`` [m] is the lever with the foot nearly flat, ``raised`` [m] the lever of a raised foot, ``half`` [rad] the
-    tilt half of the way between.
+    tilt at which the lever is halfway between both.
     """
 
     flat: float

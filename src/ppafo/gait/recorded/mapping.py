@@ -209,12 +209,18 @@ def json_schema() -> dict[str, Any]:
 class ImportSettings:
     """Settings of the import of a gait.
 
-    ``body_mass`` [kg] may be None if a file states it. ``columns`` is the gait map, ``walking_speed`` is in [m/s], and
-    ``low_pass`` [Hz] is the cut-off frequency. ``least_strides`` is the least number of strides; default 2, and 1
-    overground or for a single cycle. ``stature`` [m] gives the length of the thigh if no map does. ``start`` and
-    ``end`` [s] limit the files, and gaps up to ``longest_gap`` [s] are filled. ``ankle_neutral`` [rad] is the reading
-    with the foot perpendicular to the shank; it overrides map and convention. ``form`` names the file format; it is
-    detected if empty.
+    - ``body_mass``: body mass [kg], None if a file states it
+    - ``side``: side of the foot
+    - ``columns``: gait map, None for the default of the file format
+    - ``walking_speed``: walking speed [m/s]
+    - ``low_pass``: cut-off frequency [Hz], None for no filter
+    - ``least_strides``: least number of strides; default 2, and 1 overground or for a single cycle
+    - ``name``, ``title``: name and title of the gait
+    - ``stature``: stature [m], gives the length of the thigh if no map does
+    - ``start``, ``end``: limits of the used part of the files [s]
+    - ``longest_gap``: longest gap that is filled [s]
+    - ``ankle_neutral``: reading [rad] with the foot perpendicular to the shank; it overrides map and convention
+    - ``form``: name of the file format, detected if empty
     """
 
     body_mass: float | None = None

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from ppafo.simulation.at_hand import RecordedResult
 
 _FEWEST_SAMPLES = 8
-"""Samples of a recording below which nothing is judged."""
+"""Smallest number of samples of a recording for a verdict."""
 
 
 @dataclass(frozen=True, slots=True)
