@@ -1,4 +1,4 @@
-"""Runs whose bits every computer must find, and their golden hashes, in ``golden_bits.json`` beside this file."""
+"""Runs whose results must be bitwise equal on every computer, and their reference hashes in ``golden_bits.json``."""
 
 import hashlib
 import json
@@ -32,11 +32,11 @@ VARIED = {
         ),
     ),
 }
-"""Scenarios with settings of their own, for what no shipped one has."""
+"""Scenarios with special settings, for features that no shipped scenario uses."""
 TASK_SEQUENCES = {"first-steps": "proportional"}
-"""Task sequences, and the walk that takes each."""
+"""Task sequences, and the walk for each."""
 WALKED = 4.0
-"""Seconds of a walk."""
+"""Duration of a walk [s]."""
 
 
 def names() -> tuple[str, ...]:
@@ -45,7 +45,7 @@ def names() -> tuple[str, ...]:
 
 
 def plain_batch(name: str) -> Batch:
-    """Return one run of a scenario, or some seconds of a walk, by its name."""
+    """Return one run of a scenario, or the first seconds of a walk, by name."""
     if name in VARIED:
         scenario, settings = VARIED[name]
         return batch_of(plan_run(load_scenario(scenario, settings)))
@@ -56,12 +56,12 @@ def plain_batch(name: str) -> Batch:
 
 
 def digest(result: BatchResult) -> str:
-    """Return the hash of all numbers of a result, with one NaN for all: what a NaN is made of is free."""
+    """Return the hash of all numbers of a result; all NaNs count as equal, whatever their bits."""
     return hash_of((result.states, result.record))
 
 
 def hash_of(arrays: tuple[NDArray[np.float64], ...]) -> str:
-    """Return the hash of arrays, with one NaN for all."""
+    """Return the hash of arrays; all NaNs count as equal."""
     found = hashlib.sha256()
     for values in arrays:
         # Little-endian on every computer.
@@ -74,13 +74,13 @@ Hashes = Mapping[str, Mapping[str, str | int]]
 
 
 def golden_hashes() -> Hashes:
-    """Return the hashes that every computer must find, by name."""
+    """Return the reference hashes by name of the run."""
     found: dict[str, dict[str, str | int]] = json.loads(GOLDEN.read_text(encoding="utf-8"))
     return found
 
 
 def found_bits() -> Iterator[tuple[str, bool]]:
-    """Yield the name of each run, and whether this computer finds its golden hash; some seconds in all."""
+    """Yield the name of each run, and whether this computer reproduces its reference hash; takes some seconds."""
     golden = golden_hashes()
     for name in names():
         yield name, digest(run_batch(plain_batch(name))) == golden[name]["run"]

@@ -14,7 +14,7 @@ from ppafo.first_moments import end
 
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 _received: list[int] = []
-"""Numbers of the signals that came; a list, since appending to it cannot be interrupted."""
+"""Numbers of the received signals; a list, since appending to it cannot be interrupted."""
 
 
 def listen() -> None:

@@ -1,10 +1,10 @@
-"""Catalogues of kinds: kinds of this package, and kinds that other packages offer, found when they are requested.
+"""Catalogues of kinds: kinds of this package, and kinds of other packages, which are found on request.
 
-A catalogue names the place of a kind of this package, ``module:KIND``, which is loaded when the kind is looked up: a
-run loads the valve and the controller that it has, and no other. A guest, a package that no other imports, is reached
-by such a name alone; where its folder is not installed its kinds are not listed. Another package offers a kind as an
-entry point of the catalogue's group; an object of a module that the person named is ``my_module:KIND``. Nothing is
-looked for before a name is requested that is not here.
+A catalogue gives the location of each kind of this package as ``module:KIND`` and loads a kind when it is looked up: a
+run loads only its own valve and controller. A subpackage that no other one imports is reached only through such a
+location; if its folder is not installed, its kinds are not listed. Another package offers a kind as an entry point of
+the catalogue's group; an object of a module named by the user is ``my_module:KIND``. Other packages are searched only
+for a name that is unknown here.
 """
 
 import importlib.util
@@ -28,10 +28,10 @@ Kind = TypeVar("Kind")
 
 
 class Kinds(MutableMapping[str, Kind], Generic[Kind]):
-    """Kinds by name. Looking a name up loads its kind, also from another package; names are known without loading.
+    """Kinds by name. Looking up a name loads its kind, also from another package; names are known without loading.
 
-    ``group`` is the group of entry points, ``word`` what messages call a kind, ``kind_type`` what each of them is.
-    ``own`` are the kinds of this package by name, in their order: kinds, or where each is, as ``module:KIND``.
+    ``group`` is the group of entry points, ``word`` the name of a kind in messages, ``kind_type`` the class of the
+    kinds. ``own`` maps the names of this package's kinds, in order, to kinds or to their locations, ``module:KIND``.
     """
 
     def __init__(self, group: str, word: str, kind_type: type[Any], own: Mapping[str, Kind | str]) -> None:
@@ -48,7 +48,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
             del self._own[name], self._places[name]
 
     def __getitem__(self, name: str) -> Kind:
-        """Return a kind; KeyError where there is none, KindError where it is there and cannot be used."""
+        """Return a kind; KeyError for an unknown name, KindError for a kind that cannot be used."""
         if name in self._absent:
             raise KindError(f"{self.word} '{name}' is part of {self._absent[name]}, which is not installed")
         if name not in self._kinds:
@@ -59,27 +59,27 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         return self._kinds[name]
 
     def __setitem__(self, name: str, kind: Kind) -> None:
-        """Add a kind for as long as the program runs."""
+        """Add a kind for the lifetime of the process."""
         self._kinds[name] = kind
 
     def __delitem__(self, name: str) -> None:
-        """Forget a kind."""
+        """Remove a kind."""
         del self._kinds[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Names of the kinds of this package, then of loaded kinds of other packages."""
+        """Iterate over the names of this package's kinds, then of loaded kinds of other packages."""
         return iter((*self._own, *(name for name in self._kinds if name not in self._own)))
 
     def __len__(self) -> int:
-        """Return how many names are known."""
+        """Return the number of known names."""
         return len(self._own.keys() | self._kinds.keys())
 
     def loaded(self) -> dict[str, Kind]:
-        """Return the loaded kinds by name: kinds of this package first, in their order."""
+        """Return the loaded kinds by name: kinds of this package first, in order."""
         return {name: self._kinds[name] for name in self if name in self._kinds}
 
     def loaded_or_own(self) -> dict[str, Kind]:
-        """Return the kinds that are loaded; where nothing named one, all of this package."""
+        """Return the loaded kinds; if none is loaded, all kinds of this package."""
         if not self._kinds:
             self.load_own()
         return self.loaded()
@@ -93,7 +93,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         self._kinds |= {name: kind_at(location) for name, location in self._places.items() if name not in self._kinds}
 
     def load_all(self) -> tuple[str, ...]:
-        """Load every kind that is installed; return one line for each that cannot be used, and log it."""
+        """Load every installed kind; return and log one line for each kind that cannot be used."""
         self.load_own()
         problems = []
         for point in _entry_points(self.group, _installed_path()):
@@ -132,7 +132,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         return self._checked(load, f"{self.word} '{one_line(point.name)}' of {_package(point)}", point.name)
 
     def _checked(self, load: Callable[[], Any], where: str, called: str) -> Kind:
-        """Return what is loaded where it is a kind, of a name that was given; KindError where it is none."""
+        """Return the loaded kind; KindError if it cannot be loaded, is no kind, or has another name than ``called``."""
         try:
             kind: Kind = load()
         except KindError as error:
@@ -149,12 +149,12 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
 
 
 def package_of(location: str) -> str:
-    """Return the package of a place, ``ppafo.page`` of ``ppafo.page.workbench:live_part``."""
+    """Return the package of a location: ``ppafo.page`` for ``ppafo.page.workbench:live_part``."""
     return ".".join(location.partition(":")[0].split(".")[:2])
 
 
 def is_installed(location: str) -> bool:
-    """Tell whether the package of a place is there."""
+    """Tell whether the package of a location is installed."""
     return _is_there(package_of(location))
 
 
@@ -168,10 +168,11 @@ def _is_there(package: str) -> bool:
 
 
 def declared_kinds(group: str) -> dict[str, str]:
-    """Return the kinds of a catalogue, as ``module:KIND`` by name, that folders of this package declare for it.
+    """Return the kinds that subpackages declare for a catalogue, as ``module:KIND`` by name.
 
-    A catalogue cannot name what is built on it. So a folder says in its ``kinds.toml`` what it offers, as another
-    package does by entry points: without the folder the kind is not known, and nothing else changes.
+    A catalogue cannot name kinds of packages that depend on it. A subpackage therefore declares its kinds in its
+    ``kinds.toml``, like the entry points of another package: without the subpackage the kind is unknown, and nothing
+    else changes.
     """
     import tomllib
     from importlib import resources
@@ -185,7 +186,7 @@ def declared_kinds(group: str) -> dict[str, str]:
 
 
 def kind_at(location: str) -> Any:
-    """Return what stands at ``module:NAME``, a place in this package."""
+    """Return the object at a location ``module:NAME`` in this package."""
     module, _, name = location.partition(":")
     return getattr(importlib.import_module(module), name)
 
@@ -196,7 +197,7 @@ def _installed_path() -> tuple[str, ...]:
 
 @lru_cache(maxsize=32)
 def _entry_points(group: str, _path: tuple[str, ...]) -> tuple["EntryPoint", ...]:
-    """Entry points of a group for a search path, in the order of their names."""
+    """Entry points of a group for a search path, sorted by name."""
     from importlib.metadata import entry_points
 
     # The path is part of the key, as it may grow while the program runs. What lies in the working folder is no package

@@ -1,6 +1,6 @@
-"""Loading of a scenario by name or file, whatever moves its ankle: a vane alone, or a leg that walks.
+"""Loading of a scenario by name or file, for any motion of the ankle: a vane alone, or a leg that walks.
 
-The code of walks, which is much, is loaded only where one is asked for.
+The extensive code of walks is only loaded on request.
 """
 
 from collections.abc import Iterable, Mapping
@@ -26,7 +26,7 @@ from ppafo.wording import nearest_name
 
 
 def list_all_scenarios() -> tuple[str, ...]:
-    """Return the names of the scenarios that come with the package: vanes alone first, then walks."""
+    """Return the names of the shipped scenarios: vanes alone first, then walks."""
     from ppafo.walking.loading import list_walks
 
     return *of_vanes.list_scenarios(), *list_walks()
@@ -40,14 +40,14 @@ def load_scenario(
     parameter_set: ParameterSet | str | Path | None = None,
     plugins: Plugins = (),
 ) -> Scenario:
-    """Return a scenario, walks among them, by its name in the package or by the path of a TOML file, in SI units.
+    """Return a scenario or walk, by the name of a shipped one or by the path of a TOML file, in SI units.
 
     Arguments:
         scenario: name of a shipped scenario or walk, or a .toml file
-        overrides: texts whose path begins in the scenario, ``run.duration=1 s``, or in its device,
+        overrides: texts whose path starts in the scenario, ``run.duration=1 s``, or in its device,
             ``valve.area=12.6mm^2``, or a dictionary of such paths, in which a number is in SI
-        parameter_set: a ParameterSet, a name or a file in place of the set that the scenario names; what the scenario
-            changes in its device is changed in this one
+        parameter_set: a ParameterSet, a name or a file that replaces the set named in the scenario; the scenario's
+            changes of its device apply to this set
         plugins: modules of your own, files or names, whose objects files may name:
             ``["laws.py"]`` for ``kind = "laws:KIND"``
 
@@ -92,7 +92,7 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Overrides = (), *,
 
     Arguments:
         content: tables of the file; quantities are texts with their unit, ``{"angle": "75 deg"}``, and relative paths
-            begin in the working folder
+            start from the working folder
         overrides: texts such as ``valve.area=12.6mm^2``, or a dictionary
         plugins: modules of your own, files or names, whose objects files may name
 
@@ -117,7 +117,7 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Overrides = (), *,
 
 
 def _layout(document: Mapping[str, Any]) -> of_vanes.Layout:
-    """Return how a document is laid out: as its motion says."""
+    """Return the layout of a document, according to its kind of motion."""
     if not is_walk(kind_at(document, "motion")):
         return of_vanes.VANE
     from ppafo.walking.loading import WALKING
@@ -126,19 +126,19 @@ def _layout(document: Mapping[str, Any]) -> of_vanes.Layout:
 
 
 def scenario_or_load(scenario: Scenario | str | Path, overrides: Iterable[str] = ()) -> Scenario:
-    """Return a scenario as it is, or load it by name or path; ScenarioError for overrides of one that is loaded."""
+    """Return a loaded scenario unchanged, or load one by name or path; ScenarioError for overrides of a loaded one."""
     return of_vanes.scenario_or_load(scenario, overrides, load_scenario)
 
 
 def placed(name: str, folder: Path) -> str:
-    """Return the name of a shipped scenario or walk, or the path of a file, relative ones from a folder."""
+    """Return the name of a shipped scenario or walk, or the path of a file; relative paths start from a folder."""
     return beside(name, folder, of_vanes.list_scenarios())
 
 
 def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:
-    """Return a scenario built again of what its file said, with further overrides as a layer on top of its own.
+    """Return a scenario rebuilt from the content of its file, with further overrides on top of its own.
 
-    A Python object that controls it stays in charge.
+    A Python object as its controller is kept.
     """
     before, custom = of_vanes.request_again(scenario.origin), scenario.controller.custom
     layout, later = _layout(before.content), read_overrides(more, ScenarioError)
@@ -150,7 +150,7 @@ def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:
 
 
 def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a scenario file: of a vane alone, or of a leg that walks."""
+    """Return the JSON Schema of a scenario file, for a vane alone or for a leg that walks."""
     from ppafo.walking import declaration as of_walks
 
     forms = {"vane": schema.json_schema(), "walk": of_walks.json_schema()}
@@ -167,7 +167,7 @@ _DEFINITIONS = "#/$defs/"
 
 
 def _with_references(node: Any, to: str) -> Any:
-    """Copy of a part of a JSON Schema, whose references to definitions begin with ``to``."""
+    """Copy of a part of a JSON Schema whose references to definitions start with ``to``."""
     if isinstance(node, dict):
         return {key: _with_references(value, to) for key, value in node.items()}
     if isinstance(node, list):

@@ -1,4 +1,4 @@
-"""Measures a recording, or the file or the result folder of one: its metrics by name."""
+"""Metrics of a recording, given directly, as a file or as a result folder."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 def evaluate(
     recording: "Recording | DataFrame | Dataset | str | Path", *, columns: ColumnsLike | None = None
 ) -> dict[str, Metric]:
-    """Return every metric [SI] that the channels of a recording allow, by name; one sample alone allows none.
+    """Return every metric [SI] that the channels of a recording allow, by name; none for a single sample.
 
     Arguments:
-        recording: a Recording, or a file, a result folder, a pandas DataFrame or an xarray Dataset that holds one
+        recording: a Recording, or a file, a result folder, a pandas DataFrame or an xarray Dataset with one
         columns: a column map of a file with other columns, or the name of one
 
     Returns:

@@ -1,7 +1,7 @@
-"""Modules of the person: of a word ``module:OBJECT``, only a module that the person named is imported.
+"""User modules: of a word ``module:OBJECT``, only a module that the user named is imported.
 
-Files come from others and run no code, so that a word in a file finds an object only where the person named its module:
-on the command line, as ``plugins`` of a call in Python, or by importing it.
+Files may come from other people and must not run code. A word in a file therefore finds an object only if the user
+named its module: on the command line, as ``plugins`` of a call in Python, or by importing the module.
 """
 
 import importlib
@@ -19,7 +19,7 @@ from ppafo.errors import KindError
 from ppafo.wording import one_line
 
 Plugins = Iterable[str | Path]
-"""Files (``laws.py``) or modules (``my_laws.hysteresis``) of the person."""
+"""Files (``laws.py``) or modules (``my_laws.hysteresis``) of the user."""
 
 VARIABLE = "PPAFO_PLUGINS"
 """Environment variable by which child processes inherit the names of the plug-in modules."""
@@ -32,7 +32,7 @@ _SUFFIX, _PACKAGE = ".py", "__init__.py"
 
 @dataclass(frozen=True, slots=True)
 class Plugin:
-    """A module by its name, and the folder in which it lies; without a folder it is looked for as any other."""
+    """User module by name, with the folder that contains it; without a folder the usual search path is used."""
 
     module: str
     folder: str = ""
@@ -42,20 +42,20 @@ _named: dict[str, Plugin] = {}
 
 
 def name_plugins(plugins: Plugins | str | Path) -> None:
-    """Let words in files find objects of these modules; KindError where one is not there. Nothing is imported yet."""
+    """Allow words in files to refer to objects of these modules, not yet imported; KindError for a missing module."""
     for plugin in (plugins,) if isinstance(plugins, str | Path) else plugins:
         for found in _found(plugin):
             add_plugin(found)
 
 
 def name_modules_in(text: str) -> None:
-    """Name the modules of all words ``module:OBJECT`` in a text of the person's, such as the value of ``--set``."""
+    """Allow the modules of all words ``module:OBJECT`` in a text from the user, such as the value of ``--set``."""
     for module in _OBJECT_IN_TEXT.findall(text):
         add_plugin(_of_module(module))
 
 
 def add_plugin(plugin: Plugin) -> None:
-    """Name a module that is known by its folder; KindError where another folder has a module of that name."""
+    """Allow a module with a known folder; KindError if another folder has a module of the same name."""
     earlier = {item.module: item for item in named_plugins()}.get(plugin.module)
     if earlier is not None and earlier.folder and plugin.folder and earlier.folder != plugin.folder:
         raise KindError(f"plugin '{plugin.module}': is in {earlier.folder} and in {plugin.folder}; rename one of them")
@@ -65,7 +65,7 @@ def add_plugin(plugin: Plugin) -> None:
 
 
 def named_plugins() -> tuple[Plugin, ...]:
-    """Return what was named so far, here or in the process that started this one."""
+    """Return the modules named so far, in this process or in its parent process."""
     for text in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
         module, _, folder = text.partition("=")
         _named.setdefault(module, Plugin(module, folder))
@@ -73,7 +73,7 @@ def named_plugins() -> tuple[Plugin, ...]:
 
 
 def _found(plugin: str | Path) -> tuple[Plugin, ...]:
-    """Return the module of a path or a name, under each name that it has; KindError where there is none."""
+    """Return the module of a path or name, under each of its names; KindError if there is none."""
     text = str(plugin)
     path = Path(text).absolute()
     if (path / _PACKAGE).is_file():
@@ -94,7 +94,7 @@ def _found(plugin: str | Path) -> tuple[Plugin, ...]:
 
 
 def _of_path(path: Path) -> Plugin:
-    """Return the module of a file, with the names of the packages that it lies in."""
+    """Return the module of a file, with the names of its enclosing packages."""
     parts, folder = [path.stem], path.parent
     while (folder / _PACKAGE).is_file():
         parts.insert(0, folder.name)
@@ -103,7 +103,7 @@ def _of_path(path: Path) -> Plugin:
 
 
 def _of_module(module: str) -> Plugin:
-    """Return the module of a name: of the working folder where nothing else has that name."""
+    """Return the module of a name: from the working folder only if nothing installed has the same name."""
     top, here = module.partition(".")[0], str(Path.cwd())
     if _is_installed(top) or importlib.machinery.PathFinder.find_spec(top, [here]) is None:
         return Plugin(module)
@@ -111,7 +111,7 @@ def _of_module(module: str) -> Plugin:
 
 
 def _is_installed(top: str) -> bool:
-    """Tell whether a module is there without the working folder."""
+    """Tell whether a module is found without the working folder."""
     if top in sys.modules or top in sys.builtin_module_names:
         return True
     with without_working_folder():
@@ -119,10 +119,10 @@ def _is_installed(top: str) -> bool:
 
 
 def object_of(word: str) -> Any:
-    """Return the object of a word ``module:OBJECT``; KindError where nobody named its module, which is not imported.
+    """Return the object of a word ``module:OBJECT``; KindError if the user did not name its module.
 
-    A module that the program has loaded already counts as named: nothing of it is run. What a module raises while it
-    is imported is for the caller.
+    A module that was not named is not imported. A module that is already loaded counts as named: no code of it is run.
+    Exceptions raised during the import of a module are passed on to the caller.
     """
     module, _, name = word.partition(":")
     named = {plugin.module: plugin for plugin in named_plugins()}
@@ -142,7 +142,7 @@ def object_of(word: str) -> Any:
 
 
 def _remedy(module: str) -> str:
-    """Return what names a module that a file asks for: its file where that is in the working folder."""
+    """Return the argument that names a module used by a file: its path if it is in the working folder."""
     file = Path(*module.split(".")).with_suffix(_SUFFIX)
     if not file.is_file():
         return module if Path(module.partition(".")[0]).is_dir() else f"PATH/{file.as_posix()}"
@@ -160,7 +160,7 @@ def _imported(module: str, folder: str) -> Any:
 
 @contextmanager
 def _searched_last(folder: str) -> Iterator[None]:
-    """Let modules be found in a folder after all others, so that it hides none of them."""
+    """Context in which modules are also found in a folder, after all others, so that it hides none of them."""
     if not folder or folder in sys.path:
         yield
         return
@@ -174,7 +174,7 @@ def _searched_last(folder: str) -> Iterator[None]:
 
 @contextmanager
 def without_working_folder() -> Iterator[None]:
-    """Let modules be found only where packages are installed: where Python looks for them, but for this folder."""
+    """Context in which modules are only found in installed packages, on the search path without the working folder."""
     before = sys.path[:]
     sys.path[:] = [folder for folder in before if not is_working_folder(folder)]
     try:
@@ -184,7 +184,7 @@ def without_working_folder() -> Iterator[None]:
 
 
 def is_working_folder(folder: str | Path) -> bool:
-    """Tell whether an entry of the search path is the working folder, which may hold files of others."""
+    """Tell whether an entry of the search path is the working folder, which may contain files of other people."""
     try:
         return os.path.samefile(folder or ".", ".")  # noqa: PTH121
     except OSError:  # the search path has folders that are not there

@@ -8,7 +8,7 @@ from typing import TextIO, final
 from ppafo import interrupts
 
 _BETWEEN_LINES = 10.0
-"""Seconds between two lines where the output is not a terminal."""
+"""Time [s] between two lines if the output is not a terminal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Progress:
 
 
 Report = Callable[[Progress], None]
-"""Callback of long work; it may raise KeyboardInterrupt."""
+"""Callback for the progress of a long task; may raise KeyboardInterrupt."""
 
 
 def report_nothing(_progress: Progress) -> None:

@@ -1,4 +1,4 @@
-"""Runs scenarios by name, by file or as they are, a vane alone or a leg that walks."""
+"""Execution of scenarios, given by name, by file or loaded: a vane alone or a leg that walks."""
 
 import contextlib
 import math
@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from ppafo.simulation.tracking.remedies import Remedy
 
 MOST_TRIED = 12
-"""Remedies of a run that does not follow that are tried side by side."""
+"""Largest number of remedies of a run that are tried."""
 _STRIDES_TRIED = 8.0
-"""Strides of a walk with which a remedy is tried."""
+"""Number of strides of a walk for trying a remedy."""
 
 
 @checked
 def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plugins: Plugins = ()) -> Result:
     """Run one scenario: a task, or a walk with the device.
 
-    A scenario that walks is one walk with the device; ``compare_walks`` shows it beside the same without.
+    A walk is simulated with the device only; ``compare_walks`` also simulates the same walk without it.
 
     Arguments:
         scenario: a Scenario, the name of a shipped one, or a .toml file
@@ -43,8 +43,8 @@ def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plug
             ``["laws.py"]`` for ``kind = "laws:KIND"``
 
     Returns:
-        a Result: status, recording and metrics in SI units. A run that diverges has that status, and what was recorded
-        up to the time of failure
+        a Result: status, recording and metrics in SI units; a run that diverged has this status, and its recording ends
+        at the time of failure
 
     Raises:
         ScenarioError: a scenario that cannot be used
@@ -60,7 +60,7 @@ def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plug
 
 
 def gains(scenario: Scenario) -> "Gains | None":
-    """Return the gains in force of a scenario's torque law; None for a law that has none."""
+    """Return the gains in use of a scenario's torque controller; None for a controller without such gains."""
     from ppafo.simulation.gains import gains_of
 
     law = scenario.law
@@ -68,7 +68,7 @@ def gains(scenario: Scenario) -> "Gains | None":
 
 
 def most_reversals(scenario: Scenario) -> float:
-    """Return the ``command_reversals`` of a run above which its loop oscillates; infinite for a law that may turn."""
+    """Return the limit of ``command_reversals`` above which a loop oscillates; inf for a controller that may switch."""
     from ppafo.simulation import tracking as rules
 
     law = scenario.law
@@ -78,11 +78,11 @@ def most_reversals(scenario: Scenario) -> float:
 
 
 def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
-    """Return a verdict with the first of its remedies that lets the run follow, from runs with each, side by side.
+    """Return a verdict with the first remedy that makes the run follow, from a run for each remedy.
 
-    They are given as the overrides that the verdict prints; a walk is tried on its first strides. Where none of the
-    surest cause lets it follow, a remedy of another names that one as the cause. Where none does, it is the one that
-    leaves the least error, if that is less than half.
+    Remedies are applied as the overrides that the verdict prints; a walk is tried on its first strides. If only a
+    remedy of a less certain cause succeeds, that cause becomes the cause of the verdict. If none succeeds, the verdict
+    gets the remedy with the smallest remaining error, provided that this is less than half of the original one.
     """
     if verdict is None or verdict.accepted:
         return verdict
@@ -125,7 +125,7 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
 
 
 def _trial_run(scenario: Scenario) -> RunSettings:
-    """Return the times with which a remedy is tried: those of a task, some strides of a walk."""
+    """Return the times of a run that tries a remedy: unchanged for a task, some strides for a walk."""
     run, duration = scenario.run, _STRIDES_TRIED * scenario.motion.stride_time
     if scenario.follows_reference or not 0.0 < duration < run.duration:
         return run
@@ -137,7 +137,7 @@ def _trial_run(scenario: Scenario) -> RunSettings:
 def simulate_many(
     scenarios: Sequence[Scenario | str | Path], *, threads: Threads | None = None, plugins: Plugins = ()
 ) -> list[Result]:
-    """Run many scenarios side by side, objects, names or files, each exactly as if it ran alone.
+    """Run many scenarios in parallel, given as objects, names or files; each result is exactly as if run alone.
 
     Arguments:
         scenarios: Scenario objects, names of shipped ones, or .toml files

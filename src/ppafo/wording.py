@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 LONGEST_SHOWN = 40
-"""Characters of a name or a cell of a file that a message repeats."""
+"""Maximum number of characters of a name or cell quoted in a message."""
 
 
 def count_of(number: int, noun: str) -> str:
@@ -25,7 +25,7 @@ _OF_DATA_SHEETS: Mapping[str, str] = {
     "kv": "4.48 L/(s bar) for each Kv [m^3/h, bar]",
     "qn": "qn/254 L/(s bar) for qn [L/min] from 6 to 5 bar gauge",
 }
-"""Flow of a valve on data sheets, in C of ISO 6358 at b = 0.3; ``parameters/flow_coefficients.py`` derives it."""
+"""Data-sheet flow coefficients converted to C of ISO 6358 at b = 0.3; see ``parameters/flow_coefficients.py``."""
 _C, _B = "sonic_conductance", "critical_ratio"
 _SPELT_OTHERWISE = {"kvs": "kv", "qnn": "qn", "nominal_flow": "qn", "flow_coefficient": "cv", "flow_factor": "kv"}
 

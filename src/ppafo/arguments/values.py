@@ -113,7 +113,7 @@ def _type_text(annotation: Any) -> str:
 
 
 _NAMES: Mapping[Any, str] = {types.NoneType: "None", ...: "..."}
-"""Names that annotations have for people and not for Python."""
+"""Display names of annotations whose Python name differs."""
 
 
 class Taken(NamedTuple):

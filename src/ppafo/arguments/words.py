@@ -31,16 +31,16 @@ _EXAMPLES = {
     "Hz": ("a frequency", ("Hz",)),
     "rad": ("an angle", ("deg", "rad")),
 }
-"""Description of each quantity, and units in which people write it."""
+"""Description and usual units of each quantity, by SI unit."""
 _SHOWN_AGAIN = ("Pa_a", "N m", "kg/s", "m^3")
-"""Quantities that differ from laboratory to laboratory, which people are shown in the unit that they gave."""
+"""SI units of quantities displayed in the unit in which they were given, since usage differs between laboratories."""
 _MAXIMUM_DIGITS, _ABOVE_ALL, _MAXIMUM_LEVELS = 40, 10**40, 60
-"""A seed of 128 bits has 39; Python refuses thousands of them by an error of its own."""
+"""Limits of whole numbers (a seed of 128 bits has 39 digits) and of nesting; Python limits digits to thousands."""
 
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """Text form of a parameter: how a command shows and parses it, and the values that a Python call may give.
+    """Argument type: display and parsing on the command line, and accepted values of a Python call.
 
     ``metavar`` is the name in the help. ``read`` converts the text to the value. ``take`` converts a Python value, with
     a ValueError for an unsuitable one, and ``what`` describes the accepted values; without ``take`` the annotated type

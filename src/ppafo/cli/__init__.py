@@ -1,1 +1,1 @@
-"""The command line: one thin file per subcommand."""
+"""Command line of ppafo: one thin file per subcommand."""

@@ -1,6 +1,6 @@
-"""The reader of signatures: a verb's parameters become the arguments of its command, its docstring the help.
+"""Command parsers built from function signatures: parameters become arguments, the docstring becomes the help.
 
-The parser is like any of argparse, but a mistake is one error, and it names what was mistyped.
+The parser is an argparse parser that reports each mistake as a single error naming the mistyped word.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ _Verb = Callable[..., Any]
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command: its verb as ``module:function``, and what its signature does not say.
+    """Command: its function as ``module:function``, and properties beyond the signature of the function.
 
-    ``library`` is the ``TomlKind`` of the files that come with the package (``module:NAME``), for ``--list``, and
-    ``listing`` what returns the entries of that list (``module:function``), by default the words of the files;
-    ``listed`` is what these are called. ``default_folder`` takes the values of the parameters by name and returns where
-    the result is written unless ``--out`` says so; without it nothing is. ``first_line`` is the first line of its
-    docstring, where loading the verb takes too long for a list of commands.
+    ``library`` is the ``TomlKind`` of the bundled files (``module:NAME``), for ``--list``. ``listing`` is the function
+    (``module:function``) that returns the entries of that list, by default built from the files, and ``listed`` is the
+    noun for the entries. ``default_folder`` maps the parameters by name to the result folder used without ``--out``;
+    without it nothing is written by default. ``first_line`` repeats the first line of the docstring if loading the
+    function would slow down the list of commands.
     """
 
     verb: str
@@ -63,25 +63,25 @@ class Command:
     """The verb itself, of another package, in place of where it is."""
 
     def function(self) -> _Verb:
-        """Load and return the verb."""
+        """Import and return the function of the command."""
         verb: _Verb = self.found or kind_at(self.verb)
         return verb
 
     @property
     def summary(self) -> str:
-        """The first line of the docstring of the verb, as an entry of a list has it."""
+        """First line of the function's docstring, as an entry of the list of commands."""
         first = (self.first_line or (self.function().__doc__ or "").strip().partition("\n")[0]).rstrip(".")
         return first[:1].lower() + first[1:]
 
     @property
     def lists(self) -> bool:
-        """True where the command has ``--list``."""
+        """True if the command has ``--list``."""
         return bool(self.library or self.listing)
 
 
 @dataclass(frozen=True, slots=True)
 class CommandGroup:
-    """Commands that share their first word, as ``sets audit`` and ``sets show`` do."""
+    """Commands with a common first word, such as ``sets audit`` and ``sets show``."""
 
     summary: str
     actions: Mapping[str, Command]
@@ -100,7 +100,7 @@ _PARAMETER = re.compile(r"(\w+): (.*)")
 
 @dataclass(frozen=True, slots=True)
 class _OptionType:
-    """Option type: how an annotation turns the text of a parameter into its value."""
+    """Option type: conversion of the text of a parameter to its value, from the annotation."""
 
     word: Word
     is_flag: bool = False
@@ -109,7 +109,7 @@ class _OptionType:
 
 
 def reading_of(annotation: Any) -> _OptionType:
-    """Return how the text of a parameter with an annotation is read."""
+    """Return the text conversion for a parameter with an annotation."""
     word, is_repeated = None, False
     while True:
         origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
@@ -130,23 +130,23 @@ def reading_of(annotation: Any) -> _OptionType:
 
 
 def parameters_of(verb: _Verb) -> Iterator[tuple[inspect.Parameter, _OptionType]]:
-    """Return each parameter that words of the line fill, with how its text is read."""
+    """Yield each parameter to be filled from the command line, with its text conversion."""
     for name, parameter in annotated_parameters(verb).items():
         if name not in (PROGRESS, PLUGINS):
             yield parameter, reading_of(parameter.annotation)
 
 
 def option_of(parameter: inspect.Parameter, reading: _OptionType) -> str:
-    """Return the option that fills a parameter, empty where its place in the line does; a flag has no place."""
+    """Return the option of a parameter; empty for a positional parameter. Flags are always options."""
     if reading.word.option or not (reading.is_flag or parameter.kind is inspect.Parameter.KEYWORD_ONLY):
         return reading.word.option
     return f"--{parameter.name.strip('_').replace('_', '-')}"
 
 
 def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing: bool = False) -> None:
-    """Add the parameters of a verb, ``--list`` where there is one, ``--json`` and ``--out`` to the parser.
+    """Add the parameters of a command to the parser, with ``--list`` if available, ``--json`` and ``--out``.
 
-    A line with ``--list``, which ``is_listing`` says, needs none of them.
+    With ``is_listing``, for a command line with ``--list``, none of the parameters is required.
     """
     verb = command.function()
     readings = list(parameters_of(verb))
@@ -194,7 +194,7 @@ def _add_parameter(
     may_be_missing: bool,
     is_listing: bool,
 ) -> None:
-    """Add a parameter of a verb as a word or an option; a word that ``may_be_missing`` is refused by ``run``."""
+    """Add a parameter as positional argument or option; ``run`` refuses a missing one that ``may_be_missing``."""
     word, is_required = reading.word, parameter.default is inspect.Parameter.empty
     default = None if is_required else parameter.default
     if isinstance(default, float):
@@ -239,7 +239,7 @@ def _add_parameter(
 
 
 def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
-    """Call the verb of a command with what the line says, deliver what it returns, and return the exit code."""
+    """Call the function of a command with the parsed arguments, deliver its result, and return the exit code."""
     if command.lists and parsed.list:
         library: TomlKind | None = kind_at(command.library) if command.library else None
         noun = command.listed or (library.noun if library is not None else "")
@@ -283,7 +283,7 @@ _NAMING = ("overrides", "tasks", "metric", "metrics", "also", "such_that", "form
 
 
 def _texts(values: Iterable[Any]) -> Iterator[str]:
-    """Yield the texts among values, and those inside of them."""
+    """Yield the texts among values, and the texts nested inside values."""
     for value in values:
         if isinstance(value, str):
             yield value
@@ -298,42 +298,42 @@ _NEGATIVE_NUMBER = re.compile(r"-\d+|-\d*\.\d+")
 
 
 class UsageError(PpafoError):
-    """The words after ``ppafo`` are not an order that it knows."""
+    """Words after ``ppafo`` that form no known command."""
 
 
 @final
 class CommandParser(argparse.ArgumentParser):
-    """A parser that raises ``UsageError`` where argparse would print its usage and end the process."""
+    """Parser that raises ``UsageError`` instead of printing its usage and ending the process."""
 
     list_commands: Callable[[], str] | None = None
     """Writer of the text after the description in the help; called only there, as it loads every command."""
 
     def format_help(self) -> str:
-        """Return the help, with the commands where there are some."""
+        """Return the help, followed by the list of commands if there is one."""
         if self.list_commands is not None:
             self.description, self.list_commands = f"{self.description}\n\n{self.list_commands()}", None
         return super().format_help()
 
     def error(self, message: str) -> NoReturn:
-        """Raise the message of argparse as an error of one line that names the help to look at."""
+        """Raise argparse's message as a one-line error that names the help to read."""
         bad_value = _BAD_VALUE.fullmatch(message)
         if bad_value is not None:
             raise UsageError(f"{bad_value[1]} {bad_value[2]}")
         raise UsageError(f"{message.removeprefix('argument ')}; see '{self.prog} --help'")
 
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
-        """Print a help text; some versions of Python leave it to the caller that it cannot be written."""
+        """Print a help text; on some Python versions argparse ignores a failed write."""
         with output.printing():
             super()._print_message(message, file)
 
     def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
-        """End the process after ``--help`` or ``--version``, once their text has really been written."""
+        """End the process after ``--help`` or ``--version``, once the text has been flushed."""
         with output.printing():
             print(end="", flush=True)
         super().exit(status, message)
 
     def options(self) -> set[str]:
-        """Return every option of this parser and of the subcommands that it knows."""
+        """Return all options of this parser and of its subcommands."""
         found = {name for action in self._actions for name in action.option_strings}
         for action in self._actions:
             if isinstance(action.choices, Mapping):
@@ -342,7 +342,7 @@ class CommandParser(argparse.ArgumentParser):
 
 
 def check_options(words: Sequence[str], parser: CommandParser) -> None:
-    """Refuse an option that no part of the parser has, before argparse complains of what it finds missing besides."""
+    """Refuse an unknown option before argparse complains about missing arguments."""
     known = sorted(parser.options())
     for word in takewhile(lambda word: word != "--", words):
         name = word.partition("=")[0]

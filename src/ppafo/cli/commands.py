@@ -1,4 +1,4 @@
-"""Every command, under the heading of the help where it stands; to add one: a verb in ``verbs/`` and one line here.
+"""List of all commands under the headings of the help. To add one, write a function in ``verbs/`` and list it here.
 
 Commands of other packages are plain functions, found by entry points of the group ``ppafo.commands``.
 """
@@ -138,7 +138,7 @@ _EVERY: dict[str, dict[str, Command | CommandGroup]] = {
 
 
 def _installed(one: Command | CommandGroup) -> Command | CommandGroup | None:
-    """Return a command, a group without the commands that are not there, or None where nothing is left."""
+    """Return a command, a group without its missing commands, or None if nothing remains."""
     if isinstance(one, Command):
         return one if is_installed(one.verb) else None
     return CommandGroup(
@@ -160,9 +160,9 @@ OTHERS: Kinds[FunctionType] = Kinds("ppafo.commands", "command", FunctionType, {
 
 
 def check_words(words: list[str]) -> None:
-    """Refuse words that begin as no command does, with the nearest name.
+    """Refuse words that match no command, suggesting the nearest name.
 
-    KindError for a command of another package that is there and cannot be used.
+    Raises KindError for a command of another package that is installed and cannot be used.
     """
     given = [word for word in words if not word.startswith("-")]
     # Options alone, such as --version, are for the parser.
@@ -193,7 +193,7 @@ def check_words(words: list[str]) -> None:
 
 
 def list_commands() -> str:
-    """Return the commands with what each does, heading by heading, with the commands of other packages."""
+    """Return the list of commands with summaries, by heading, including commands of other packages."""
     # The summary of a command is in its function, so that the ones of other packages are loaded here.
     OTHERS.load_all()
     groups = {heading: {name: one.summary for name, one in group.items()} for heading, group in HEADINGS.items()}

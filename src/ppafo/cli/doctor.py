@@ -85,7 +85,7 @@ def doctor(
 
 
 def _bits() -> CommandOutput:
-    """Return which runs have their golden bits here."""
+    """Compare every run with its recorded bits, and return the number that agrees and the names of the others."""
     from ppafo.engine.loading import compilers_to_try
     from ppafo.golden_bits import found_bits
 
@@ -99,7 +99,7 @@ def _bits() -> CommandOutput:
 
 
 def models_document(folder: Path | None, why_not: str) -> dict[str, Any]:
-    """Return compilers and kept models of a cache folder; ``why_not`` says why that one is not used, if so."""
+    """Return compilers and cached models of a cache folder; ``why_not`` is the reason for not using it, or empty."""
     from ppafo.engine.cache.tidying import LONGEST_UNUSED, MAXIMUM_BYTES, list_left_out, list_programs, list_texts
     from ppafo.engine.loading import compilers_to_try
 
@@ -122,7 +122,7 @@ def models_document(folder: Path | None, why_not: str) -> dict[str, Any]:
 
 
 def models_text(document: dict[str, Any], one_by_one: bool) -> str:
-    """Return ``models_document`` in words, the programs as their number or ``one_by_one``."""
+    """Return ``models_document`` as text, with the number of programs, or a list of them if ``one_by_one``."""
     lines = [f"compilers: {', '.join(document['compilers'])}", f"folder: {document['folder'] or 'none'}"]
     if document["not_used"]:
         lines.append(f"not used: {document['not_used']}")

@@ -1,4 +1,4 @@
-"""``ppafo new example``: the files and scripts of the how-to pages, ready to run."""
+"""``ppafo new example``: files and scripts of the how-to pages, ready to run."""
 
 import os
 import tomllib
@@ -15,12 +15,12 @@ _FOLDER = resources.files("ppafo") / "examples"
 
 
 def load_examples() -> dict[str, dict[str, Any]]:
-    """Return the examples of the package by name: summary, page that explains it, commands in order."""
+    """Return the bundled examples by name: summary, documentation page, commands in order."""
     return tomllib.loads((_FOLDER / "catalogue.toml").read_text(encoding="utf-8"))
 
 
 def example_files(name: str) -> dict[PurePosixPath, bytes]:
-    """Return the files of an example, by their path in its folder."""
+    """Return the files of an example by path in its folder."""
     found, left = {}, [(_FOLDER / name, PurePosixPath())]
     for folder, path in left:
         for item in folder.iterdir():
@@ -33,13 +33,13 @@ def example_files(name: str) -> dict[PurePosixPath, bytes]:
 
 
 def list_examples() -> CommandOutput:
-    """Return the examples with what each shows."""
+    """Return the list of examples with summaries."""
     said = listing("example", [{"name": name, **one} for name, one in load_examples().items()], ("name", "summary"))
     return replace(said, text=f"{said.text}\n\nppafo new example NAME writes one into a new folder.")
 
 
 def write_example(name: str, folder: Path) -> CommandOutput:
-    """Write the files of an example, all or none, into a folder that is not there yet, and say what to run."""
+    """Write all files of an example into a new folder, or none, and return the next command."""
     from ppafo.storage.files import replace_folder
 
     examples = load_examples()

@@ -1,4 +1,4 @@
-"""``ppafo export figure DIR``: draws what a folder of results holds again, without running anything again."""
+"""``ppafo export figure DIR``: redraws the figures of a result folder without a new run."""
 
 from ppafo.arguments import File, Folder
 from ppafo.cli import output

@@ -1,4 +1,4 @@
-"""``ppafo hil SCENARIO --port PORT``: a scenario's plant in real time against a controller at a wire."""
+"""``ppafo hil SCENARIO --port PORT``: real-time plant of a scenario with an external controller on a link."""
 
 import sys
 from contextlib import closing
@@ -85,7 +85,7 @@ def hil(
 
 @in_units(lambda ran, *_: ran.result.scenario.device.shown)
 def _said(ran: "HardwareRun", port: str, folder: Path) -> CommandOutput:
-    """Return what is said of a run that is written."""
+    """Return the output of a finished run after its files have been written."""
     from ppafo.documents.json_text import plain
     from ppafo.report.display_units import metrics_lines
 

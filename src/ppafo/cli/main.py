@@ -1,4 +1,4 @@
-"""Entry point of the command line: the parser of what was called for, and errors as one line and an exit code."""
+"""Entry point of the command line: builds the parser of the requested command, and prints errors as one line."""
 
 import argparse
 import gc
@@ -42,7 +42,7 @@ complete -o default -F _ppafo ppafo
 
 
 def completion_script(shell: str) -> str:
-    """Return the script that completes commands, options and names of the package in a shell of ``SHELLS``."""
+    """Return the completion script of a shell of ``SHELLS`` for commands, options and bundled names."""
     # What may follow the first words of a line; a group after its actions.
     following: dict[str, list[str]] = {}
     for name, one in COMMANDS.items():
@@ -55,7 +55,7 @@ def completion_script(shell: str) -> str:
 
 
 def _words(command: Command) -> list[str]:
-    """Return the options of a command, and the names that its values may have."""
+    """Return the options of a command, and the names accepted as values."""
     parser = CommandParser(add_help=True)
     add_parameters(parser, command)
     found = sorted(option for option in parser.options() if option.startswith("--"))
@@ -95,7 +95,7 @@ OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
 
 
 def build_parser(words: Sequence[str]) -> CommandParser:
-    """Return the parser; only the module of the verb that the words name is imported, so that help is quick."""
+    """Return the parser; only the module of the requested command is imported, so that help is quick."""
     chosen = [word for word in words if not word.startswith("-")]
     parser = CommandParser(
         prog="ppafo",
@@ -138,7 +138,7 @@ def _sentence(summary: str) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code: 0 good, 1 a check failed, 2 bad input, 130 interrupted."""
+    """Run the command line and return its exit code: 0 success, 1 failed check, 2 bad input, 130 interrupted."""
     # A call from Python: its process goes on, and so must its garbage collection.
     if arguments is not None:
         return _run(list(arguments))

@@ -1,4 +1,4 @@
-"""``ppafo new KIND NAME``: an input file to start from, a template or a copy of a shipped one; or an example."""
+"""``ppafo new KIND NAME``: a new input file from a template or a bundled file, or the files of an example."""
 
 import json
 import os
@@ -25,9 +25,9 @@ _FIRST_TABLE = re.compile(r"^\s*\[", re.MULTILINE)
 
 @dataclass(frozen=True, slots=True)
 class _NewFile:
-    """A kind of file: what it is called, the folder of the package's own, what loads one, the command to try next.
+    """Kind of file: its noun, folder of bundled files, loader, and the command to try next.
 
-    The command has ``FILE`` for the new file and ``NAME`` for its name.
+    In the command, ``FILE`` stands for the new file and ``NAME`` for its name.
     """
 
     noun: str
@@ -137,7 +137,7 @@ def new(
 
 
 def list_kinds() -> list[dict[str, str]]:
-    """Return what each word for KIND stands for, and the files of the package that ``--from`` copies."""
+    """Return each value of KIND with its meaning, and the bundled files that ``--from`` copies."""
     from importlib import resources
 
     rows = []

@@ -1,4 +1,4 @@
-"""``ppafo export opensim``: a walk or a recording in the names and signs of OpenSim."""
+"""``ppafo export opensim``: a walk or a recording with the names and signs of OpenSim."""
 
 import shlex
 from collections.abc import Sequence

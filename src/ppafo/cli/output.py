@@ -1,4 +1,4 @@
-"""Delivery of a result: printed as text or JSON, written into a folder whole or not at all, an exit code."""
+"""Delivery of a result: printing as text or JSON, writing of a folder completely or not at all, and exit code."""
 
 import argparse
 import contextlib
@@ -28,12 +28,12 @@ EXIT_INTERRUPTED = 130
 
 
 def add_json_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--json``, which every command takes."""
+    """Add the option ``--json``, common to all commands."""
     parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
 
 def check_output(out: Path | None, command: str) -> None:
-    """Refuse, before anything runs, a folder of ``--out`` that is not absent, empty or this command's own result."""
+    """Refuse, before anything runs, an ``--out`` folder unless it is new, empty, or a result of this command."""
     if out is not None:
         from ppafo.storage.result_folder import check_owned_folder, marked_folder
 
@@ -42,7 +42,7 @@ def check_output(out: Path | None, command: str) -> None:
 
 
 def check_new_file(path: Path) -> None:
-    """Refuse a file of ``--out`` that is there: nothing in it would say whose it is."""
+    """Refuse an ``--out`` file that exists, since no mark tells if ppafo wrote it."""
     # A link that leads nowhere is there as well: it would be written through.
     if os.path.lexists(path):
         raise DataError(f"--out {path}: already exists; remove it or choose another name")
@@ -50,7 +50,7 @@ def check_new_file(path: Path) -> None:
 
 @contextlib.contextmanager
 def blame_out_option() -> Iterator[None]:
-    """Begin what is said of a folder with the option that named it."""
+    """Prefix errors about a folder with the option that named it."""
     try:
         yield
     except DataError as error:
@@ -59,9 +59,9 @@ def blame_out_option() -> Iterator[None]:
 
 @dataclass(frozen=True, slots=True)
 class CommandOutput:
-    """Output of a command that solves no question: text, JSON document, files.
+    """Output of a command other than a question: text, JSON document and files.
 
-    ``name`` is the stem of the files in the folder of ``--out``, in which ``draw`` makes a figure. ``finish`` draws and
+    ``name`` is the stem of the files in the ``--out`` folder, where ``draw`` makes a figure. ``finish`` draws and
     writes after the text is printed, and returns the last lines of text. ``aside`` is a line for standard error after
     the result.
     """
@@ -76,9 +76,9 @@ class CommandOutput:
 
 
 def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_written: bool = False) -> int:
-    """Write what a verb returned into a folder where requested, print it as text or JSON, and return the exit code.
+    """Write the result of a command into a folder if requested, print it as text or JSON, and return the exit code.
 
-    ``has_written`` is true of a verb which writes itself; what it found names the folder.
+    ``has_written`` is True for a command that writes its files itself and returns the folder.
     """
     if isinstance(found, CommandOutput):
         if out is not None:
@@ -143,7 +143,7 @@ _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202
 
 
 def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
-    """Print the text, or the document as JSON; ends quietly where the reader has gone, as in ``... | head``."""
+    """Print the text, or the document as JSON; ends quietly if the pipe is closed, as by ``... | head``."""
     with printing():
         # A terminal without a character shows its number, where Python would end with an error.
         shown = json_text(document) if as_json else _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text)
@@ -153,7 +153,7 @@ def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
 
 @contextlib.contextmanager
 def printing() -> Iterator[None]:
-    """Print with one line of error where standard output cannot be written, and none where its reader has gone."""
+    """Print within a ``with`` block: one line of error if standard output is unwritable, none for a closed pipe."""
     try:
         yield
     except BrokenPipeError:
@@ -164,14 +164,14 @@ def printing() -> Iterator[None]:
 
 
 def _drop_output() -> None:
-    """Let what is left go nowhere: Python would try to write it once more when it ends, and complain again."""
+    """Discard unwritten output, since Python would write it again at exit and report a second error."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
     os.close(nowhere)
 
 
 def write_files(out: Path, contents: Mapping[str, bytes], command: str) -> None:
-    """Make the folder of ``--out`` hold exactly these files, and the mark by which it is known: all of them or none."""
+    """Replace the content of the ``--out`` folder by these files and the mark of the command: all of them or none."""
     from ppafo.storage.result_folder import write_marked_folder
 
     with blame_out_option():
@@ -185,7 +185,7 @@ def export(
     following: Callable[[Sequence[str]], str],
     **more: Any,
 ) -> CommandOutput:
-    """Write the files of a scenario for another tool, and return which they are and what to do next with them."""
+    """Write the files of an export, and return their names and the next command."""
     # Before the files are made: a folder that is refused must not cost their making.
     check_output(out, command)
     contents = make()
@@ -197,7 +197,7 @@ def export(
 
 
 def export_file(out: Path, make: Callable[[], bytes], following: str) -> CommandOutput:
-    """Write the one file of a scenario for another tool, where none is yet, and return what to do next with it."""
+    """Write the single file of an export, unless it exists, and return the next command."""
     from ppafo.storage.files import check_files_can_be_added, write_file
 
     check_new_file(out)
@@ -208,7 +208,7 @@ def export_file(out: Path, make: Callable[[], bytes], following: str) -> Command
 
 
 def listing(noun: str, rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> CommandOutput:
-    """Return a list of what there is: a row each, of these columns (all without), and all of it as data."""
+    """Return a list with one row per entry and the given columns (default: all), and all entries as data."""
     from ppafo.report.writing import align_columns
 
     shown = [[row[name] for name in columns or row] for row in rows]
@@ -223,7 +223,7 @@ def listing(noun: str, rows: Sequence[Mapping[str, Any]], columns: Sequence[str]
 
 @contextmanager
 def progress_line() -> Iterator[ProgressLine]:
-    """Show progress on the side for the length of a ``with`` block; what is logged begins on a line of its own."""
+    """Display progress on standard error within a ``with`` block; log messages start on a new line."""
     line = ProgressLine(sys.stderr)
     logger = logging.getLogger("ppafo")
 
@@ -241,11 +241,11 @@ def progress_line() -> Iterator[ProgressLine]:
 
 
 def _tell_drawing() -> None:
-    """Say at a terminal why the command has not ended although its numbers are there."""
+    """Print at a terminal that drawing is in progress, as the numbers are already printed."""
     if sys.stderr.isatty():
         tell("drawing figures and page")
 
 
 def tell(text: str) -> None:
-    """Say on the side, where it does not mix with the result, what is being done."""
+    """Print a message on the work in progress to standard error, separate from the result."""
     print(f"ppafo: {text} ...", file=sys.stderr, flush=True)

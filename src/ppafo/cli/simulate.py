@@ -89,7 +89,7 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> CommandOutput:
 
 
 def _finding(result: "Result", check: "Check | None", follows: Sequence[str], tuned: Sequence[str]) -> "Finding[None]":
-    """Return what the page of a result says: the metrics, the figure, and the run again, to be dragged."""
+    """Return the content of a result page: metrics, figure, and the interactive run."""
     from ppafo.report.display_units import metric_text, metric_words
     from ppafo.report.finding import Finding, Section, columns_of
     from ppafo.report.live_parts import live_part
@@ -120,7 +120,7 @@ def _finding(result: "Result", check: "Check | None", follows: Sequence[str], tu
 
 
 def list_descriptions() -> list[dict[str, Any]]:
-    """Return name and description of each scenario and walk of the package."""
+    """Return name and description of each bundled scenario and walk."""
     from ppafo.loading import list_all_scenarios, load_scenario
 
     return [{"name": name, "description": load_scenario(name).description} for name in list_all_scenarios()]
@@ -154,7 +154,7 @@ def _text(
     follows: Sequence[str],
     tuned: Sequence[str],
 ) -> str:
-    """Return how the run ended, how it follows its reference, the numbers, how exact they are, and the gains."""
+    """Return status, tracking error, metrics, their repeatability, and gains of a run as text."""
     from ppafo.report.display_units import metrics_lines
 
     exact = [repr(check)] if check is not None else [] if error is None else [error.sentence]

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 MAXIMUM_LEVELS = 50
-"""No file of ours has a fifth of it; whoever goes through a document by calls of calls must come to an end."""
+"""Maximum nesting depth, five times the depth of any file of the package; it bounds recursion over documents."""
 
 
 def json_text(document: Mapping[str, Any]) -> str:

@@ -28,12 +28,12 @@ def _no_flag(value: Any) -> Any:
 
 
 SchemaVersion = Annotated[Literal[1], BeforeValidator(_no_flag), Field(description="version of this layout")]
-"""Version of the layout of a file: so far there is one of each."""
+"""Version of a file layout; so far each layout has only version 1."""
 Text = Annotated[str, Field(min_length=1)]
 Texts = Annotated[tuple[Text, ...], Field(strict=False)]
 
 SCHEMA = "https://json-schema.org/draft/2020-12/schema"
-"""The version of JSON Schema in which the layouts of files are published."""
+"""JSON Schema version of the published file layouts."""
 
 _CONFIG = ConfigDict(strict=True, extra="forbid", frozen=True, defer_build=True)
 

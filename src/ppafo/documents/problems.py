@@ -13,7 +13,7 @@ from ppafo.wording import nearest_name, one_line, said_missing
 NAME = r"^[a-z0-9][a-z0-9_-]*$"
 """Pattern of the name of a set or scenario."""
 LABEL = r"^[^\x00-\x20\x7f-\xa0](?:[^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\xa0])?$"
-"""Pattern of a name that only people read: a line of text that neither begins nor ends with a space."""
+"""Pattern of a display name: a line of text without leading or trailing space."""
 QUANTITY = r"^\s*[+-]?(\d|\.\d)"
 """Pattern of the start of a number with its unit."""
 _LONGEST_VALUE = 60
@@ -173,7 +173,7 @@ def _any_other(spot: _Spot, detail: ErrorDetails) -> str:
 
 
 _GAPS = {"missing": "", "union_tag_not_found": ".kind"}
-"""Types of problems that are gaps, and what follows the path of what is missing."""
+"""Problem types of missing keys, with the suffix to append to the path."""
 _SENTENCES: dict[str, Callable[[_Spot, ErrorDetails], str]] = {
     "literal_error": _unknown_word,
     "string_pattern_mismatch": _wrong_name,

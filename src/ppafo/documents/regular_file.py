@@ -5,7 +5,7 @@ import stat
 from pathlib import Path
 
 MAXIMUM_BYTES_TYPED = 1_000_000
-"""More than this is no scenario and no parameter set that a person wrote."""
+"""Maximum size in bytes of a file written by hand, such as a scenario or a parameter set."""
 
 
 def read_regular_file(path: Path, maximum: int | None = None) -> bytes:

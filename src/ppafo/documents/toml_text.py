@@ -18,13 +18,13 @@ from ppafo.wording import nearest_name, one_line, reason
 
 _SUFFIX = ".toml"
 _MAXIMUM_NAMED = 3
-"""Files of a folder that a message names."""
+"""Maximum number of files of a folder listed in a message."""
 _LONGEST_LABEL, _KEPT_AT_EACH_END = 200, 60
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
 _DEEP_KEY = re.compile(
     rf"(?:^[ \t]*+\[{{0,2}}+|[{{,])[ \t]*+(?>{_PART}\.[ \t]*+){{{MAXIMUM_LEVELS}}}", re.ASCII | re.MULTILINE
 )
-"""A key with too many dots, for which the parser takes time that grows with their square and more."""
+"""Pattern of a key with too many dots; parsing time would grow at least with the square of their number."""
 _TOO_DEEP = f"has tables nested deeper than {MAXIMUM_LEVELS} levels; a few are enough"
 
 

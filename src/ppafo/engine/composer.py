@@ -130,7 +130,7 @@ class Composer(ast.NodeTransformer):
         return node if value is _INSIDE else self.handed_over(value, node)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        """Replace ``module.name``. ProgramError where it cannot be compiled."""
+        """Replace ``module.name``. ProgramError if the value cannot be compiled."""
         value = self.value_of(node)
         if value is not _INSIDE:
             return self.handed_over(value, node)

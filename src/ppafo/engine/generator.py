@@ -1,4 +1,4 @@
-"""Functions of the step in the text of a module, for one program."""
+"""Text of the functions of a step in the compiled module of one program."""
 
 import ast
 from collections import namedtuple
@@ -21,64 +21,64 @@ from ppafo.wording import nearest_name
 
 @dataclass(slots=True)
 class ComposedFunction:
-    """A function of the step in the module."""
+    """Function of the step as written into the module."""
 
     function: FunctionType
     name: str
     """Name of the function in the module."""
     effects: Effects
-    """Groups of a lane that the function reads, and those that it sets."""
+    """Groups that the function reads and sets."""
     handed: tuple[str, ...]
-    """Names that it is handed before its own arguments: groups of a lane, and the lane's number."""
+    """Parameters before the function's own parameters: groups of a run, and the index of the run."""
     known: Mapping[str, Any]
-    """Arguments whose values are known while it is composed; it has no parameters for them."""
+    """Arguments known at composition, which are not parameters of the composed function."""
     is_phase: bool
-    """True where the loop over steps calls it, false where another function of the step does."""
+    """True if the loop over steps calls the function, false if another function of the step does."""
     ending: str
-    """Suffix of its name, where another program has a different function of that name."""
+    """Suffix of the name, used if another program has a different function of the same name."""
 
     @property
     def own(self) -> str:
-        """Name of what it returns, where that is a row."""
+        """Name of the returned row, if the function returns a row."""
         return f"after_{self.function.__name__}{self.ending if self.name.endswith(self.ending) else ''}"
 
 
 @dataclass(slots=True)
 class StepText:
-    """Gathers the functions of the step of one program in a collector, which has those of the model.
+    """Collection of the step functions of one program in a collector that also has the functions of the model.
 
-    A collector may have the steps of two programs: what both have alike is there once.
+    A collector may contain the steps of two programs; functions that both have in common are stored once.
     """
 
     parts: Program
     collector: SourceCollector
     ending: str = ""
-    """Suffix of the names of functions that another program has in a different form."""
+    """Suffix for the names of functions that another program has in a different form."""
     further: Mapping[str, Any] = field(default_factory=dict)
-    """Classes of groups that are not the program's own."""
+    """Classes of groups that do not belong to the program."""
     states: dict[str, Any] = field(init=False)
     parameters: dict[str, Any] = field(init=False)
     of_step: dict[str, Any] = field(init=False)
     composed: dict[FunctionType, ComposedFunction] = field(default_factory=dict)
     kept: dict[str, Any] = field(default_factory=dict)
     given: set[str] = field(default_factory=set)
-    """Groups of a step that a phase has set so far, in the order of the loop."""
+    """Groups of a step set by any phase so far, in the order of the loop."""
 
     def __post_init__(self) -> None:
-        """Look up the groups of the program, and let its components stand for what they stand for."""
+        """Look up the groups of the program, and link the functions of its components."""
         self.states, self.parameters = self.parts.state_rows(), self.parts.parameter_rows()
         self.of_step = self.parts.step_rows()
         link_program(self.parts, self.collector)
 
     @property
     def rows(self) -> Mapping[str, Any]:
-        """Classes of the groups that have rows."""
+        """Classes of all groups that have rows."""
         return {**self.parameters, **self.states, **self.of_step, **self.further}
 
     def phase(self, function: PlainFunction, known: Mapping[str, Any] | None = None) -> ComposedFunction:
-        """A function that the loop over steps calls: of what it sets it returns what later phases may read.
+        """Add a function called by the loop over steps; the function returns the groups that later phases may read.
 
-        ProgramError where it asks for a group that no phase before it has kept.
+        Raises ProgramError if the function reads a group that no earlier phase has stored.
         """
         assert isinstance(function, FunctionType), "it is no other callable"
         phase = self._composed(function, known or {}, is_phase=True)
@@ -93,25 +93,25 @@ class StepText:
         return phase
 
     def add_called(self, inside: FunctionType, called: FunctionType, known: Mapping[str, Any]) -> str:
-        """Add a function that another calls, with what is known of its arguments; return its name in the module."""
+        """Add a function called by another function, with its known arguments; return its name in the module."""
         if is_step_function(called):
             return self._composed(called, known, is_phase=False).name
         return self.collector.add_inside(inside, called)
 
     def effects_of(self, called: FunctionType) -> Effects:
-        """Groups that a function of the step, which was added, reads and sets."""
+        """Return the groups that an added function of the step reads and sets."""
         return self.composed[called].effects
 
     def handed_to(self, name: str) -> tuple[str, ...]:
-        """Names that a function of the module is handed before its own arguments."""
+        """Return the names passed to a function of the module before its own arguments."""
         return self.collector.needs.get(name, ())
 
     def note_read(self, scope: Mapping[str, Any], name: str) -> None:
-        """Keep that a name was looked up."""
+        """Record that a name was looked up."""
         self.collector.note_read(scope, name, scope[name])
 
     def refuse_unkept(self, name: str, asking: ComposedFunction) -> ProgramError:
-        """The error for a phase that asks for a group that nothing keeps for it: the line, and what to do."""
+        """Return the error for a phase that reads a group which no phase stores: the line, and the remedy."""
         known = [function for function, composed in self.composed.items() if name in composed.effects.reads]
         reads = ((item, node) for item in [asking.function, *known] for node in uses_of_group(item, name, ast.Load))
         # A phase that only sets the group must be handed what it was before.
@@ -132,7 +132,7 @@ class StepText:
         return refusal(function.__code__.co_filename, node, problem)
 
     def refuse_unset(self, name: str, asking: ComposedFunction) -> ProgramError:
-        """The error for a phase that needs a group of the step before any phase has set it on every path."""
+        """Return the error for a phase that reads a group of the step which is not set on every path before."""
         uses = (
             (function, node)
             for use, functions in ((ast.Load, [asking.function]), (ast.Store, self.composed))
@@ -147,9 +147,9 @@ class StepText:
         return refusal(function.__code__.co_filename, node, problem)
 
     def joined(self, functions: Sequence[PlainFunction], parts: Any, takes: Sequence[str]) -> list[ast.stmt]:
-        """Statements of functions one after another, as one function of the parameters ``takes`` has them.
+        """Return the statements of several functions, concatenated into one function with the parameters ``takes``.
 
-        Their groups are names in it. The ``parts`` that they know are not those of the step.
+        Groups of these functions become names. Their ``parts`` are other parts than the parts of the step.
         """
         plain = [function for function in functions if isinstance(function, FunctionType)]
         reduced = [(function, Reduction(self, function, {"parts": parts}).reduced()) for function in plain]
@@ -162,7 +162,7 @@ class StepText:
         return found
 
     def composer(self, function: FunctionType, names: RewrittenNames) -> Composer:
-        """Composer of a reduced function of the step: replaces names that are defined outside it."""
+        """Return the composer of a reduced function of the step, which replaces names defined outside the function."""
         return Composer(
             function,
             lambda called: (
@@ -175,9 +175,9 @@ class StepText:
         )
 
     def _composed(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> ComposedFunction:
-        """A function of the step in the module, composed once: reduced, it returns what it sets.
+        """Compose a function of the step once; the reduced function returns the groups that it sets.
 
-        ProgramError where it is called in two ways, or gives a value and sets groups of its lane.
+        Raises ProgramError if the function is called in two forms, or both returns a value and sets groups.
         """
         if function in self.composed:
             composed = self.composed[function]
@@ -213,7 +213,7 @@ class StepText:
         return self.composed[function]
 
     def _written(self, function: FunctionType, tree: ast.FunctionDef, handed: tuple[str, ...], groups: set[str]) -> str:
-        """Put the text of a reduced function into the module; return its name there."""
+        """Write the text of a reduced function into the module; return its name in the module."""
         file = function.__code__.co_filename
         ast.fix_missing_locations(tree)
         check_grammar(tree, file)
@@ -237,7 +237,7 @@ class StepText:
         return tree.name
 
     def _result_row(self, function: FunctionType, names: tuple[str, ...]) -> Any:
-        """The NamedTuple class of what a function of the step sets."""
+        """Return the NamedTuple class of the groups set by a function of the step."""
         make: Any = namedtuple
         own = f"{function.__name__}_result"
         row = make(own, names)

@@ -1,6 +1,6 @@
-"""Groups of numbers of a program: each is named once, with its class and its role, by the component that it belongs to.
+"""Groups of numbers of a program: each has a unique name, a class and a role, defined by the component that owns it.
 
-The rows of parameters, of states and of what a step hands on are these groups in their order.
+The rows of parameters, states and intermediate values of a step are the groups in their order.
 """
 
 from collections.abc import Callable, Mapping
@@ -15,7 +15,7 @@ from ppafo.model.declaration import PlainFunction
 
 
 class Role(Enum):
-    """Role of a group in a run: constant input, state kept from step to step, or intermediate of one step."""
+    """Role of a group in a run: constant input, state between steps, or intermediate value of one step."""
 
     PARAMETER = "parameters"
     STATE = "states"
@@ -23,9 +23,9 @@ class Role(Enum):
 
 
 class Group(NamedTuple):
-    """A group of numbers: the class of its row, a NamedTuple or float, and its role.
+    """Group of numbers: class of its row (NamedTuple or float), and its role.
 
-    ``of_plant(plant)`` gives its row where that follows the plant; None where the run has it.
+    ``of_plant(plant)`` computes the row if it depends only on the plant; None if the run provides the row.
     """
 
     row: Any
@@ -38,22 +38,22 @@ Groups = Mapping[str, Group]
 
 
 def given(row: Any, of_plant: PlainFunction | None = None) -> Group:
-    """A group that does not change in a run: the one that the run has, or ``of_plant(plant)``, in an export too."""
+    """Declare a group that is constant during a run, set by the run or, also in exports, by ``of_plant(plant)``."""
     return Group(row, Role.PARAMETER, of_plant)
 
 
 def kept(row: Any) -> Group:
-    """A group that a run keeps from step to step."""
+    """Declare a group of states that a run keeps from step to step."""
     return Group(row, Role.STATE)
 
 
 def handed(row: Any) -> Group:
-    """A group that a phase of a step hands to later ones."""
+    """Declare a group that one phase of a step passes to later phases."""
     return Group(row, Role.STEP)
 
 
 def merged(*parts: Groups) -> dict[str, Group]:
-    """Groups of several components as one, in order. ProgramError where two have one name: a lane would mix them."""
+    """Return the groups of several components in order. ProgramError if two groups have the same name."""
     found: dict[str, Group] = {}
     for groups in parts:
         for name, group in groups.items():
@@ -64,7 +64,7 @@ def merged(*parts: Groups) -> dict[str, Group]:
 
 
 def rows_of(groups: Groups, role: Role) -> dict[str, Any]:
-    """Classes of the groups of one role, in order."""
+    """Return the classes of the groups of one role, in order."""
     return {name: group.row for name, group in groups.items() if group.role is role}
 
 
@@ -75,10 +75,10 @@ def filled(
     role: Role,
     declared_at: Callable[[str], str] = str,
 ) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
-    """Rows (numbers, runs) of groups by name, whose numbers are floats or arrays (runs,).
+    """Return the rows (numbers, runs) of groups by name, whose numbers are floats or arrays (runs,).
 
-    ProgramError for a group without value, with the place where it is ``declared_at``, for a value without group, and
-    for one of another class.
+    Raises ProgramError for a group without value, with the place where it is declared (``declared_at``), for a value
+    without group, and for a value of the wrong class.
     """
     for name, value in values.items():
         if name not in rows and leaves(value):
@@ -106,9 +106,9 @@ def filled(
 
 
 def check_rows(count: int, rows: Mapping[str, Any], role: Role) -> None:
-    """Refuse a table with another number of rows than its groups have: compiled code would read past it.
+    """Raise ProgramError, naming the last group, for a table with a wrong number of rows.
 
-    ProgramError names the last group.
+    Compiled code would otherwise read beyond the table.
     """
     sizes = {name: len(leaf_paths(row, name)) for name, row in rows.items()}
     if count != sum(sizes.values()):

@@ -1,10 +1,10 @@
-"""Functions of the model run by Python itself, as a program has them: the same code, and a debugger stops in it.
+"""Execution of model functions by Python as in a program: the same code, in which debuggers can stop.
 
-Where a program has something in the place of functions of the model, its actuator's and the laws of its effects, these
-stand in copies of the functions that call them: the same code with other names around it, so that breakpoints in their
-files hold. Compiled code goes on where Python raises, with what a division by zero gives: copies may do the same.
+A program may replace functions of the model by functions of its actuator and by laws of its effects. Copies of the
+calling functions then use the replacements: the same code with other global names, so that breakpoints in the source
+files work. Where Python raises an exception, compiled code continues with the result of IEEE 754; copies may do so too.
 
-Steps (``interpreter.py``), recordings, solvers and linear models run their functions so.
+Steps (``interpreter.py``), recordings, solvers and linear models run their functions in this way.
 """
 
 import ast
@@ -34,20 +34,20 @@ from ppafo.model.binding import is_made_of
 from ppafo.model.declaration import PlainFunction
 
 OWN = "ppafo."
-"""Begin of the names of modules whose functions are called by the names of the modules, too."""
+"""Prefix of module names whose functions may also be called through the module name."""
 
 
 class EffectRows(Protocol):
-    """Parameters and states of effects by name, as they are at a call."""
+    """Present parameters and states of effects, by name."""
 
     def __getitem__(self, name: str, /) -> Any:
-        """The NamedTuple of a name."""
+        """Return the NamedTuple of a name."""
 
 
 class PythonFunctions:
-    """Functions in which some names stand for what a program has in their place; the functions themselves without any.
+    """Copies of functions with names replaced as in a program; without replacements, the original functions.
 
-    ``operations`` are other ones than Python's: those that go on, or those of columns.
+    ``operations`` replaces Python's operations, by operations that never raise or by operations on columns.
     """
 
     def __init__(
@@ -62,13 +62,13 @@ class PythonFunctions:
         self.made_from = MadeFrom()
 
     def parts(self, program: Program) -> Any:
-        """All that a program says of itself, worked out once."""
+        """All public attributes of a program, computed once, with functions replaced."""
         names = [name for name in dir(program) if not name.startswith("_")]
         values = {name: getattr(program, name) for name in names}
         return SimpleNamespace(**{name: self.part(value) for name, value in values.items()})
 
     def part(self, value: Any) -> Any:
-        """A part of a program or an argument, with the functions that stand for its own."""
+        """Component of a program or an argument, with its functions replaced."""
         if isinstance(value, FunctionType | ModuleType):
             return self.of(value)
         if isinstance(value, Mapping):
@@ -99,7 +99,7 @@ class PythonFunctions:
         return self._made[module]
 
     def _function(self, function: FunctionType) -> Any:
-        """A copy of a function whose names stand for what the program has; the function itself where none differs."""
+        """Copy of a function with replaced global names; the function itself if no name differs."""
         # A valve or law of somebody's own module calls the model too; the standard library does not.
         if function.__module__.partition(".")[0] in sys.stdlib_module_names:
             return function
@@ -122,7 +122,7 @@ class PythonFunctions:
         return self._made[function]
 
     def _law(self, function: FunctionType, rows: tuple[str, ...]) -> PlainFunction:
-        """Return the law of an effect, called as its port is, with the present rows of the effect."""
+        """Return the law of an effect with the signature of its port, bound to the present rows of the effect."""
         names = function.__code__.co_varnames[: function.__code__.co_argcount]
         own = [name for name in names if name not in rows]
 
@@ -135,13 +135,13 @@ class PythonFunctions:
 
 @lru_cache(maxsize=4096)
 def _names_of(code: CodeType) -> frozenset[str]:
-    """Names that a code reads, with those of the code in it."""
+    """Names read by a code object and by the code objects nested in it."""
     names = frozenset(code.co_names)
     return names.union(*(_names_of(constant) for constant in code.co_consts if isinstance(constant, CodeType)))
 
 
 def functions_of(program: Program, rows: EffectRows, operations: "Operations | None" = None) -> PythonFunctions:
-    """Return the functions of the model as a program has them, with rows of its effects; ProgramError as linking."""
+    """Return the model functions as replaced in a program, with rows of its effects; ProgramError as for linking."""
     links, effects = _links_of(program)
     return PythonFunctions(links, effects, rows, operations)
 
@@ -157,9 +157,9 @@ def _links_of(program: Program) -> tuple[dict[Any, Any], dict[Any, tuple[str, ..
 def in_program(
     function: PlainFunction, program: Program, effects: Sequence[Any], operations: "Operations | None" = None
 ) -> PlainFunction:
-    """Return a function of the model as a program has it, with parameters of its effects.
+    """Return a model function as replaced in a program, with the parameters of its effects.
 
-    Before its own arguments it takes the states of effects by name, an empty mapping where there are none.
+    The first argument of the returned function are the effect states by name, an empty mapping if there are none.
     """
     rows = {effect.name: row for effect, row in zip(program.effects, effects, strict=True)}
     own = functions_of(program, rows, operations).of(function)
@@ -172,7 +172,7 @@ def in_program(
 
 
 class Operations(NamedTuple):
-    """Operations in the place of Python's: what writes a function for them, and their names."""
+    """Replacements of Python's operations: the syntax-tree transformer that inserts them, and their names."""
 
     writer: Callable[[FunctionType], ast.NodeTransformer]
     names: Mapping[str, Any]
@@ -180,7 +180,7 @@ class Operations(NamedTuple):
 
 @lru_cache(maxsize=1024)
 def rewritten(function: FunctionType, writer: Callable[[FunctionType], ast.NodeTransformer]) -> CodeType:
-    """The code of a function with other operations, on the lines of its file; ProgramError where it has none."""
+    """Return the code of a function with other operations, on the original source lines; ProgramError if impossible."""
     code = function.__code__
     text = textwrap.dedent(inspect.getsource(function))
     tree = writer(function).visit(parse_module("\n" * (code.co_firstlineno - 1) + text))
@@ -196,15 +196,15 @@ def rewritten(function: FunctionType, writer: Callable[[FunctionType], ast.NodeT
 
 
 def over_samples(function: PlainFunction, *arguments: Any) -> Any:
-    """Value of a function of the model, in its own units, of rows and numbers any of which may be columns (samples,).
+    """Return the value of a model function for rows and numbers, any of which may be columns (samples,).
 
-    What is the same for all samples may stay one number.
+    Results that are the same for all samples may remain a single number.
     """
     return _over_samples(partial(_with_operations, function), arguments)
 
 
 def _with_operations(function: PlainFunction, operations: "Operations | None") -> PlainFunction:
-    """A function of the model with other operations, made anew where a name in it stands for something else by now."""
+    """Return a model function with other operations, rebuilt if a global name of the function has changed since."""
     if operations is not COLUMNS:
         own: PlainFunction = PythonFunctions({}, {}, {}, operations).of(function)
         return own
@@ -224,7 +224,7 @@ def _for_columns(function: PlainFunction) -> tuple[PythonFunctions, PlainFunctio
 def over_samples_in(
     program: Program, effects: Sequence[Any], function: PlainFunction, states: Mapping[str, Any], *arguments: Any
 ) -> Any:
-    """Value of a function of the model as a program has it, with parameters and states of effects, over samples."""
+    """Return the value of a model function as replaced in a program, for columns (samples,) of arguments and states."""
     if _copied(program, function) is function:
         # No law of an effect acts in it.
         return over_samples(function, *arguments)
@@ -233,12 +233,12 @@ def over_samples_in(
 
 @lru_cache(maxsize=256)
 def _copied(program: Program, function: PlainFunction) -> Any:
-    """A function as a program has it."""
+    """Return a function as replaced in a program."""
     return functions_of(program, {}).of(function)
 
 
 def _over_samples(make: Callable[[Operations | None], PlainFunction], arguments: Sequence[Any]) -> Any:
-    """Value of a function that is made for operations."""
+    """Return the value over samples of the function that ``make`` builds for given operations."""
     sizes = {column.size for argument in arguments for column in _columns_of(argument)}
     if not sizes:
         return make(None)(*arguments)
@@ -254,7 +254,7 @@ def _over_samples(make: Callable[[Operations | None], PlainFunction], arguments:
 
 
 def _columns_of(argument: Any) -> list[Any]:
-    """All columns in an argument."""
+    """Return all columns in an argument."""
     if isinstance(argument, Mapping):
         return [column for row in argument.values() for column in _columns_of(row)]
     values = leaves(argument) if isinstance(argument, tuple) else [argument]
@@ -262,7 +262,7 @@ def _columns_of(argument: Any) -> list[Any]:
 
 
 def _samples_of(argument: Any, size: int) -> Iterable[Any]:
-    """An argument at each of so many samples."""
+    """Return an argument at each of ``size`` samples."""
     if not _columns_of(argument):
         return repeat(argument, size)
     if isinstance(argument, Mapping):
@@ -276,7 +276,7 @@ def _samples_of(argument: Any, size: int) -> Iterable[Any]:
 
 
 def _gathered(results: list[Any]) -> Any:
-    """Columns of the numbers of results of one shape."""
+    """Return columns of the numbers of results of one shape."""
     first = results[0]
     if not isinstance(first, tuple):
         return np.array(results, dtype=np.float64)
@@ -300,7 +300,7 @@ def _where(test: Any, yes: Any, no: Any) -> Any:
 
 
 def _extreme(is_beyond: Callable[[Any, Any], Any], first: Any, *others: Any) -> Any:
-    """The largest or smallest as Python has it: of equal numbers the first, also of 0 and -0."""
+    """Return the maximum or minimum as Python does: of equal numbers the first, also for 0 and -0."""
     for other in others:
         # A strict comparison, as Python's max has it; np.maximum would take 0.0 over -0.0, and spread NaN.
         first = _where(is_beyond(other, first), other, first)
@@ -332,19 +332,19 @@ def _later(value: ast.expr) -> ast.Lambda:
 
 
 class _ForColumns(ast.NodeTransformer):
-    """Writes the operations of a function for columns. ProgramError for what has no such form."""
+    """Rewriter of the operations of a function for columns. ProgramError for code that cannot be vectorised."""
 
     def __init__(self, function: FunctionType) -> None:
         self.known = function.__globals__.keys() - set(function.__code__.co_varnames)
 
     def visit(self, node: ast.AST) -> Any:
-        """Write a node."""
+        """Rewrite a node."""
         if isinstance(node, ast.If | ast.While | ast.Starred | ast.AugAssign) or not self.is_elementwise(node):
             raise ProgramError(f"'{ast.unparse(node)}' cannot be evaluated for columns")
         return super().visit(node)
 
     def is_elementwise(self, node: ast.AST) -> bool:
-        """True where columns can stand for numbers."""
+        """Return whether an expression also works elementwise on columns."""
         if isinstance(node, ast.BinOp):
             return isinstance(node.op, ast.Add | ast.Sub | ast.Mult | ast.Div)
         if isinstance(node, ast.Compare):
@@ -392,18 +392,18 @@ class _ForColumns(ast.NodeTransformer):
 
 
 COLUMNS = Operations(_ForColumns, _OF_COLUMNS)
-"""Operations of whole columns."""
+"""Operations on whole columns."""
 
 
 # Operations that go on where Python would raise, with what compiled code gives there: a run that diverges divides by
 # zero or takes the root of a negative number; compiled, it ends as one that failed.
 
 LOWEST_INTEGER = -(2**63)
-"""The lowest integer of 64 bits, which processors give for a number that is none of these integers."""
+"""Lowest 64-bit integer, which processors return for numbers that 64-bit integers cannot represent."""
 
 
 def quotient(dividend: float, divisor: float) -> float:
-    """Return a quotient as IEEE 754 has it: by zero it is infinite, and NaN for zero by zero."""
+    """Return a quotient as in IEEE 754: infinite for division by zero, and NaN for zero divided by zero."""
     if divisor != 0.0:
         return dividend / divisor
     if dividend == 0.0 or math.isnan(dividend):
@@ -412,12 +412,12 @@ def quotient(dividend: float, divisor: float) -> float:
 
 
 def whole_part(value: float) -> int:
-    """Return a number without its fraction; ``LOWEST_INTEGER`` for NaN and for what 64 bits do not hold."""
+    """Return a number without its fraction; ``LOWEST_INTEGER`` for NaN and for numbers beyond 64 bits."""
     return int(value) if LOWEST_INTEGER <= value < -LOWEST_INTEGER else LOWEST_INTEGER
 
 
 def _without_errors(function: Callable[..., float]) -> Callable[..., float]:
-    """Return a function of ``math`` that is infinite where it overflows, and NaN where it has no value."""
+    """Return a function of ``math`` that returns infinity on overflow and NaN outside its domain."""
 
     def called(*arguments: float) -> float:
         try:
@@ -437,12 +437,12 @@ MATH = SimpleNamespace(
         if not name.startswith("_")
     }
 )
-"""The module ``math``: infinite where a function overflows or has a pole, NaN where it has no value."""
+"""Variant of ``math`` whose functions return infinity on overflow or at a pole, and NaN outside their domain."""
 
 
 class _GoingOn(ast.NodeTransformer):
     def __init__(self, _function: FunctionType) -> None:
-        """Any function can go on."""
+        """Accept any function, because every function can be rewritten in this way."""
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         self.generic_visit(node)
@@ -452,4 +452,4 @@ class _GoingOn(ast.NodeTransformer):
 
 
 GOING_ON = Operations(_GoingOn, {"_quotient": quotient, "int": whole_part})
-"""Operations that go on where Python would raise."""
+"""Operations that continue where Python would raise an exception."""

@@ -1,4 +1,4 @@
-"""The step run by Python itself: the same functions (``in_python.py``) over lanes, with the bits of compiled code."""
+"""Execution of steps by Python: the functions of ``in_python.py`` over many runs, bit-identical to compiled code."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 
 Table = tuple[Mapping[str, Any], Floats]
-"""Groups by name, and the array (numbers, lanes) of their numbers."""
+"""Groups by name, and the array (numbers, runs) of their numbers."""
 
 
 class PythonProgram:
@@ -26,7 +26,7 @@ class PythonProgram:
         self._program = program
 
     def advance(self, states: Floats, parameters: Floats, *arrays_and_clock: Any) -> None:
-        """Take all runs some steps further; arrays of histories and samples come before the numbers of the clock."""
+        """Advance all runs by some steps; arrays of histories and samples precede the numbers of the clock."""
         program = self._program
         tables = (program.state_rows(), states), (program.parameter_rows(), parameters)
         run_lanes(program, loop.advance, tables, arrays_and_clock[:4], arrays_and_clock[4:])
@@ -39,10 +39,10 @@ def run_lanes(
     histories: Sequence[Floats],
     arguments: Sequence[Any],
 ) -> None:
-    """Run a function of lanes, ``function(parts, lanes, *arguments)``, on tables that it changes.
+    """Run a function of the loop, ``function(parts, lanes, *arguments)``, on tables that the function modifies.
 
-    The first table is the state of the runs; ``histories`` are signals, commands, samples and traces, as far as there
-    are any.
+    The first table is the state of the runs; ``histories`` are signals, commands, samples and traces, as far as
+    present.
     """
 
     def run(operations: Operations | None) -> None:
@@ -70,11 +70,11 @@ def _numbers_of(lane: Lane, groups: Iterable[str]) -> list[float]:
 
 
 NONE = np.empty((0, 0, 0))
-"""A history or record without numbers."""
+"""Empty history or record."""
 
 
 class PythonLanes:
-    """The runs of a block; while one is gone through, laws of effects find its rows in ``now``."""
+    """Runs of a block; during iteration, laws of effects find the rows of the present run in ``now``."""
 
     def __init__(
         self,
@@ -104,36 +104,36 @@ class PythonLanes:
             lane.signal_history = signal_history[:, :, number]
 
     def __iter__(self) -> Iterator[Lane]:
-        """Each run."""
+        """Iterate over the runs."""
         for lane in self.lanes:
             self.now = lane
             yield lane
 
     def __getitem__(self, name: str) -> Any:
-        """A group of the run that is gone through."""
+        """Return a group of the present run."""
         return self.now[name]
 
     def record(self, index: int) -> None:
-        """Keep the state of all runs as a sample."""
+        """Store the state of all runs as a recorded sample."""
         for number, lane in enumerate(self.lanes):
             self.records[index, :, number] = _numbers_of(lane, self.groups)
 
     def set_aside(self) -> None:
-        """Keep what lanes that wait get again: their state, and what the step was handed."""
+        """Save the data of waiting runs: their state, and the values passed from the previous step."""
         for lane in self.lanes:
             names = (*self.groups, "remaining", "held", "carried")
             lane["kept"] = {name: lane[name] for name in names if hasattr(lane, name)}
 
     def put_back(self) -> None:
-        """Give it to those that had nothing left of their step."""
+        """Restore the saved data of runs whose step was already complete."""
         for lane in self.lanes:
             if not lane["kept"]["remaining"] > 0.0:
                 vars(lane).update(lane["kept"] | {"remaining": lane.remaining})
 
     def traces(self, index: int, trace_every: int) -> bool:
-        """Tell whether a sample is traced."""
+        """Return whether a sample is traced."""
         return index % trace_every == 0
 
     def slot(self, index: int, trace_every: int) -> int:
-        """Index of a sample in the trace, a ring that keeps the last samples."""
+        """Return the index of a sample in the trace, a ring buffer of the last samples."""
         return index // trace_every % len(self.trace)

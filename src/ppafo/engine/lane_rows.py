@@ -1,4 +1,4 @@
-"""A loop over the runs of a program: what it is handed, and how many go through their steps side by side."""
+"""Signature of the compiled loop over runs, and the number of runs processed side by side."""
 
 from functools import lru_cache
 
@@ -10,7 +10,7 @@ COMPILED = ENTRY.format(
     "float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1], "
     "float64[:, :, ::1], int64, int64, int64, int64, float64, int64, int64, int64, int64, int64"
 )
-"""The mark of a loop, with the types of its ``ARGUMENTS``."""
+"""Decorator of a loop, with the types of its ``ARGUMENTS``."""
 ARGUMENTS = (
     "states, parameters, signal_history, command_history, record, trace, "
     "first_step, step_count, steps_in_all, steps_per_sample, interval, last_record, next_record, trace_every, "
@@ -18,22 +18,22 @@ ARGUMENTS = (
 )
 
 LANES = 32
-"""Most runs of a block."""
+"""Largest number of runs in a block."""
 
 VECTOR = 8
-"""Lanes that the widest processors take at once, and the fewest of a block: its columns are a whole number of these."""
+"""Vector width of the widest processors, and smallest block; the number of columns of a block is a multiple of it."""
 
 FIRST_CACHE = 48 * 1024
-"""Bytes of the first-level data cache of a core; a block that does not fit takes fewer runs."""
+"""Size [byte] of the first-level data cache of a core; a block that does not fit takes fewer runs."""
 
 
 HANDED = ("held.", "carried.")
-"""Groups of rows that a step is handed by the one before."""
+"""Groups of rows passed from one step to the next."""
 
 
 @lru_cache(maxsize=64)
 def lanes_of(program: Program) -> int:
-    """Number of runs that a block of a program takes side by side: all lanes, or half where rows would spill."""
+    """Return the number of runs in a block of a program: ``LANES``, or fewer if the rows would not fit the cache."""
     groups = (program.state_rows(), program.parameter_rows(), program.step_rows())
     # Fewer lanes rather than a block that spills: a miss of the first cache costs more than half-used loops.
     rows = sum(len(leaf_paths(row, name)) for group in groups for name, row in group.items())

@@ -1,7 +1,7 @@
-"""Runs many devices at once: blocks of up to 32 lanes, spread over threads, the same numbers in any order.
+"""Execution of many runs at once: blocks of up to 32 runs, distributed over threads, with reproducible results.
 
-A run's result does not depend on its block, its place in it or the number of threads, because every lane goes
-through the same instructions and no lane sees another.
+The result of a run does not depend on its block, its position in the block or the number of threads, because all runs
+execute the same instructions and are independent.
 """
 
 import copy
@@ -37,27 +37,27 @@ logger = logging.getLogger("ppafo")
 Floats = NDArray[np.float64]
 
 PYTHON_STEP = 2.0e-4
-"""Time [s] that Python takes for a step of one run."""
+"""Time [s] that Python needs for one step of one run."""
 LONGEST_UNSAID = 120.0
-"""Time [s] that a run by Python may take without a word of warning."""
+"""Expected duration [s] of a run by Python above which a warning is logged."""
 
 STEPS_PER_CALL = 10_000
-"""Steps in one call of compiled code: some hundredths of a second, seconds where each step takes hundreds of parts."""
+"""Steps per call of compiled code: some hundredths of a second, or seconds if each step takes hundreds of parts."""
 
 QUICK_STEPS = 200_000
-"""Steps of all runs up to which a program that is compiled quickly ends sooner: a second of either."""
+"""Total number of steps of all runs up to which quick compilation is faster overall: a second of either."""
 
 SIGNAL_ROWS = 5
-"""Readings that may come late: angle and pressures, and in a walk two forces."""
+"""Number of readings that may be delayed: angle and pressures, and in a walk two forces."""
 
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """Numbers that all runs of a batch share; delays are in steps, ``record_every`` 0 records nothing.
+    """Step counts shared by all runs of a batch; delays in steps, ``record_every`` 0 records nothing.
 
-    ``record_every`` is the number of steps between two recorded samples, whole unless the program has samples inside
-    its steps. Programs that are metered record nothing: ``measure_every`` is the same for their meters, and every
-    ``trace_every`` samples the traced channels are kept, 0 for never.
+    ``record_every`` is the number of steps between recorded samples, an integer unless the program has samples inside
+    its steps. Programs with meters record nothing: ``measure_every`` is the number of steps between samples of the
+    meters, and the traced channels are stored every ``trace_every`` samples, 0 for never.
     """
 
     step_count: int
@@ -70,19 +70,19 @@ class Clock:
 
     @property
     def samples(self) -> int:
-        """Number of recorded or measured samples, the first and the last among them."""
+        """Number of recorded or metered samples, ends included."""
         interval = self.record_every or self.measure_every
         return samples_in(self.step_count, interval) if interval else 0
 
 
 def samples_in(steps: int, interval: float) -> int:
-    """Number of samples, one every ``interval`` steps [-] from step 0 to a number of steps, both included."""
+    """Number of samples at intervals of ``interval`` steps [-] from step 0 to ``steps``, ends included."""
     return math.floor((steps + SAME_MOMENT) / interval) + 1
 
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Runs of one program and clock: parameters (rows, runs) and initial states (rows, runs)."""
+    """Runs of one program with one clock: parameters (rows, runs) and initial states (rows, runs)."""
 
     program: Program
     clock: Clock
@@ -92,9 +92,9 @@ class Batch:
 
 @dataclass(frozen=True, slots=True)
 class BatchResult:
-    """Final states (rows, runs) and records (records, rows, runs), the first at time 0 and the last at the end.
+    """Final states (rows, runs) and records (records, rows, runs), from time 0 to the end.
 
-    The records of a metered program are its traces, with a row for each traced channel.
+    The records of a program with meters are its traces, with a row for each traced channel.
     """
 
     states: Floats
@@ -102,24 +102,24 @@ class BatchResult:
 
 
 class RunnableProgram(Protocol):
-    """A program that can be run: compiled, or by Python itself."""
+    """Program that can be run: compiled, or by Python itself."""
 
     @property
     def advance(self) -> Callable[..., None]:
-        """Take a block of lanes some steps further."""
+        """Function that advances a block of runs by some steps."""
 
 
 def effort_for(batch: Batch) -> Effort:
-    """Optimisation with which a batch by itself ends soonest where its program has yet to be compiled."""
+    """Return the optimisation level with the shortest total time for a batch whose program is not yet compiled."""
     is_short = batch.states.shape[1] * batch.clock.step_count <= QUICK_STEPS
     return Effort.QUICK if is_short else Effort.FULL
 
 
 def load_program(program: Program, effort: Effort = Effort.FULL) -> RunnableProgram:
-    """The compiled module of a program, from the disk cache where it is there; or the program as Python runs it.
+    """Return the compiled module of a program, from the cache if possible; or the program as run by Python.
 
-    A program is written anew where a number or function that it was made from stands for something else by now. It is
-    written where Python runs it, too: what cannot be compiled is refused on every computer, in the same words.
+    The text is regenerated if a number or function used in it has changed. The text is also generated if Python runs
+    the program, so that code which cannot be compiled is refused with the same message on every computer.
     """
     source = _current_source(program)
     module: Any = None if runs_by_python() else compiled(source, effort)
@@ -131,7 +131,7 @@ def load_program(program: Program, effort: Effort = Effort.FULL) -> RunnableProg
 
 
 def load_programs(programs: Iterable[tuple[Program, Effort]]) -> None:
-    """Load compiled programs with their optimisation; those to be compiled are announced and compiled together."""
+    """Load programs with their optimisation levels; missing programs are announced and compiled together."""
     different = dict.fromkeys(programs)
     compilers = compilers_to_try() if len(different) > 1 else ()
     if compilers:
@@ -141,7 +141,7 @@ def load_programs(programs: Iterable[tuple[Program, Effort]]) -> None:
 
 
 def _current_source(program: Program) -> str:
-    """The source of a program, made anew where it is out of date."""
+    """Return the source of a program, regenerated if out of date."""
     made_from, source = _known_source(program)
     # It may rest on a number or function that a session has changed since.
     if made_from.is_current():
@@ -153,7 +153,7 @@ def _current_source(program: Program) -> str:
 
 @lru_cache(maxsize=64)
 def _known_source(program: Program) -> tuple[MadeFrom, str]:
-    """Inputs of a program and its source text, read from the cache or else written."""
+    """Return the inputs of a program and its source text, from the cache or newly written."""
     key = package_key(program)
     if key is None:
         return write_source(program)
@@ -166,7 +166,7 @@ def _known_source(program: Program) -> tuple[MadeFrom, str]:
 
 @lru_cache(maxsize=64)
 def write_source(program: Program, lanes: int = 0) -> tuple[MadeFrom, str]:
-    """Inputs of a program and its source text for ``lanes`` runs side by side; 0 for the largest number that fits."""
+    """Return inputs and source text of a program for ``lanes`` runs side by side; 0 for as many runs as fit."""
     from ppafo.engine.loop_text import write_lanes  # a kept program needs no writer
 
     collector = SourceCollector(INLINE)
@@ -191,10 +191,10 @@ def run_blocks(
     threads: int | None = None,
     effort: Effort = Effort.FULL,
 ) -> None:
-    """Run a batch block by block on ``threads`` threads (all cores by default), and give each result away at once.
+    """Run a batch block by block on ``threads`` threads (all cores by default), and pass on each result immediately.
 
-    ``take(runs, result)`` is called from several threads. ``effort`` is the optimisation of a program that has yet to
-    be compiled.
+    ``take(runs, result)`` is called from several threads. ``effort`` is the optimisation level if the program is not
+    yet compiled.
     """
     module = load_program(batch.program, effort)
     runs = batch.states.shape[1]
@@ -235,7 +235,7 @@ def run_blocks(
 
 
 def _run_block(module: RunnableProgram, batch: Batch, members: slice, stop: threading.Event) -> BatchResult | None:
-    """Run some members of a batch to their end; None where another thread has said stop before."""
+    """Run some members of a batch to the end; None if another thread requested a stop."""
     clock = batch.clock
     block = LaneBlock(module, batch.program, clock, batch.parameters[:, members], batch.states[:, members])
     for first_step in range(0, clock.step_count, STEPS_PER_CALL):
@@ -248,7 +248,7 @@ def _run_block(module: RunnableProgram, batch: Batch, members: slice, stop: thre
 
 
 def join_results(results: Sequence[BatchResult]) -> BatchResult:
-    """Return the results of neighbouring blocks as one."""
+    """Return the concatenated results of consecutive blocks."""
     if len(results) == 1:
         return results[0]
     states = np.concatenate([result.states for result in results], axis=1)
@@ -257,12 +257,12 @@ def join_results(results: Sequence[BatchResult]) -> BatchResult:
 
 @lru_cache(maxsize=64)
 def _row_counts(program: Program) -> tuple[int, int]:
-    """Number of rows of parameters and of states of a program."""
+    """Return the numbers of parameter rows and state rows of a program."""
     return len(row_numbers(program.parameter_rows())), len(row_numbers(program.state_rows()))
 
 
 class LaneBlock:
-    """Block of runs in progress; ``states`` (rows, runs) may be read and written between calls of ``advance``."""
+    """Block of runs in progress; ``states`` (rows, runs) may be read and modified between calls of ``advance``."""
 
     def __init__(
         self, module: RunnableProgram, program: Program, clock: Clock, parameters: Floats, states: Floats
@@ -286,7 +286,7 @@ class LaneBlock:
         self._commands = np.zeros((clock.command_delay + 2, self.states.shape[1]))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "LaneBlock":
-        """Return a block that goes on from here by itself; the compiled program is the same."""
+        """Return an independent copy of the block in its present state; the compiled program is shared."""
         other = copy.copy(self)
         for name, value in vars(self).items():
             if isinstance(value, np.ndarray):
@@ -295,7 +295,7 @@ class LaneBlock:
         return other
 
     def advance(self, step_count: int) -> None:
-        """Go ``step_count`` steps on."""
+        """Advance all runs by ``step_count`` steps."""
         clock = self._clock
         interval = float(clock.record_every or clock.measure_every)
         # Samples before this step are taken; one that lies on it to rounding is still to come.
@@ -322,21 +322,21 @@ class LaneBlock:
         self._next_step += step_count
 
     def set_parameters(self, rows: Sequence[int], values: Floats) -> None:
-        """Change some parameters of all runs from the next step on; ``rows`` as ``Program.parameter_rows`` has them."""
+        """Change some parameters of all runs from the next step on; ``rows`` as in ``Program.parameter_rows``."""
         self._parameters[rows] = values[:, None]
 
     def late_signals(self, step: int) -> Floats:
-        """Angle [rad] and pressures [Pa] (3, runs) that late sensors show at ``step``, the next one, but the first."""
+        """Angle [rad] and pressures [Pa] (3, runs) of delayed sensors at ``step``, the next step, except the first."""
         return self._signals[:3, (step - self._clock.signal_delay) % self._signals.shape[1]]
 
     def result(self) -> BatchResult:
-        """States and record so far."""
+        """Return the present states and records."""
         record = self._trace[:, :, : self._width] if self._clock.trace_every else self._record
         return BatchResult(self.states[:, : self._width].copy(), record)
 
 
 def begin_block(batch: Batch, effort: Effort = Effort.FULL) -> LaneBlock:
-    """Block of all runs of a batch, before its first step; ValueError for more runs than its program takes at once."""
+    """Return a block with all runs of a batch before the first step; ValueError for more runs than a block can take."""
     runs, lanes = batch.states.shape[1], lanes_of(batch.program)
     if runs > lanes:
         raise ValueError(f"{runs} runs do not fit a block of {lanes} lanes")
@@ -345,7 +345,7 @@ def begin_block(batch: Batch, effort: Effort = Effort.FULL) -> LaneBlock:
 
 
 def _pad_columns(columns: Floats) -> Floats:
-    """A contiguous copy with a whole number of vectors of columns; the last one repeated where there are fewer."""
+    """Return a contiguous copy with a multiple of the vector width as columns; the last column is repeated."""
     rows, width = columns.shape
     padded = np.empty((rows, width + -width % VECTOR))
     padded[:, :width] = columns

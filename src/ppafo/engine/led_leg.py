@@ -1,7 +1,7 @@
-"""A foot on a prescribed shank, without ground: the torque that it adds to an unconstrained vane.
+"""Foot on a prescribed shank without ground contact: additional torque on an unconstrained vane.
 
-Foot, foot plate and vane turn as one body, whose inertia the plant has; what shank, knee and weight do to it stands
-here. A walk's free foot has the same physics with more around it (``scheme/walking.py``).
+Foot, foot plate and vane turn as one body, whose inertia is part of the plant; this module has the torques of shank,
+knee and weight on this body. The free foot of a walk has the same physics among others (``scheme/walking.py``).
 """
 
 import math
@@ -18,7 +18,7 @@ from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
 
 
 def gait_bounds(_gait: ShankSeries) -> tuple[float, float]:
-    """No bounds: a shank goes where its gait was recorded, and nothing asks for more."""
+    """Return no bounds, because the shank follows the recorded gait."""
     return -math.inf, math.inf
 
 
@@ -30,19 +30,19 @@ GAIT_SHANK = ProfileKind(
     value=shank_in_gait,
     bounds=gait_bounds,
 )
-"""A shank whose knee moves too: its value is a ``ShankNow``. Any other profile leads a shank whose knee rests."""
+"""Shank with a moving knee, whose value is a ``ShankNow``; with any other profile of the shank, the knee is at rest."""
 
 
 @dataclass(frozen=True, slots=True)
 class LedLeg:
-    """Foot on a prescribed shank: the body that turns about the ankle, and the profile of the shank."""
+    """Foot on a prescribed shank: load that turns about the ankle, and profile of the shank."""
 
     load: FootLoad
     shank: Any
 
 
 def shank_at(kind: ProfileKind, shank: Any, time: float) -> ShankNow:
-    """Angle [rad], rate, acceleration and knee of the shank at a time [s], by the profile or gait that leads it."""
+    """Shank angle [rad], rate [rad/s], acceleration [rad/s^2] and knee acceleration [m/s^2] at a time [s]."""
     if kind is GAIT_SHANK:
         return shank_in_gait(shank, time)
     angle, rate, acceleration = kind.value(shank, time)
@@ -50,7 +50,7 @@ def shank_at(kind: ProfileKind, shank: Any, time: float) -> ShankNow:
 
 
 def shank_over_samples(kind: ProfileKind, shank: Any, times: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Any:
-    """The shank at times [s]: a ``ShankNow`` of columns (samples,), or of one number where it is always the same."""
+    """Shank motion at times [s]: a ``ShankNow`` of columns (samples,), or of single numbers if constant."""
     if kind is GAIT_SHANK:
         return over_samples(shank_in_gait, shank, times)
     angle, rate, acceleration = over_samples(kind.value, shank, times)

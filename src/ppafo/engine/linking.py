@@ -1,4 +1,4 @@
-"""Laws of effects at their ports, and the chambers that an observer of a walk assumes of an actuator."""
+"""Linking of effect laws to their ports, and of an actuator's chambers to the observer of a walk."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,9 +13,9 @@ from ppafo.model.valves.kind import valve_problem
 
 
 def link_program(program: Program, collector: SourceCollector) -> None:
-    """Let a collector call what the components of a program have in the place of functions of the model.
+    """Register the functions with which the components of a program replace functions of the model.
 
-    ProgramError for an effect that cannot act, or whose name other rows of the program have.
+    Raises ProgramError for an effect that cannot act, or whose name is already used by other rows of the program.
     """
     problem = valve_problem(program.valve)
     if problem:
@@ -47,7 +47,7 @@ def link_program(program: Program, collector: SourceCollector) -> None:
 
 
 def link_effects(effects: Sequence[Effect], collector: SourceCollector) -> None:
-    """Let a collector call the laws of effects at their ports. ProgramError for an effect that cannot act."""
+    """Register the laws of effects at their ports. ProgramError for an effect that cannot act."""
     for effect in effects:
         problem = effect_problem(effect)
         if problem:

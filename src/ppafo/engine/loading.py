@@ -1,9 +1,9 @@
-"""The module of a composed text: by the first compiler of C that works here, or as Python runs it.
+"""Module of a composed text: compiled by the first working C compiler, or run by Python.
 
-``PPAFO_BACKEND`` names one compiler, or Python; without it gcc, clang and zig are tried in this order, the quickest
-code first. All give the same bits. One that does not work, because there are no headers or its libraries cannot be
-loaded, is reported in one line and left out for a day; one that was killed or found no room on a disk, for the rest of
-the run. Where none is left, and where a law has no C, Python runs the text, and one line says so.
+``PPAFO_BACKEND`` selects one compiler, or Python; by default gcc, clang and zig are tried in this order, fastest code
+first. Results are bit-identical. A compiler that does not work, because headers are missing or its libraries cannot be
+loaded, is reported in one line and skipped for a day; after a kill or a full disk, only in the present process. If no
+compiler is left, or a law cannot be translated to C, Python runs the text, and one line reports this.
 """
 
 import contextlib
@@ -27,30 +27,30 @@ logger = logging.getLogger("ppafo")
 
 BACKEND_VARIABLE = "PPAFO_BACKEND"
 PYTHON = "python"
-"""Lets Python run the models."""
+"""Value of ``PPAFO_BACKEND`` that lets Python run the models."""
 ANY_OF_C = "c"
-"""Names the first compiler of C that works."""
+"""Value of ``PPAFO_BACKEND`` that selects the first working C compiler."""
 HOW_TO_INSTALL = "install gcc or clang, or 'pip install ppafo[native]', which brings zig"
 WITHOUT_C = f"{BACKEND_VARIABLE}={PYTHON} needs no compiler, and takes some hundred times as long"
 
 _FAILED: set[str] = set()
-"""Identities of compilers that failed in this process."""
+"""Identities of compilers that have failed in this process."""
 _LEAVING_OUT = threading.Lock()
 
 
 def compilers_to_try() -> tuple[Compiler, ...]:
-    """Return the compilers of this computer in the order in which they are tried; none where Python runs the models.
+    """Return the compilers of this computer in order of preference; none if Python runs the models.
 
-    SimulationError where ``PPAFO_BACKEND`` names none, or one that is not on this computer.
+    Raises SimulationError if ``PPAFO_BACKEND`` names an unknown compiler, or one that this computer does not have.
     """
     return _compilers(os.environ.get(BACKEND_VARIABLE, ""), cache_folder())
 
 
 @lru_cache(maxsize=8)
 def _compilers(name: str, folder: Path | None) -> tuple[Compiler, ...]:
-    """Return the compilers to try: the one of a name, or those of this computer that are not noted to have failed.
+    """Return the compilers to try: the named compiler, or those of this computer without a recorded failure.
 
-    SimulationError for a name that is none, and where any of C was asked for and none is there.
+    Raises SimulationError for an unknown name, and if any C compiler was requested and none is available.
     """
     if name == PYTHON:
         return ()
@@ -72,22 +72,22 @@ def _compilers(name: str, folder: Path | None) -> tuple[Compiler, ...]:
 
 
 def backend_described() -> str:
-    """Return what runs the models here, with its version."""
+    """Return the name and version of the backend that runs the models."""
     compilers = compilers_to_try()
     return compilers[0].described() if compilers else "Python itself, which compiles nothing"
 
 
 def compiled(source: str, effort: Effort = Effort.FULL) -> ModuleType | None:
-    """Return the module of a composed text by a compiler; None where Python has to run it, which a line has said.
+    """Return the compiled module of a composed text; None if Python has to run the text, which is then logged.
 
-    A quick program is not made where the full one is kept. ProgramError for a mistake in it, SimulationError where the
-    compiler that ``PPAFO_BACKEND`` names does not work.
+    A quick program is not compiled if the fully optimised one is cached. Raises ProgramError for a mistake in the text,
+    and SimulationError if the compiler named by ``PPAFO_BACKEND`` does not work.
     """
     return None if runs_by_python() else _load_by(source, compilers_to_try(), effort)
 
 
 def runs_by_python() -> bool:
-    """Return whether no compiler is to be tried, which a line has said where nobody asked for it."""
+    """Return whether no compiler is available or Python was selected; a missing compiler is logged."""
     if compilers_to_try():
         return False
     if os.environ.get(BACKEND_VARIABLE) != PYTHON:
@@ -97,9 +97,9 @@ def runs_by_python() -> bool:
 
 @lru_cache(maxsize=64)
 def _load_by(source: str, compilers: tuple[Compiler, ...], effort: Effort) -> ModuleType | None:
-    """Return the module of a text by the first of some compilers that works; None where none does.
+    """Return the module of a text compiled by the first working compiler; None if there is none.
 
-    SimulationError, or ProgramError for a law without C, where ``PPAFO_BACKEND`` names one that does not do.
+    If the compiler named by ``PPAFO_BACKEND`` fails, raises SimulationError, or ProgramError for a law without C.
     """
     if not compilers:
         return None
@@ -130,12 +130,12 @@ def _load_by(source: str, compilers: tuple[Compiler, ...], effort: Effort) -> Mo
 
 @cache
 def _say_slow(why: str) -> None:
-    """Say once in a process why Python runs a model."""
+    """Log once per process why Python runs a model."""
     logger.warning("ppafo: %s: Python runs the model, some hundred times slower than compiled", why)
 
 
 def _leave_out(failed: Iterable[Compiler], failure: CompilerError) -> None:
-    """Remember in this process, and beside the programs if the reason lasts, that compilers do not work."""
+    """Record the failure of compilers, in this process and, for a lasting cause, in the cache folder."""
     folder = cache_folder()
     for compiler in failed:
         _FAILED.add(compiler.identity())

@@ -1,7 +1,7 @@
-"""Storage of the numbers of a step in the text of the loop: rows of ``x`` for many runs, names for one run.
+"""Storage of the numbers of a step in the generated loop: rows of ``x`` for many runs, local names for one run.
 
-The writer of the loop (``loop_text.py``) asks these for each phase that is called, each question to all runs, and each
-function of ``lanes``.
+The generator of the loop (``loop_text.py``) uses this storage for each phase call, each condition over all runs, and
+each function of ``lanes``.
 """
 
 import ast
@@ -18,68 +18,69 @@ from ppafo.engine.rows import leaf_paths, row_expression, row_numbers
 
 
 class Call(NamedTuple):
-    """A call of a phase in a loop over lanes."""
+    """Call of a phase in a loop over runs."""
 
     phase: ComposedFunction
     arguments: Mapping[str, str]
-    """The phase's own arguments as text, by their names."""
+    """The phase's own arguments as text, by parameter name."""
 
     def text(self, number: str) -> str:
-        """The call for the lane of a number, with the groups that the phase is handed."""
+        """Text of the call for one run, with the groups passed to the phase."""
         handed = [number if name == NUMBER else name for name in self.phase.handed]
         own = [self.arguments[name] for name in self.phase.effects.takes]
         return f"{self.phase.name}({', '.join([*handed, *own])})"
 
     @property
     def returned(self) -> str:
-        """Name that the value of the call gets: its only result's, or one of its own for several results."""
+        """Name of the returned value: the name of its only result, or a separate name for several results."""
         results = self.phase.effects.results
         return results[0] if len(results) == 1 else self.phase.own
 
     def result(self, name: str) -> str:
-        """Expression of a result, once the value of the call has its name."""
+        """Expression of one result, after the returned value has been assigned."""
         return name if name == self.returned else f"{self.returned}.{name}"
 
     def stored(self, slot: Slot, number: str) -> str:
-        """Element of a history that the phase sets, for the lane of a number."""
+        """Expression of the history element that the phase sets, for one run."""
         arguments = {name: parse_expression(text) for name, text in self.arguments.items()}
         places = [ast.unparse(with_arguments(index, arguments)) for index in slot.places]
         return f"{slot.history}[{', '.join([*places, number])}]"
 
 
 class Rows(Protocol):
-    """Storage of the numbers of a step, as the writer of the loop uses it."""
+    """Storage of the numbers of a step, as used by the generator of the loop."""
 
     arrays: frozenset[str]
-    """Names of arrays in which numbers are, beside those of the loop over steps."""
+    """Names of arrays that contain numbers, besides the arrays of the loop over steps."""
 
     def over_lanes(self, calls: Sequence[Call]) -> list[str]:
-        """Lines that call phases, one after the other, for each run."""
+        """Lines that call several phases in sequence, for each run."""
 
     def for_lane(self, call: Call) -> list[str]:
         """Lines that call a phase for the present run."""
 
     def with_cells(self, node: ast.expr) -> ast.expr:
-        """An expression with the numbers of the present run in the place of ``lane.GROUP.FIELD``."""
+        """Expression with ``lane.GROUP.FIELD`` replaced by the storage of the present run."""
 
     def any_of(self, condition: ast.expr, is_none: bool) -> tuple[list[str], str]:
-        """Lines before, and expression of, the answer whether a condition on ``lane`` holds in any run, or in none."""
+        """Preceding lines and expression for whether a condition on ``lane`` is true in any run, or in none."""
 
     def action(self, method: str, arguments: Sequence[str]) -> list[str]:
-        """Lines for a function of ``lanes`` that does something: ``record``, ``set_aside`` or ``put_back``."""
+        """Lines for a function of ``lanes`` without return value: ``record``, ``set_aside`` or ``put_back``."""
 
     def value(self, method: str, arguments: Sequence[str]) -> str:
-        """Expression for a function of ``lanes`` that gives something: ``traces`` or ``slot``."""
+        """Expression for a function of ``lanes`` with return value: ``traces`` or ``slot``."""
 
     def heading(self, function: FunctionType) -> list[ast.stmt]:
         """First statements of a function of the loop."""
 
 
 class RowsOfLanes:
-    """Row of ``x`` of each number of a program: state, parameters, intermediates of a step, its parts.
+    """Row of ``x`` for each number of a program: state, parameters, intermediate values of a step and of its parts.
 
-    One array for all of them lets the compiler see that no two rows overlap. From row ``aside`` on lies what lanes that
-    wait for others keep, where few do: the state, what was left of the step, and what it was handed.
+    With a single array for all numbers, the compiler knows that rows do not overlap. If waiting is rare, the rows from
+    ``aside`` on contain the saved data of waiting runs: state, remainder of the step, and values from the previous
+    step.
     """
 
     def __init__(self, step: StepText, lanes: int = 0) -> None:
@@ -99,16 +100,16 @@ class RowsOfLanes:
         self.arrays: frozenset[str] = frozenset()
 
     def load(self, group: str) -> str:
-        """Line that makes the group from its rows."""
+        """Line that builds the group from its rows."""
         return f"{group} = {row_expression(self.step.rows[group], group, self.cells, self.step.collector.add)}"
 
     def over_lanes(self, calls: Sequence[Call]) -> list[str]:
-        """A loop over all lanes of the block."""
+        """Lines of a loop over all runs of the block."""
         lines = [line for call in calls for line in self.for_lane(call)]
         return _for_each_lane(lines or ["pass"])
 
     def for_lane(self, call: Call) -> list[str]:
-        """Lines for one lane: what the phase asks for, the call, and what it returns in its rows."""
+        """Lines for one run: load the groups, call the phase, and store the results."""
         effects, rows = call.phase.effects, self.step.rows
         if not effects.results:
             return []
@@ -122,18 +123,18 @@ class RowsOfLanes:
         return lines + [f"{call.stored(slot, 'lane')} = {call.result(name)}" for name, slot in effects.slots.items()]
 
     def with_cells(self, node: ast.expr) -> ast.expr:
-        """An expression with the cells of its numbers."""
+        """Expression with group fields replaced by elements of ``x``."""
         written: ast.expr = _Cells(self.cells).visit(deepcopy(node))
         return written
 
     def any_of(self, condition: ast.expr, is_none: bool) -> tuple[list[str], str]:
-        """A count of lanes: a sum of whole numbers is taken of several at once, a largest float is not."""
+        """Lines that count runs, because a sum of integers can be vectorised and a maximum of floats cannot."""
         text = ast.unparse(self.with_cells(condition))
         lines = ["counted = 0", "for lane in range(width):", f"    counted += 1 if {text} else 0"]
         return lines, "counted == 0" if is_none else "counted > 0"
 
     def action(self, method: str, arguments: Sequence[str]) -> list[str]:
-        """Lines that copy rows: to a sample of the record, aside for lanes that wait, or back again."""
+        """Lines that copy rows: to a recorded sample, to the saved data of waiting runs, or back."""
         if method == "record":
             return [
                 "for row in range(record.shape[1]):",
@@ -154,28 +155,28 @@ class RowsOfLanes:
         return [*copied, *(_for_each_lane(lines) if lines else [])]
 
     def value(self, method: str, arguments: Sequence[str]) -> str:
-        """Test whether a sample is traced, or its index in the trace: a ring that keeps the last samples."""
+        """Expression for whether a sample is traced, or for its index in the trace, a ring buffer."""
         index, trace_every = arguments
         return f"{index} % {trace_every} == 0" if method == "traces" else f"{index} // {trace_every} % trace.shape[0]"
 
     def heading(self, function: FunctionType) -> list[ast.stmt]:  # noqa: ARG002 - a protocol
-        """Nothing: no person reads this text."""
+        """Return no statements, because this text is not meant for readers."""
         return []
 
 
 class RowsOfRun:
-    """Groups of a single run: NamedTuples under their own names, of which the outputs of a sample are a row, too."""
+    """Groups of a single run: NamedTuples under their own names, including the outputs of a sample."""
 
     def __init__(self, step: StepText, outputs: str) -> None:
         self.step, self.outputs = step, outputs
         self.arrays: frozenset[str] = frozenset()
 
     def over_lanes(self, calls: Sequence[Call]) -> list[str]:
-        """The bare calls, whose results get the names of their groups."""
+        """Lines of plain calls, whose results are assigned to the names of their groups."""
         return [line for call in calls for line in self.for_lane(call)] or ["pass"]
 
     def for_lane(self, call: Call) -> list[str]:
-        """Lines for one call: groups that it sets, numbers of histories, and of a trace the row of the sample."""
+        """Lines for one call: assignment of groups and history elements, and the row of a traced sample."""
         effects = call.phase.effects
         if not effects.results:
             return []
@@ -188,17 +189,17 @@ class RowsOfRun:
         return lines + [f"{call.stored(slot, '0')} = {call.result(name)}" for name, slot in kept.items()]
 
     def with_cells(self, node: ast.expr) -> ast.expr:
-        """An expression with the names of its groups."""
+        """Expression with the names of the groups."""
         written: ast.expr = _OfRun().visit(deepcopy(node))
         return written
 
     def any_of(self, condition: ast.expr, is_none: bool) -> tuple[list[str], str]:
-        """The condition of the run itself."""
+        """Expression of the condition for the single run."""
         text = ast.unparse(self.with_cells(condition))
         return [], f"not {text}" if is_none else text
 
     def action(self, method: str, arguments: Sequence[str]) -> list[str]:  # noqa: ARG002 - a protocol
-        """Nothing: a single run records nothing, and waits for no other."""
+        """Return an empty statement, because a single run records nothing and does not wait."""
         return ["pass"]
 
     def value(self, method: str, arguments: Sequence[str]) -> str:  # noqa: ARG002 - a protocol
@@ -211,7 +212,7 @@ class RowsOfRun:
 
 
 class _Cells(ast.NodeTransformer):
-    """Puts the cell of each number in the place of ``lane.GROUP.FIELD``."""
+    """Transformer that replaces ``lane.GROUP.FIELD`` by the storage of the number."""
 
     def __init__(self, cells: Mapping[str, str]) -> None:
         self.cells = cells
@@ -227,7 +228,7 @@ class _Cells(ast.NodeTransformer):
 
 
 class _OfRun(ast.NodeTransformer):
-    """Puts the name of a group in the place of ``lane.GROUP``."""
+    """Transformer that replaces ``lane.GROUP`` by the name of the group."""
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         if isinstance(node.value, ast.Name) and node.value.id == "lane":
@@ -240,10 +241,10 @@ class _OfRun(ast.NodeTransformer):
 
 
 def over_rows(count: int, line: str) -> list[str]:
-    """A loop with a line for all lanes of the first ``count`` rows."""
+    """Lines of a loop that apply a line to all runs in the first ``count`` rows."""
     return [f"for row in range({count}):", *indent(_for_each_lane([line]))]
 
 
 def _for_each_lane(lines: Iterable[str]) -> list[str]:
-    """A loop with some lines for all lanes of the block."""
+    """Lines of a loop that apply some lines to all runs of the block."""
     return ["for lane in range(width):", *indent(lines)]

@@ -1,8 +1,8 @@
-"""The loop over steps in the text of a module: for many runs at once, or for a single one.
+"""Text of the loop over steps in the compiled module, for many runs at once or for a single run.
 
-``for lane in lanes`` becomes a loop over the rows of ``x``, in which each call of a phase loads the groups that it asks
-for and stores those that it returns; for a single run it is the bare call (``loop_rows.py``). Functions of ``lanes``
-stand where they act.
+``for lane in lanes`` becomes a loop over the columns of ``x``, in which each phase call loads the groups that it reads
+and stores the groups that it returns. For a single run, it becomes the plain call (``loop_rows.py``). Functions of
+``lanes`` are expanded in place.
 """
 
 import ast
@@ -24,15 +24,15 @@ from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Now
 
 NEEDS_PARTS = "needs_parts"
-"""The last argument of a loop that has both steps: 1 where the error decides about the parts of a step, else 0."""
+"""Last argument of a loop with both kinds of steps: 1 for steps divided by error control, else 0."""
 
 
 class LoopText:
-    """Writes a function of the loop over steps, with those that it calls in their places.
+    """Generator of a function of the loop over steps, with called functions expanded in place.
 
-    ``steps`` has the step of each program with the place of its numbers: with two, the loop asks ``NEEDS_PARTS``
-    wherever the second goes on in another way. ``known`` are arguments of the function whose values are known. A method
-    for a statement returns the statements that it becomes; ProgramError where it is none of the loop.
+    ``steps`` has the step of each program with its storage. With two programs, the loop tests ``NEEDS_PARTS`` wherever
+    they differ. ``known`` are arguments with known values. The method for a statement returns its translation, and
+    raises ProgramError for an unsupported statement.
     """
 
     def __init__(
@@ -51,17 +51,17 @@ class LoopText:
         return self.block(self.reduction.definition.tree.body)
 
     def either(self, own: list[ast.stmt], other: list[ast.stmt]) -> list[ast.stmt]:
-        """Statements of this program or of the other one, under a condition only where they differ."""
+        """Statements of this program or of the other program, under a condition only if they differ."""
         if [*map(ast.dump, own)] == [*map(ast.dump, other)]:
             return own
         return [ast.If(parse_expression(f"{NEEDS_PARTS} == 1"), other or [ast.Pass()], own)]
 
     def expression(self, node: ast.expr) -> ast.expr:
-        """An expression of the loop as the module has it: reduced, with arrays in the place of ``lanes``."""
+        """Translation of an expression of the loop: reduced, with ``lanes`` replaced by arrays."""
         return self.composed(self.reduction.visit(node))
 
     def composed(self, reduced: ast.expr) -> ast.expr:
-        """A reduced expression as the module has it."""
+        """Translation of a reduced expression."""
         composed: ast.expr = self.composer.visit(_OfLanes(self.rows).visit(reduced))
         return composed
 
@@ -97,7 +97,7 @@ class LoopText:
         )
 
     def branch(self, node: ast.If) -> list[ast.stmt]:
-        """A decision: of the parts, of a question to all runs, or of numbers that all have."""
+        """Translation of a condition on the parts, on all runs, or on numbers common to all runs."""
         question = node.test.operand if isinstance(node.test, ast.UnaryOp) else node.test
         if isinstance(question, ast.Call) and question.args and isinstance(question.args[0], ast.GeneratorExp):
             # ``any(CONDITION for lane in lanes)``, or ``not any(...)``.
@@ -118,21 +118,21 @@ class LoopText:
         return self.block(own) if other is own else self.either(self.block(own), self.other.branch(node))
 
     def decided(self, node: ast.If) -> list[ast.stmt] | None:
-        """The side that a decision of the parts takes; None for any other decision."""
+        """Branch selected by a condition on the parts alone; None for any other condition."""
         test = self.reduction.asked(node.test)
         if not isinstance(test, ast.Constant):
             return None
         return node.body if test.value else node.orelse
 
     def phases(self, node: ast.For) -> list[ast.stmt]:
-        """A loop over lanes, in which phases are called; or with decisions and names of each lane between them."""
+        """Translation of a loop over runs that calls phases, optionally with conditions and names of each run."""
         if not all(isinstance(statement, ast.Expr) for statement in node.body):
             return [ast.For(node.target, parse_expression("range(width)"), self.of_lane(node.body), [])]
         own = _parsed(self.rows.over_lanes([self.phase(call) for call in node.body]))
         return own if self.other is None else self.either(own, self.other.phases(node))
 
     def of_lane(self, statements: Sequence[ast.stmt]) -> list[ast.stmt]:
-        """Body of the loop over lanes: phases, names, conditional expressions and counted loops."""
+        """Body of the loop over runs: phases, names, conditions and counted loops."""
         made: list[ast.stmt] = []
         for node in statements:
             match node:
@@ -157,11 +157,11 @@ class LoopText:
         return made
 
     def number_of_lane(self, node: ast.expr) -> ast.expr:
-        """An expression of the loop with numbers of the present lane."""
+        """Translation of an expression with numbers of the present run."""
         return self.composed(self.rows.with_cells(self.reduction.visit(node)))
 
     def phase(self, node: ast.stmt) -> Call:
-        """The call of a phase in a loop over lanes."""
+        """Call of a phase in a loop over runs."""
         if not isinstance(node, ast.Expr) or not isinstance(node.value, ast.Call):
             raise self.reduction.refuse(node, "in a loop over lanes phases are called")
         called: FunctionType = self.reduction.outside(node.value.func)
@@ -173,7 +173,7 @@ class LoopText:
         return Call(self.step.phase(called, known), own)
 
     def called(self, node: ast.Call) -> list[ast.stmt]:
-        """The statements of a function of the loop that is called, or what one of ``lanes`` does."""
+        """Statements of a called function of the loop, or of a function of ``lanes``."""
         if isinstance(node.func, ast.Attribute) and _is_lanes(node.func.value):
             arguments = [ast.unparse(self.expression(argument)) for argument in node.args]
             return _parsed(self.rows.action(node.func.attr, arguments))
@@ -190,12 +190,12 @@ class LoopText:
 
 
 def _is_lanes(node: ast.expr) -> bool:
-    """True for the name ``lanes``."""
+    """Return whether an expression is the name ``lanes``."""
     return isinstance(node, ast.Name) and node.id == "lanes"
 
 
 class _OfLanes(ast.NodeTransformer):
-    """Puts arrays of the module in the place of those of ``lanes``, and what its functions give."""
+    """Transformer that replaces arrays and functions of ``lanes`` by arrays and expressions of the module."""
 
     def __init__(self, rows: Rows) -> None:
         self.rows = rows
@@ -215,19 +215,19 @@ class _OfLanes(ast.NodeTransformer):
 
 
 def _parsed(lines: Sequence[str]) -> list[ast.stmt]:
-    """The statements of some lines."""
+    """Parse some lines into statements."""
     return parse_module("\n".join(lines)).body
 
 
 def _unparsed(body: list[ast.stmt]) -> list[str]:
-    """The lines of some statements."""
+    """Return the lines of some statements."""
     return ast.unparse(ast.fix_missing_locations(ast.Module(body, []))).split("\n")
 
 
 def lane_loop(step: StepText, head: str, name: str, arguments: str, lanes: int = 0) -> str:
-    """The function ``name`` that takes a block of some lanes, 0 for as many as fit, some steps further.
+    """Text of the function ``name`` that advances a block of ``lanes`` runs, or of as many as fit if ``lanes`` is 0.
 
-    ``head`` is its mark, the line before it; ``arguments`` are its parameters, at least those of ``ARGUMENTS``.
+    ``head`` is the decorator line; ``arguments`` are the parameters, which include ``ARGUMENTS``.
     """
     rows = RowsOfLanes(step, lanes)
     states, parameters = len(rows.state_at), len(rows.parameter_at)
@@ -249,10 +249,10 @@ def lane_entry(
     arrays: Mapping[str, Mapping[str, Any]],
     known: Mapping[str, Any] | None = None,
 ) -> str:
-    """An entry that does what a function of the loop says, on arrays in which numbers of lanes stay between calls.
+    """Text of an entry that applies a function of the loop to arrays that keep the numbers of runs between calls.
 
-    Its parameters are the ``arrays``, each of the rows of its groups by lanes, the histories of signals, and the
-    function's own numbers but those that are ``known``.
+    Parameters of the entry are the ``arrays``, each with the rows of its groups and a column per run, the histories of
+    signals, and the function's own numbers except the ``known`` ones.
     """
     rows = RowsOfLanes(step)
     # What a step hands on lives no longer than a call.
@@ -268,21 +268,21 @@ def lane_entry(
 
 
 LOOP_ARRAYS = {"signal_history": 3, "command_history": 2}
-"""Arrays of a loop behind its states, parameters and samples, with how many extents they have; the last one is 1."""
+"""Arrays of a loop after states, parameters and samples, with their number of dimensions; the last extent is 1."""
 LOOP_NUMBERS = {
     **dict.fromkeys(("first_step", "step_count", "steps_in_all", "steps_per_sample"), "int64"),
     "interval": "float64",
     **dict.fromkeys(("last_record", "next_record", "signal_delay", "command_delay"), "int64"),
 }
-"""Numbers of a loop behind its arrays, with their types, by the names that ``step.loop.advance`` has for them."""
+"""Numbers of a loop after its arrays, with their types, by their parameter names in ``step.loop.advance``."""
 
 
 def run_loop(step: StepText, outputs: str, in_parts: StepText | None) -> str:
-    """The function ``advance`` that takes one run of a program through its steps, and the row ``outputs`` of a sample.
+    """Text of the function ``advance`` that advances one run of a program, and of the row ``outputs`` of a sample.
 
-    Its ``states`` and ``parameters`` have the groups of a run, ``samples`` has the ``last`` sample and that ``before``.
-    It is for translation alone, as it writes into these. With ``in_parts``, the same program with steps that their
-    error divides, it has both, and ``needs_parts`` chooses.
+    ``states`` and ``parameters`` have the groups of a run; ``samples`` has the sample ``last`` and the previous sample
+    ``before``. The text is meant for translation only, because it assigns to fields. With ``in_parts``, the same
+    program with adaptive steps, the function contains both kinds of steps, selected by ``needs_parts``.
     """
     steps: dict[Rows, StepText] = {RowsOfRun(step, outputs): step}
     if in_parts is not None:
@@ -304,6 +304,6 @@ def run_loop(step: StepText, outputs: str, in_parts: StepText | None) -> str:
 
 
 def write_lanes(program: Program, collector: SourceCollector, lanes: int = 0) -> str:
-    """Source text of a program of some lanes, 0 for as many as fit; ``collector`` then has all that it is made from."""
+    """Source text of a program for ``lanes`` runs, 0 for as many as fit; ``collector`` then has all its inputs."""
     advance = lane_loop(StepText(program, collector), COMPILED, "advance", ARGUMENTS, lanes)
     return f"{HEADER}\n\n{collector.text()}\n\n\n{advance}\n"

@@ -1,4 +1,4 @@
-"""Meters of a batch: put into its program in the place of a recording, and read when it has run."""
+"""Meters of a batch: added to its program instead of a recording, and read after the run."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,9 +14,9 @@ from ppafo.signals.recording import Floats
 
 
 def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] = (), trace_every: int = 0) -> Batch:
-    """The batch with meters at every sample that it would record, of which it then records none.
+    """Return the batch with meters at every sample that it would have recorded, and without recording.
 
-    Every ``trace_every`` samples it keeps the ``traced`` channels, 0 for never.
+    The ``traced`` channels are stored every ``trace_every`` samples, 0 for never.
     """
     program = replace(batch.program, meters=tuple(meters), traced=tuple(traced))
     clock = replace(batch.clock, record_every=0, measure_every=batch.clock.record_every, trace_every=trace_every)
@@ -28,6 +28,6 @@ def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] 
 
 
 def meters_of(program: Program, states: Floats) -> dict[str, Any]:
-    """The last state of each meter by its name, from final states (rows, runs): arrays (runs,), units of the meter."""
+    """Return the final state of each meter by name, from final states (rows, runs): arrays (runs,) in meter units."""
     groups = program.state_rows()
     return {kind.name: group_of(group, groups, states) for group, kind in program.meter_groups.items()}

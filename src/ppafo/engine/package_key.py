@@ -1,10 +1,10 @@
-"""Cache key of composed texts: hashes of the package's own files, and the parts of the program.
+"""Cache key of composed texts: hashes of the package files, and the components of the program.
 
-A text follows from the functions of its parts and from those that compose it. Where all of them stand in files of this
-package, the bytes of these files, which are read once a process, and the names of the parts say which text it is. A
-number or function of the package that a session has changed since counts too. A part from elsewhere, a law in a file of
-a user or a function of a notebook, may change at any moment: what has one has no key, and is composed, which looks at
-the source of all that it calls.
+A text depends on the functions of its components and on the composing functions. If all of them are defined in files of
+this package, the contents of the files, read once per process, and the names of the components determine the text.
+Numbers and functions of the package that were replaced in the present process are included in the key. A component from
+elsewhere, such as a law in a user's file or a function in a notebook, may change at any time. A program with such a
+component has no key and is composed again, which reads the source of all called functions.
 """
 
 import hashlib
@@ -22,19 +22,19 @@ from ppafo.engine.source_text import MadeFrom, Read
 from ppafo.model.binding import frame_of
 
 COMPOSED = ("control", "engine", "metrics", "model", "processor", "signals")
-"""Packages with functions that enter the text of a program, or that compose it."""
+"""Subpackages with functions that become part of a program text, or that compose the text."""
 _PACKAGE = Path(__file__).parents[1]
 _SUFFIXES = (".py", ".c", ".h")
 _PLAIN = (bool, int, float, str)
 
 
 class Key(NamedTuple):
-    """Inputs of a text.
+    """Inputs that determine a composed text.
 
     Attributes:
-        described: parts of the program in words
-        files: hash of the files of the package that compose the text
-        values: hash of the numbers and texts that each loaded module of them has under its names, by module
+        described: description of the components of the program
+        files: hash of the package files that compose the text
+        values: hash of the numbers and texts defined in each loaded module of these files, by module name
         made_from: names that the text depends on, with their values
     """
 
@@ -45,13 +45,13 @@ class Key(NamedTuple):
 
     @property
     def words(self) -> str:
-        """All inputs in one text; also Python's version, as each writes a syntax tree in its own way."""
+        """All inputs in one text, and the Python version, because each version writes syntax trees differently."""
         values = " ".join(self.values.values())
         return f"{sys.version} {self.files} {values} {self.described}"
 
 
 def package_key(parts: Any, folders: tuple[str, ...] = COMPOSED) -> Key | None:
-    """Return the key of what is composed of these parts by functions in ``folders``; None where one is elsewhere."""
+    """Return the key of a text composed of these parts by functions in ``folders``; None for parts from elsewhere."""
     try:
         reads = list(_names_in(folders))
         described = _described(parts)
@@ -68,12 +68,12 @@ def package_key(parts: Any, folders: tuple[str, ...] = COMPOSED) -> Key | None:
 
 
 class _ElsewhereError(Exception):
-    """A part does not stand in a file of this package, or is no longer what its name stands for."""
+    """Error for a part that is not defined in a package file, or that no longer has its original value."""
 
 
 @cache
 def _hash_of_files(folders: tuple[str, ...]) -> str:
-    """Hash of the paths and bytes of the files."""
+    """Return the hash of paths and contents of the files."""
     digest = hashlib.sha256()
     root = str(_PACKAGE)
     # Names as texts: paths of hundreds of files take longer than their bytes.
@@ -93,7 +93,7 @@ def _hash_of_files(folders: tuple[str, ...]) -> str:
 
 
 def _names_in(folders: tuple[str, ...]) -> Iterator[Read]:
-    """Numbers and functions that the loaded modules of some folders have under their names."""
+    """Yield the numbers and functions defined in the loaded modules of some folders."""
     own = tuple(f"ppafo.{folder}." for folder in folders)
     for name, module in sorted(sys.modules.items()):
         if not name.startswith(own):
@@ -111,19 +111,19 @@ def _names_in(folders: tuple[str, ...]) -> Iterator[Read]:
 
 
 def _is_plain(value: Any) -> bool:
-    """True for numbers, texts and tuples of these."""
+    """Return whether a value is a number, a text or a tuple of such values."""
     return isinstance(value, _PLAIN) or (isinstance(value, tuple) and all(map(_is_plain, value)))
 
 
 @cache
 def _is_installed(file: str) -> bool:
-    """True for a file of this package, of another one that is installed, or of Python."""
+    """Return whether a file belongs to this package, to another installed package or to Python."""
     places = (str(_PACKAGE), sys.prefix, sys.base_prefix)
     return file.startswith(("<frozen", "<string", *places)) or "site-packages" in file
 
 
 def _described(value: Any) -> str:
-    """A part, or what it holds, in words that no other one has."""
+    """Return a unique description of a part or of its contents."""
     if value is None or isinstance(value, bool | int | float | str):
         return f"{type(value).__name__} {value!r}"
     if isinstance(value, FunctionType | type | ModuleType):
@@ -140,7 +140,7 @@ def _described(value: Any) -> str:
 
 
 def _named(value: Any) -> str:
-    """Qualified name of a function, class or module of the package."""
+    """Return the qualified name of a function, class or module of the package."""
     module = value.__name__ if isinstance(value, ModuleType) else value.__module__
     if isinstance(value, type) and module == "builtins":
         return value.__qualname__

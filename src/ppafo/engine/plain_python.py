@@ -1,7 +1,7 @@
-"""The part of Python that the engine compiles, and the one line that says what is wrong with anything else.
+"""Compiled subset of Python, and the one-line errors for code outside the subset.
 
-What can be seen in the text is refused before it is composed; what only shows with the types of values is refused by
-the walk through the whole (``translation/walk.py``), as a line of the file that a user wrote (``place_in``).
+Code that is visibly outside the subset is refused before composition. Errors that depend on the types of values are
+found by type inference (``translation/walk.py``) and reported for the line of the user's file (``place_in``).
 """
 
 import ast
@@ -51,13 +51,13 @@ _INSTEAD = "a law is made of numbers, tuples, NamedTuples, 'math' and other plai
 
 
 def refusal(file: str, where: ast.AST | int, problem: str) -> ProgramError:
-    """The error for a place in a file: one line that begins as ``my_law.py:12: ``."""
+    """Return the error for a position in a file: one line that starts with ``my_law.py:12: ``."""
     line = where if isinstance(where, int) else getattr(where, "lineno", 0)
     return ProgramError(f"{place(file, line)}: {one_line(problem)}")
 
 
 def place(file: str, line: int) -> str:
-    """A line as messages name it: its file from the working folder where it lies below that, else by its name."""
+    """Return a line as named in messages: by relative path below the working folder, otherwise by file name."""
     path = Path(file)
     try:
         path = path.relative_to(Path.cwd())
@@ -67,13 +67,13 @@ def place(file: str, line: int) -> str:
 
 
 def parse_module(text: str, path: str = "<unknown>") -> ast.Module:
-    """Return the syntax tree of a text, one thread at a time; SyntaxError as Python says it."""
+    """Return the syntax tree of a text; only one thread parses at a time. SyntaxError as raised by Python."""
     with PARSING:
         return ast.parse(text, path)
 
 
 def check_grammar(tree: ast.FunctionDef, file: str) -> None:
-    """Refuse what cannot be compiled, the first of it in the file. ProgramError names the file and the line."""
+    """Raise ProgramError, with file and line, for the first construct in a file that cannot be compiled."""
     problems: list[tuple[ast.stmt | ast.expr | ast.keyword, str]] = []
     if tree.args.vararg or tree.args.kwarg or getattr(tree, "type_params", None):
         problem = f"'{tree.name}' takes any number of arguments, which cannot be compiled; name each of them"
@@ -93,7 +93,7 @@ def check_grammar(tree: ast.FunctionDef, file: str) -> None:
 
 
 def _problem(node: ast.AST) -> str:
-    """Why a part of a syntax tree cannot be compiled, and what to write instead; empty where it can."""
+    """Return the reason why a node cannot be compiled, and the remedy; empty if the node can be compiled."""
     if type(node) not in _PLAIN:
         word = _WORDS.get(type(node), f"'{type(node).__name__}'")
         return f"{word} cannot be compiled; {_INSTEAD}"
@@ -109,9 +109,9 @@ def _problem(node: ast.AST) -> str:
 
 
 def check_flow(tree: ast.FunctionDef, file: str, local: Iterable[str]) -> None:
-    """Refuse a function that can end without a value, or read one of its ``local`` names before it has a value.
+    """Refuse a function that can end without a value, or that reads one of its ``local`` names before assignment.
 
-    ProgramError names the file and the line.
+    Raises ProgramError with file and line.
     """
     arguments = tree.args
     parameters = {argument.arg for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)}
@@ -121,13 +121,13 @@ def check_flow(tree: ast.FunctionDef, file: str, local: Iterable[str]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Flow:
-    """Follows which names have a value; those after a return are of no interest (None)."""
+    """Analysis of which names are assigned; None after a return."""
 
     file: str
     local: set[str]
 
     def end_of(self, body: list[ast.stmt], bound: set[str]) -> set[str] | None:
-        """Names that have a value after some statements, None where they do not end."""
+        """Return the names assigned after some statements; None if they do not reach their end."""
         now: set[str] | None = set(bound)
         for statement in body:
             if now is None:
@@ -136,7 +136,7 @@ class _Flow:
         return now
 
     def after(self, statement: ast.stmt, bound: set[str]) -> set[str] | None:
-        """Names that have a value after a statement, None where it does not end."""
+        """Return the names assigned after a statement; None if the statement does not reach its end."""
         if isinstance(statement, ast.If):
             self.read(statement.test, bound)
             ends = [self.end_of(branch, bound) for branch in (statement.body, statement.orelse)]
@@ -162,7 +162,7 @@ class _Flow:
         return None if ends_here else bound | stored
 
     def after_loop(self, statement: ast.For | ast.While, bound: set[str]) -> set[str] | None:
-        """Names that have a value after a loop, which may be gone through not once."""
+        """Return the names assigned after a loop, whose body may not run at all."""
         if isinstance(statement, ast.For):
             self.read(statement.iter, bound)
             # The body may run not once, so that what it assigns does not count after the loop.
@@ -176,14 +176,14 @@ class _Flow:
         return None if is_endless and not breaks else self.end_of(statement.orelse, bound)
 
     def read(self, node: ast.AST, bound: set[str]) -> None:
-        """Refuse the reading of a local name that may have no value yet."""
+        """Refuse the reading of a local name that may be unassigned."""
         missing = self.local - bound
         for inner in ast.walk(node) if missing else ():
             if isinstance(inner, ast.Name) and inner.id in missing:
                 raise self.unbound(inner, inner.id)
 
     def unbound(self, where: ast.AST, name: str) -> ProgramError:
-        """The error for a name without a value."""
+        """Return the error for an unassigned name."""
         return refusal(self.file, where, f"'{name}' may have no value here; assign it before, on every path")
 
 
@@ -195,7 +195,7 @@ _ORIGIN = re.compile(rf"{re.escape(ORIGIN)} (?P<file>.*): (?P<lines>[\d ]+)$")
 
 
 class SourcePosition(NamedTuple):
-    """The line of a user's file where a statement begins, and the line where the next one does."""
+    """Line of a user's file where a statement starts, and the line where the next statement starts."""
 
     file: str
     line: int
@@ -203,7 +203,7 @@ class SourcePosition(NamedTuple):
 
 
 def place_in(lines: list[str], number: int) -> SourcePosition | None:
-    """Source position of line ``number`` of a generated text; None for lines that belong to no function of a file."""
+    """Return the source position of line ``number`` of a generated text; None for lines without a source file."""
     for start in range(min(number, len(lines)) - 1, -1, -1):
         origin = _ORIGIN.match(lines[start])
         if origin is None:

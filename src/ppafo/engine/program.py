@@ -1,4 +1,4 @@
-"""Program: the components (valve, controller, gas, ...) that one compiled model consists of."""
+"""Program: combination of the components (valve, controller, gas, ...) of one compiled model."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -38,69 +38,75 @@ class GasPhases(Protocol):
 
     @property
     def IS_THERMAL(self) -> bool:  # noqa: N802 - constants of modules
-        """True where it has an energy balance."""
+        """True if the gas has an energy balance."""
 
     @property
     def HAS_TRUE_MASSES(self) -> bool:  # noqa: N802
-        """True where its true masses stand beside what ``PlantState`` counts."""
+        """True if true masses are stored in addition to the masses in ``PlantState``."""
 
     @property
     def START(self) -> Callable[..., Any] | None:  # noqa: N802
-        """``START(plant, initial, parts=functions)`` makes the only group of states; None where there is none."""
+        """Function ``START(plant, initial, parts=functions)`` for the initial gas state; None without a gas state."""
 
     def groups(self, parts: "Program") -> Groups:
-        """Groups of numbers that it has in a lane."""
+        """Return the groups of numbers of this kind of gas."""
 
     def begin(self, parts: "Program", lane: "Lane", next_angle: float, length: float) -> None:
-        """The first stage over a length [s], with volumes that run to an angle [rad]."""
+        """Set the first stage over a length [s], with volumes that end at ``next_angle`` [rad]."""
 
     def ends(self, parts: "Program", lane: "Lane") -> tuple[float, float]:
-        """Pressures [Pa] to which it leads."""
+        """Return the pressures [Pa] of both chambers after the first stage."""
 
     def first_flows(self, parts: "Program", lane: "Lane") -> tuple[float, float, float]:
-        """Flows [kg/s] of the first stage: from the supplies, and into both chambers."""
+        """Return the flows [kg/s] of the first stage: from the supplies, and into both chambers."""
 
     def change(self, parts: "Program", lane: "Lane", length: float) -> None:
-        """The second stage, and what both change."""
+        """Set the second stage, and the changes from both stages."""
 
     def error(self, parts: "Program", lane: "Lane", ahead: float, length: float) -> float:
-        """Error of the pressures over what is allowed [-], with volumes that ran to an angle [rad]."""
+        """Return the pressure error divided by the allowed error [-], with volumes that end at ``ahead`` [rad]."""
 
     def shift_error(self, parts: "Program", lane: "Lane", shift: float, ahead: float, length: float) -> float:
-        """Error of the pressures over what is allowed [-], of a valve whose opening moves by a share."""
+        """Return the pressure error due to a relative opening change ``shift``, divided by the allowed error [-]."""
 
     def add(self, parts: "Program", lane: "Lane") -> None:
-        """``lane.fed``, the state with the gas of the step, and ``lane.warmed``, the true masses if it has any."""
+        """Set ``lane.fed``, the state with the gas of the step, and ``lane.warmed``, the true masses if any."""
 
     def move(self, parts: "Program", lane: "Lane", state: PlantState, assumed: float, reached: float) -> PlantState:
-        """A state whose vane came to another angle [rad] than assumed."""
+        """Return the state for the angle reached [rad] instead of the assumed angle [rad]."""
 
     def work(self, parts: "Program", lane: "Lane") -> None:
-        """Count what the gas did on the vane."""
+        """Add the work of the gas on the vane to the totals."""
 
 
 @dataclass(frozen=True, slots=True)
 class Program:
     """Combination of components; each combination is compiled once.
 
-    ``angle`` None leaves the vane unconstrained, otherwise that profile prescribes it. ``controller`` None leaves the
-    command to the caller, sample by sample. ``ideal_sensors`` False adds noise and quantisation of the signals,
-    ``late_signals`` True a delay. ``late_readings`` True lets sensors of a walk be whole samples late.
-    ``late_commands`` True adds a dead time before the valve. ``gas`` is the module of what the gas keeps or exchanges.
-
-    Modules of ``engine.step``, or None: ``feed`` is ``lines``, None for constant pressures; ``leg`` is ``walk``, a leg
-    whose foot is free or where the ground and a gait lead it (``angle`` is None then; its sensors are its own), which
-    walks stride after stride, or ``takes_task_sequence``: it stands, starts, changes its speed and stops; ``faults`` is
-    ``failing``, for faults of the plant or a shut-off valve in a walk; ``foot`` is ``foot``, where an unconstrained
-    vane carries one on a ``shank`` that moves by that profile.
-
-    ``is_adaptive`` True divides each step as its error asks, ``rests_whole`` True but one in which a led joint stands
-    still where a locked one takes it whole, ``samples_inside`` True where recorded samples lie between the steps.
-    ``meters`` are updated at every sample that a recording would have, ``traced`` names channels, or paths of the
-    state, that are kept at some of them. ``starts_apart`` True lets the run of each lane begin at a step of its own,
-    while others of the block are under way. ``actuator`` is what stands between the chambers and the joint.
-    ``effects`` act in this order at the ports of their laws. ``controlled`` names what the reference is of.
-    ``has_one_chamber`` True where nothing is measured of chamber 2, which is the dead volume behind a port alone.
+    Attributes:
+        valve, reference, controller: valve, reference profile and controller; without a controller (None), the caller
+            sets the command at each sample
+        angle: profile that prescribes the angle; None for an unconstrained vane or a walk
+        ideal_sensors: False for signals with noise and quantisation
+        late_commands: True for a dead time before the valve
+        gas: module of ``engine.step`` for the gas
+        late_signals: True for delayed signals
+        late_readings: True for sensors of a walk that may be delayed by whole samples
+        leg: module ``walk`` for a walking leg, whose foot is free or led by ground and gait, with sensors of its own
+        takes_task_sequence: True for a leg that stands, starts, changes speed and stops; False for equal strides
+        faults: module ``failing`` for plant faults or a shut-off valve in a walk
+        feed: module ``lines`` for supply lines; None for constant supply pressures
+        is_adaptive: True for steps divided by error control
+        rests_whole: True if a step with a prescribed joint at rest is not divided when a locked joint would not need it
+        samples_inside: True if recorded samples lie inside steps
+        meters: meters, updated at every sample that a recording would have
+        traced: names of channels, or paths of state variables, stored at some of the samples
+        starts_apart: True if each run of a block may start at its own step, while others are in progress
+        actuator: actuator between the chambers and the joint
+        effects: effects, applied in this order at the ports of their laws
+        shank, foot: profile of the shank, and module ``foot``, for a foot carried by an unconstrained vane
+        controlled: name of the quantity that follows the reference
+        has_one_chamber: True if chamber 2 is only the dead volume downstream of a port and is not measured
     """
 
     valve: ValveModel
@@ -144,63 +150,63 @@ class Program:
 
     @property
     def groups_of_plant(self) -> dict[str, PlainFunction]:
-        """Functions of the plant that give groups of parameters, by their names."""
+        """Functions of the plant that compute groups of parameters, by group name."""
         return {name: group.of_plant for name, group in self.groups.items() if group.of_plant is not None}
 
     def step_rows(self) -> dict[str, type]:
-        """Groups of numbers that a phase of a step hands to the later ones, in order."""
+        """Groups of numbers that one phase of a step passes to later phases, in order."""
         return rows_of(self.groups, Role.STEP)
 
     @property
     def functions(self) -> ActuatorFunctions:
-        """Functions of its actuator."""
+        """Functions of the actuator."""
         return functions_of_actuator(self.actuator)
 
     @property
     def warm_functions(self) -> "WarmFunctions":
-        """Functions of its actuator's chambers for gas with an energy balance."""
+        """Functions of the actuator for chambers with an energy balance."""
         from ppafo.engine.scheme.warm_actuators import warm_functions
 
         return warm_functions(self.actuator)
 
     @property
     def has_vane(self) -> bool:
-        """True where the actuator is a vane, whose volumes are the same at every pressure."""
+        """True if the actuator is a vane, whose volumes do not depend on pressure."""
         return self.actuator == VANE
 
     @property
     def shank_jumps(self) -> bool:
-        """True where the acceleration of the shank of that foot jumps at known times."""
+        """True if the acceleration of the prescribed shank jumps at known times."""
         return self.shank is not None and self.shank.until_jump is not None
 
     @property
     def shank_rests(self) -> bool:
-        """True where the shank of that foot never moves."""
+        """True if the prescribed shank never moves."""
         return self.shank is CONSTANT
 
     @property
     def is_on_gait(self) -> bool:
-        """True where a gait leads the shank of a leg, whose knee moves too (``engine/step/foot.py``)."""
+        """True if a gait prescribes the shank, including the motion of the knee (``engine/step/foot.py``)."""
         return self.shank is not None and self.shank.name == "gait"
 
     @property
     def effect_rows(self) -> dict[str, type]:
-        """Groups of rows that the laws of effects may ask for, by their names: parameters, and states."""
+        """Groups of rows available to the laws of effects, by name: parameters and states."""
         return {effect.name: effect.parameters for effect in self.effects} | self.effect_states
 
     @property
     def stated(self) -> dict[str, State]:
-        """States of the effects that have one, by the names of the effects."""
+        """States of effects, by effect name."""
         return {effect.name: effect.state for effect in self.effects if effect.state is not None}
 
     @property
     def stated_with_errors(self) -> dict[str, State]:
-        """States of effects whose error may shorten a step, by the names of the effects."""
+        """States of effects with an error estimate for step control, by effect name."""
         return {name: kind for name, kind in self.stated.items() if kind.tolerances}
 
     @property
     def stated_at_ports(self) -> dict[str, State]:
-        """States of effects that laws take which act on flows and gas, by the names of the effects."""
+        """States of effects used by laws that act on flows and gas, by effect name."""
         ports = (supply_path, exhaust_path, leakage_path, gas_density, ideal_density)
         laws = [(effect, effect.laws[port]) for effect in self.effects for port in ports if port in effect.laws]
         asked = {effect.name for effect, law in laws if effect.state_name in law.__code__.co_varnames}
@@ -213,22 +219,22 @@ class Program:
 
     @property
     def effect_states(self) -> dict[str, type]:
-        """Groups of rows of the states of effects, by their names."""
+        """Groups of rows of the effect states, by name."""
         return {f"{name}_state": kind.row for name, kind in self.stated.items()}
 
     @property
     def is_thermal(self) -> bool:
-        """True where the gas has an energy balance."""
+        """True if the gas has an energy balance."""
         return self.gas.IS_THERMAL
 
     @property
     def has_true_masses(self) -> bool:
-        """True where the true masses of the gas stand beside what ``PlantState`` counts."""
+        """True if true masses of the gas are stored in addition to the masses in ``PlantState``."""
         return self.gas.HAS_TRUE_MASSES
 
     @property
     def walks(self) -> bool:
-        """True where the device is on a walking leg."""
+        """True if the device is on a walking leg."""
         return self.leg is not None
 
     @property
@@ -238,38 +244,38 @@ class Program:
 
     @property
     def moving_meters(self) -> dict[str, MeterKind]:
-        """Groups of meters that change after the first sample: a locked vane never moves."""
+        """Meters that change after the first sample, by group; meters of motion do not change for a locked vane."""
         return {group: kind for group, kind in self.meter_groups.items() if not (self.is_locked and kind.of_motion)}
 
     @property
     def traces(self) -> dict[str, str]:
-        """Path in a lane of each traceable channel that is not a state variable of that name."""
+        """Path in a run of each traceable channel that is not a state variable of the same name."""
         return paths_of_traces(self.state_rows(), self.walks)
 
     @property
     def traced_paths(self) -> dict[int, str]:
-        """Path in a lane of each traced channel, by its index."""
+        """Path in a run of each traced channel, by channel index."""
         paths = self.traces
         return {row: paths.get(name, name) for row, name in enumerate(self.traced)}
 
     @property
     def followed(self) -> str:
-        """Quantity that follows the reference; empty without one: in a walk, the controller makes its own."""
+        """Quantity that follows the reference; empty without a reference, as in a walk."""
         return self.controlled if self.has_reference and not self.walks else ""
 
     @property
     def controlled_value(self) -> PlainFunction:
-        """Function of the controlled quantity, of angle, both pressures and torque."""
+        """Function for the controlled quantity, of angle, both pressures and torque."""
         return CONTROLLED[self.controlled].value
 
     @property
     def wanted(self) -> str:
-        """Quantity with a set-point: of the reference, or of a walking law that requests a torque."""
+        """Quantity with a set-point, given by the reference or by a walking controller that requests a torque."""
         return TORQUE if self.walks and self.requests_torque else self.followed
 
     @property
     def offers(self) -> frozenset[str]:
-        """Properties of the runs that a metric may need beside channels."""
+        """Properties of the runs that a metric may require in addition to channels."""
         has = {
             WALK: self.walks,
             STEADY: not self.takes_task_sequence,
@@ -280,12 +286,12 @@ class Program:
 
     @property
     def chooses_parts(self) -> bool:
-        """True where numbers decide whether steps are taken whole: a locked joint, rigid chambers, and no lines."""
+        """True if numeric values decide whether steps are divided: locked joint, rigid chambers, no supply lines."""
         return self.is_locked and self.feed is None and not self.actuator.gives
 
     @property
     def takes_samples(self) -> bool:
-        """True where meters or traces take samples in the place of a recording."""
+        """True if meters or traces take samples instead of a recording."""
         return bool(self.meters or self.traced)
 
     @property
@@ -295,59 +301,59 @@ class Program:
 
     @property
     def has_level_of_help(self) -> bool:
-        """True where a controller of walking says how much it helps."""
+        """True if the controller of a walk has a level of assistance."""
         return hasattr(getattr(self.initial_controller_state, "safety", None), "level")
 
     @property
     def has_phase(self) -> bool:
-        """True where a controller of walking has a phase of the gait."""
+        """True if the controller of a walk estimates the gait phase."""
         return hasattr(getattr(self.initial_controller_state, "phase", None), "phase")
 
     @property
     def requests_torque(self) -> bool:
-        """True where a controller of walking keeps the torque that it wants."""
+        """True if the controller of a walk stores its requested torque."""
         return REQUEST in leaf_paths(self.state_rows()["controller_state"], "controller_state")
 
     @property
     def has_reference(self) -> bool:
-        """True where the controller follows a reference; a constant command follows none."""
+        """True if the controller follows a reference; a constant command follows none."""
         return self.controller is None or self.controller.name != OPEN_LOOP
 
     @property
     def follows_reference(self) -> bool:
-        """True where a meter needs to know the reference over the whole run."""
+        """True if a meter needs the reference over the whole run."""
         return any(kind.needs_course for kind in self.meters)
 
     @property
     def is_parted(self) -> bool:
-        """True where a step is done in parts."""
+        """True if a step may be divided into parts."""
         return self.is_adaptive or self.samples_inside or self.late_commands or self.late_signals or self.valve.jumps
 
     @property
     def parts_are_rare(self) -> bool:
-        """True where a step is in parts only when a valve jumps inside it: lanes hardly ever wait for others then."""
+        """True if a step is divided only when a valve switches inside it, so that runs rarely wait for others."""
         others = self.is_adaptive or self.samples_inside or self.late_commands or self.late_signals
         return self.valve.jumps and not others
 
     @property
     def is_locked(self) -> bool:
-        """True where the angle is prescribed by a profile that never changes."""
+        """True if the angle is prescribed by a constant profile."""
         return self.angle is CONSTANT
 
     @property
     def keeps_volumes(self) -> bool:
-        """True where the chamber volumes of a locked joint are computed once; all others are treated as moving."""
+        """True if the chamber volumes of a locked joint are computed only once."""
         return self.is_locked and not (self.has_true_masses or self.feed is not None or self.actuator.gives)
 
     @property
     def hands_chambers_on(self) -> bool:
-        """True where the chambers are known as a step begins: once for all, or from the step before."""
+        """True if the chambers are known at the start of a step: constant, or from the previous step."""
         return self.keeps_volumes or self.walks
 
 
 @lru_cache(maxsize=256)
 def groups_of(program: Program) -> Groups:
-    """All groups of numbers of a program by name, in the order of their rows."""
+    """Return all groups of numbers of a program by name, in the order of their rows."""
     leg, feed, faults, shank = program.leg, program.feed, program.faults, program.shank
     is_alone = program.angle is None and leg is None
     controller = program.controller
@@ -395,7 +401,7 @@ def groups_of(program: Program) -> Groups:
 
 
 def place_of_group(program: Program, name: str) -> str:
-    """File and line of the function that declares a group of a component; the name of one of the program's own."""
+    """Return file and line of the function that declares a group of a component; else the name of the group."""
     for part in (program.gas, program.leg, program.faults, program.feed):
         if part is not None and name in part.groups(program):
             code = part.groups.__code__

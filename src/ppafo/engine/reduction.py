@@ -1,9 +1,9 @@
-"""A function of the step for one program: what asks the parts alone is worked out, groups become arguments and results.
+"""Partial evaluation of a step function for one program: known parts are evaluated, groups become parameters.
 
-Three things tell a function of ``engine.step`` from one of the model. ``parts`` is known while it is composed, and with
-it each name that gets its value from nothing else: what asks them alone is worked out here, by Python, so that branches
-and loops over them fall away. ``lane.GROUP`` is a name, which whoever calls the function hands over, as rows of effects
-are. And a group that the function sets is what it returns.
+Functions of ``engine.step`` differ from functions of the model in three ways. ``parts`` is known at composition, and so
+is each name computed from known values only: such expressions are evaluated by Python, so that branches and loops over
+them disappear. ``lane.GROUP`` becomes a parameter passed by the caller, like the rows of effects. A group set by the
+function becomes a return value.
 """
 
 import ast
@@ -25,13 +25,13 @@ from ppafo.errors import ProgramError
 from ppafo.model.binding import made_of
 
 TRACE = "trace"
-"""History of what is shown at samples."""
+"""Name of the history of traced channels."""
 HISTORIES = frozenset({"signal_history", "command_history", TRACE})
-"""Arrays that a lane has a column of; the last of their places is the lane's number."""
+"""Arrays with a column per run; their last index is the index of the run."""
 NUMBER = "lane_number"
-"""Name of the number of a lane in a composed function."""
+"""Name of the run index in a composed function."""
 _GROUP = "@"
-"""Before the name of a group in a reduced function, until names are told apart."""
+"""Prefix of group names in a reduced function, until name conflicts are resolved."""
 _UNKNOWN = object()
 _STATEMENTS = (
     "one sets names or groups of its lane, calls functions that do, decides with 'if', or goes through what parts have"
@@ -39,42 +39,42 @@ _STATEMENTS = (
 
 
 def is_known_part(value: Any) -> bool:
-    """True for what is known while composing and no number, so that a function that is called knows it, too."""
+    """Return whether a value is known at composition and not a number, so that called functions know it too."""
     return value is not _UNKNOWN and type(value) not in (bool, int, float)
 
 
 class Slot(NamedTuple):
-    """Element of a history that a function sets: its indices but the last, in terms of the function's parameters."""
+    """Element of a history that a function sets: all indices except the last, in terms of the function's parameters."""
 
     history: str
     places: tuple[ast.expr, ...]
 
 
 Fields = frozenset[str] | None
-"""Fields of a group that change; None for all of them."""
+"""Fields of a group that change; None for all fields."""
 
 
 @dataclass(slots=True)
 class Effects:
-    """Groups that a function reads from its lane and those that it sets, in order of occurrence.
+    """Groups that a function reads and groups and history elements that it sets, in order of occurrence.
 
-    What it sets are groups, with the fields that change, and numbers of histories.
+    ``groups`` maps each group that is set to the fields that change, ``slots`` each history element to its indices.
     """
 
     reads: dict[str, None] = field(default_factory=dict)
     takes: tuple[str, ...] = ()
-    """Parameters of its own that the function asks."""
+    """Own parameters that the function uses."""
     groups: dict[str, Fields] = field(default_factory=dict)
     slots: dict[str, Slot] = field(default_factory=dict)
 
     @property
     def results(self) -> list[str]:
-        """Names of what the function returns."""
+        """Names of the returned values."""
         return [*self.groups, *self.slots]
 
 
 class FunctionCollector(Protocol):
-    """Collector of composed functions, as the reduction uses it."""
+    """Collector of composed functions, as used by the reduction."""
 
     @property
     def parts(self) -> Any:
@@ -82,23 +82,23 @@ class FunctionCollector(Protocol):
 
     @property
     def rows(self) -> Mapping[str, Any]:
-        """Classes of the groups that have rows."""
+        """Classes of all groups that have rows."""
 
     def add_called(self, inside: FunctionType, called: FunctionType, known: Mapping[str, Any]) -> str:
-        """Add a function that another calls, with what is known of its arguments; return its name in the module."""
+        """Add a function called by another function, with its known arguments; return its name in the module."""
 
     @property
     def kept(self) -> dict[str, Any]:
-        """Values in reduced functions, by the names that stand for them."""
+        """Known values in reduced functions, by their placeholder names."""
 
     def effects_of(self, called: FunctionType) -> Effects:
-        """Groups that a function of the step, which was added, reads and sets."""
+        """Return the groups that an added function of the step reads and sets."""
 
     def handed_to(self, name: str) -> tuple[str, ...]:
-        """Names that a function of the module is handed before its own arguments."""
+        """Return the names passed to a function of the module before its own arguments."""
 
     def note_read(self, scope: Mapping[str, Any], name: str) -> None:
-        """Keep that a name was looked up."""
+        """Record that a name was looked up."""
 
 
 _COMPREHENSIONS = ast.GeneratorExp | ast.ListComp | ast.SetComp | ast.DictComp
@@ -106,14 +106,14 @@ _COMPREHENSIONS = ast.GeneratorExp | ast.ListComp | ast.SetComp | ast.DictComp
 
 @dataclass(slots=True)
 class Definition:
-    """The syntax tree of a function, names that its nodes read, and expressions compiled so far."""
+    """Syntax tree of a function, names read by its nodes, and compiled expressions."""
 
     tree: ast.FunctionDef
     names: dict[int, frozenset[str]] = field(default_factory=dict)
     codes: dict[int, tuple[CodeType, bool]] = field(default_factory=dict)
 
     def read_in(self, node: ast.AST) -> frozenset[str]:
-        """Names that an expression reads and does not set itself."""
+        """Return the names that an expression reads, except names that it sets itself."""
         known = self.names.get(id(node))
         if known is None:
             if isinstance(node, ast.Name):
@@ -126,7 +126,7 @@ class Definition:
         return known
 
     def value(self, node: ast.expr, scope: dict[str, Any], known: dict[str, Any]) -> Any:
-        """The value of an expression."""
+        """Return the value of an expression."""
         if id(node) not in self.codes:
             whole = ast.fix_missing_locations(ast.Expression(node))
             is_nested = any(isinstance(inner, _COMPREHENSIONS) for inner in ast.walk(node))
@@ -139,13 +139,13 @@ class Definition:
 
 
 def names_in(node: ast.AST) -> list[ast.Name]:
-    """Return every name in a tree, where it is read and where it is set."""
+    """Return every name in a tree, read or assigned."""
     return [inner for inner in ast.walk(node) if isinstance(inner, ast.Name)]
 
 
 @lru_cache(maxsize=256)
 def definition_of(function: FunctionType) -> Definition:
-    """The definition of a function of the step. ProgramError where its source cannot be read."""
+    """Return the definition of a function of the step. ProgramError if the source cannot be read."""
     file = sys.modules[function.__module__].__file__ if function.__module__ in sys.modules else None
     definition = _definitions(file or "").get(function.__code__.co_firstlineno)
     if definition is None:
@@ -154,12 +154,12 @@ def definition_of(function: FunctionType) -> Definition:
 
 
 def group_of_name(node: ast.expr) -> str:
-    """Name of the group for which a name in a reduced expression stands; empty for any other expression."""
+    """Return the group of a placeholder name in a reduced expression; empty for any other expression."""
     return node.id.removeprefix(_GROUP) if isinstance(node, ast.Name) and node.id.startswith(_GROUP) else ""
 
 
 def uses_of_group(function: FunctionType, name: str, use: type[ast.expr_context]) -> list[ast.Attribute]:
-    """Reads or assignments of ``lane.NAME`` in a function of the step, in order."""
+    """Return the reads or assignments of ``lane.NAME`` in a function of the step, in order."""
     nodes = [node for node in ast.walk(definition_of(function).tree) if isinstance(node, ast.Attribute)]
     found = [node for node in nodes if node.attr == name and isinstance(node.ctx, use)]
     return [node for node in found if isinstance(node.value, ast.Name) and node.value.id == "lane"]
@@ -167,7 +167,7 @@ def uses_of_group(function: FunctionType, name: str, use: type[ast.expr_context]
 
 @lru_cache(maxsize=64)
 def _definitions(file: str) -> dict[int, ast.FunctionDef]:
-    """Functions of a file by their lines."""
+    """Return the functions of a file by line number."""
     try:
         tree = parse_module(Path(file).read_text(encoding="utf-8"), file)
     except (OSError, SyntaxError):
@@ -176,7 +176,7 @@ def _definitions(file: str) -> dict[int, ast.FunctionDef]:
 
 
 class Reduction:
-    """Reduces one function; ``known`` are names whose values are known, ``parts`` among them."""
+    """Reduction of one function; ``known`` are names with known values, in addition to ``parts``."""
 
     def __init__(self, collector: FunctionCollector, function: FunctionType, known: Mapping[str, Any]) -> None:
         self.collector, self.function = collector, function
@@ -193,11 +193,11 @@ class Reduction:
         self.renamed: dict[str, str] = {}
 
     def refuse(self, where: ast.AST, problem: str) -> ProgramError:
-        """The error for a place in the function."""
+        """Return the error for a node of the function."""
         return refusal(self.function.__code__.co_filename, where, problem)
 
     def reduced(self) -> ast.FunctionDef:
-        """The function, with the groups that it reads as its first parameters, and without what it returns of them."""
+        """Return the function with the groups that it reads as first parameters, without a return of groups."""
         tree = copy(self.definition.tree)
         tree.body = self.block(tree.body)
         taken = {*self.effects.reads, *self.effects.results}
@@ -216,7 +216,7 @@ class Reduction:
     # What is known.
 
     def value_of(self, node: ast.expr) -> Any:
-        """The value of an expression that asks known names alone, one of them at least; else ``_UNKNOWN``."""
+        """Return the value of an expression that depends on known names only, at least one; else ``_UNKNOWN``."""
         read = self.definition.read_in(node)
         if read & self.running or not read & self.known.keys():
             return _UNKNOWN
@@ -227,7 +227,7 @@ class Reduction:
             raise self.refuse(node, f"'{ast.unparse(node)}': {error}") from error
 
     def outside(self, node: ast.expr) -> Any:
-        """Value of an expression outside the function; ``_UNKNOWN`` if it has a value only inside."""
+        """Return the value of an expression outside the function; ``_UNKNOWN`` if the value exists only inside."""
         value = self.value_of(node)
         if value is not _UNKNOWN:
             return value
@@ -240,7 +240,7 @@ class Reduction:
         return _UNKNOWN
 
     def note_reads(self, node: ast.expr) -> None:
-        """Keep which names from outside an expression asks, those of modules too: with another value, all is other."""
+        """Record the outside names in an expression, including module attributes; the text depends on their values."""
         for inner in ast.walk(node):
             if isinstance(inner, ast.Name) and inner.id in self.scope and inner.id not in self.known:
                 self.collector.note_read(self.scope, inner.id)
@@ -250,13 +250,13 @@ class Reduction:
                     self.collector.note_read(vars(owner), inner.attr)
 
     def written(self, value: Any) -> ast.expr:
-        """An expression for a value that is known."""
+        """Return an expression for a known value."""
         if value is None or type(value) in (bool, int, float):
             return ast.Constant(value)
         return self.kept(value)
 
     def kept(self, value: Any) -> ast.Name:
-        """A name that stands for a value."""
+        """Return a placeholder name for a value."""
         name = f"kept_{id(value)}"
         self.collector.kept[name] = value
         return ast.Name(name, ast.Load())
@@ -264,7 +264,7 @@ class Reduction:
     # Expressions.
 
     def visit(self, node: ast.expr) -> ast.expr:
-        """An expression without what is known."""
+        """Return an expression with its known parts evaluated."""
         value = self.value_of(node)
         if value is not _UNKNOWN:
             return ast.copy_location(self.written(value), node)
@@ -272,7 +272,7 @@ class Reduction:
         return ast.copy_location(handler(node), node)
 
     def whole(self, node: ast.expr) -> ast.expr:
-        """An expression whose parts are reduced."""
+        """Return an expression with reduced operands."""
         made = copy(node)
         for name, value in ast.iter_fields(node):
             if isinstance(value, ast.expr):
@@ -282,29 +282,29 @@ class Reduction:
         return made
 
     def part(self, node: ast.AST) -> ast.AST:
-        """Reduction of one operand of an expression."""
+        """Return a reduced operand of an expression."""
         if isinstance(node, ast.keyword):
             return ast.keyword(node.arg, self.visit(node.value))
         return self.visit(node) if isinstance(node, ast.expr) else node
 
     def asked(self, node: ast.expr) -> ast.expr:
-        """A test, which is a constant where it is known."""
+        """Return a reduced condition, which is a constant if known."""
         value = self.value_of(node)
         return self.visit(node) if value is _UNKNOWN else ast.Constant(bool(value))
 
     def of_name(self, node: ast.Name) -> ast.expr:
-        """A name."""
+        """Return a name in its present spelling."""
         return ast.Name(self.renamed.get(node.id, node.id), node.ctx)
 
     def of_ifexp(self, node: ast.IfExp) -> ast.expr:
-        """A choice: the side that is decided on, else both."""
+        """Return the selected side of a known conditional expression, else both sides reduced."""
         test = self.asked(node.test)
         if isinstance(test, ast.Constant):
             return self.visit(node.body if test.value else node.orelse)
         return ast.IfExp(test, self.visit(node.body), self.visit(node.orelse))
 
     def of_boolop(self, node: ast.BoolOp) -> ast.expr:
-        """Reduction of ``and`` and ``or``."""
+        """Return ``and`` or ``or`` with known operands evaluated."""
         ends, made = isinstance(node.op, ast.Or), list[ast.expr]()
         for item in node.values:
             value = self.asked(item)
@@ -318,19 +318,19 @@ class Reduction:
         return made[0] if len(made) == 1 else ast.BoolOp(node.op, made)
 
     def of_unaryop(self, node: ast.UnaryOp) -> ast.expr:
-        """A sign or a negation."""
+        """Return a reduced sign or negation."""
         inner = self.visit(node.operand)
         if isinstance(node.op, ast.Not) and isinstance(inner, ast.Constant):
             return ast.Constant(not inner.value)
         return ast.UnaryOp(node.op, inner)
 
     def of_attribute(self, node: ast.Attribute) -> ast.expr:
-        """A group, or a field."""
+        """Return a group or a field."""
         name = self.group(node)
         return self.read(name) if name else self.whole(node)
 
     def of_subscript(self, node: ast.Subscript) -> ast.expr:
-        """A group by its name, a number of a history, or an item."""
+        """Return a group by its name, an element of a history, or an item."""
         name = self.group(node)
         if name:
             group, *way = name.split(".")
@@ -347,7 +347,7 @@ class Reduction:
         return self.whole(node)
 
     def group(self, node: ast.expr) -> str:
-        """Name of the group, or path in one, that ``lane.GROUP`` or ``lane["GROUP"]`` stands for; else empty."""
+        """Return the group, or the path in a group, of ``lane.GROUP`` or ``lane["GROUP"]``; empty otherwise."""
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "lane":
             return node.attr
         if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "lane":
@@ -358,13 +358,13 @@ class Reduction:
         return ""
 
     def read(self, name: str) -> ast.expr:
-        """The group of a name, handed over unless it was set before."""
+        """Return the name of a group, which becomes a parameter unless it was set before."""
         if name not in self.assigned:
             self.effects.reads[name] = None
         return ast.Name(_GROUP + name, ast.Load())
 
     def of_call(self, node: ast.Call) -> ast.expr:
-        """A call, with what the function is handed."""
+        """Return a call with the additional arguments of the called function."""
         called = self.outside(node.func)
         called, node = self.with_parts(getattr(called, "__wrapped__", called), node)
         if called is getattr:
@@ -389,7 +389,7 @@ class Reduction:
         return ast.Call(function, arguments, named)
 
     def with_parts(self, called: Any, node: ast.Call) -> tuple[Any, ast.Call]:
-        """A function that is called with ``parts=``, as the function with these parts, and the call without them."""
+        """Return a function called with ``parts=`` as a function bound to these parts, and the call without them."""
         given = next((keyword for keyword in node.keywords if keyword.arg == "parts"), None)
         if given is None or not isinstance(called, FunctionType) or is_step_function(called):
             return called, node
@@ -398,7 +398,7 @@ class Reduction:
         return made, ast.copy_location(ast.Call(node.func, node.args, others), node)
 
     def called(self, called: FunctionType, node: ast.Call) -> list[ast.expr]:
-        """Own arguments of a function of the step that is called, which is added to the module."""
+        """Return the own arguments of a called function of the step, and add the function to the module."""
         own = self.own_arguments(called, node)[2:]
         known = {name: self.value_of(value) for name, value in own}
         known = {name: value for name, value in known.items() if is_known_part(value)}
@@ -409,7 +409,7 @@ class Reduction:
         return [self.visit(value) for name, value in own if name in effects.takes]
 
     def own_arguments(self, called: FunctionType, node: ast.Call) -> list[tuple[str, ast.expr]]:
-        """Arguments of a call of a function of the step by name, in its order. ProgramError where they do not fit."""
+        """Return the arguments of a call of a step function by name, in order. ProgramError if they do not match."""
         names = called.__code__.co_varnames[: called.__code__.co_argcount]
         given = dict(zip(names, node.args, strict=False))
         named = {keyword.arg: keyword.value for keyword in node.keywords if keyword.arg is not None}
@@ -419,7 +419,7 @@ class Reduction:
         return [(name, given[name]) for name in names]
 
     def arguments(self, node: ast.expr) -> Iterator[ast.expr]:
-        """An argument, or those that ``*(... for ... in ...)`` stands for."""
+        """Yield an argument, or the arguments of an expanded ``*(... for ... in ...)``."""
         if not isinstance(node, ast.Starred) or not isinstance(node.value, ast.GeneratorExp):
             yield self.visit(node)
             return
@@ -433,7 +433,7 @@ class Reduction:
             yield made
 
     def items_of(self, node: ast.expr) -> list[Any]:
-        """The items of what is gone through, which must be known."""
+        """Return the items of an iterable, which must be known."""
         if self.definition.read_in(node) & self.running:
             raise self.refuse(node, f"'{ast.unparse(node)}' is not known while this is composed")
         return list(self.definition.value(node, self.scope, self.known))
@@ -441,7 +441,7 @@ class Reduction:
     # Statements.
 
     def block(self, statements: Iterable[ast.stmt]) -> list[ast.stmt]:
-        """Some statements; what stands behind a ``return`` that is decided on is never reached."""
+        """Return reduced statements, without statements after a certain ``return``."""
         made: list[ast.stmt] = []
         for statement in statements:
             made += [ast.copy_location(line, statement) for line in self.statement(statement)]
@@ -450,7 +450,7 @@ class Reduction:
         return made
 
     def statement(self, node: ast.stmt) -> list[ast.stmt]:
-        """Reduction of a statement."""
+        """Return a reduced statement."""
         match node:
             case ast.Expr(value=ast.Call() as call):
                 return self.call_that_sets(call)
@@ -473,7 +473,7 @@ class Reduction:
         raise self.refuse(node, f"'{line}' is not a supported statement of a phase: {_STATEMENTS}")
 
     def branch(self, node: ast.If) -> list[ast.stmt]:
-        """A decision: of the parts one branch alone, else a group that only one of both sets is also read."""
+        """Reduce an ``if`` to one branch if the condition is known; else groups set in one branch are also read."""
         test = self.asked(node.test)
         if isinstance(test, ast.Constant):
             return self.block(node.body if test.value else node.orelse)
@@ -487,7 +487,7 @@ class Reduction:
         return [ast.If(test, body or [ast.Pass()], otherwise)]
 
     def unrolled(self, node: ast.For) -> list[ast.stmt]:
-        """A loop over what is known, written out."""
+        """Expand a loop over known items."""
         made: list[ast.stmt] = []
         # Names that live in one turn have another spelling in each: what they stand for may have another class.
         begun = {name.id for name in names_in(self.definition.tree) if name.lineno < node.lineno}
@@ -507,7 +507,7 @@ class Reduction:
         return made
 
     def assignment(self, target: ast.expr, value: ast.expr) -> list[ast.stmt]:
-        """A value for names, groups, or a number of a history."""
+        """Reduce an assignment to names, groups or history elements."""
         if isinstance(target, ast.Name) and self.times_set[target.id] == 1:
             known = self.value_of(value)
             if known is not _UNKNOWN:
@@ -532,12 +532,12 @@ class Reduction:
         return [ast.Assign([ast.Tuple([*left], ast.Store()) if isinstance(target, ast.Tuple) else left[0]], written)]
 
     def crosses(self, target: ast.Tuple, value: ast.Tuple) -> bool:
-        """True where one of several values reads what another sets."""
+        """Return whether any of several values reads a target of the same assignment."""
         names = {ast.unparse(element) for element in target.elts}
         return any(ast.unparse(element) in names for part in value.elts for element in ast.walk(part))
 
     def set_target(self, target: ast.expr, fields: Fields) -> ast.Name:
-        """A name for what is set."""
+        """Return the name for an assignment target."""
         name = self.group(target)
         if name:
             self.note_set(name, fields)
@@ -555,27 +555,27 @@ class Reduction:
         return ast.Name(self.renamed.get(target.id, target.id), ast.Store())
 
     def note_set(self, name: str, fields: Fields) -> None:
-        """Note a group that is set, and which of its fields change."""
+        """Record a group that is set, and the fields that change."""
         known = self.effects.groups.get(name, frozenset())
         self.effects.groups[name] = None if known is None or fields is None else known | fields
         self.assigned.add(name)
 
     def note_slot(self, name: str, slot: Slot, where: ast.AST) -> None:
-        """Note a number of a history that is set. ProgramError for a place that the loop over steps does not know."""
+        """Record a history element that is set. ProgramError for indices unknown to the loop over steps."""
         if any(name.id not in self.parameters for index in slot.places for name in names_in(index)):
             raise self.refuse(where, "where a history is set must be a parameter, or a field of one")
         self.effects.slots[name] = slot
         self.assigned.add(name)
 
     def fields_changed(self, target: ast.expr, value: ast.expr) -> Fields:
-        """Fields of a group that an assignment changes: those that ``_replace`` of the same group gives, else all."""
+        """Return the fields of a group changed by an assignment: the arguments of its ``_replace``, else all."""
         if not isinstance(value, ast.Call) or not isinstance(value.func, ast.Attribute):
             return None
         is_part = value.func.attr == "_replace" and self.group(target) == self.group(value.func.value) != ""
         return frozenset(keyword.arg for keyword in value.keywords if keyword.arg is not None) if is_part else None
 
     def row_of(self, kind: Any, numbers: Iterator[ast.expr]) -> ast.expr:
-        """A row, nested or not, of the next of some numbers, as ``rebuilt`` makes it."""
+        """Return an expression for a row, nested or not, from the next numbers, as constructed by ``rebuilt``."""
         if is_number(kind):
             return next(numbers)
         inner = [self.row_of(inside, numbers) for _, inside in members(kind)]
@@ -584,14 +584,14 @@ class Reduction:
         return ast.Call(self.kept(kind), inner, [])
 
     def numbers_of(self, kind: Any, row: ast.expr) -> Iterator[ast.expr]:
-        """Expressions of the numbers of a row, nested or not, in their order."""
+        """Yield the expressions of the numbers of a row, nested or not, in order."""
         if is_number(kind):
             yield row
         for way, inside in members(kind):
             yield from self.numbers_of(inside, self.part_of(row, way))
 
     def part_of(self, owner: ast.expr, way: str) -> ast.expr:
-        """A field or an item of a row; of one that is known it is known."""
+        """Return a field or an item of a row; evaluated if the row is known."""
         key = int(way[1:-1]) if way[0] == "[" else way[1:]
         if isinstance(owner, ast.Name) and owner.id in self.collector.kept:
             value = self.collector.kept[owner.id]
@@ -601,7 +601,7 @@ class Reduction:
         return ast.Attribute(owner, key, ast.Load())
 
     def call_that_sets(self, node: ast.Call) -> list[ast.stmt]:
-        """A call of a function that sets groups of its lane: these get what it returns."""
+        """Reduce a call of a function that sets groups: its return values are assigned to these groups."""
         called = self.outside(node.func)
         if not is_step_function(called):
             raise self.refuse(node, f"'{ast.unparse(node)}' discards its return value")
@@ -629,17 +629,17 @@ class Reduction:
 
 
 def _places(node: ast.Subscript) -> Sequence[ast.expr]:
-    """Places of an element."""
+    """Return the indices of an element."""
     return node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
 
 
 def _bound(body: Iterable[ast.stmt]) -> set[str]:
-    """Names that some statements give values."""
+    """Return the names that some statements assign."""
     return {name.id for statement in body for name in names_in(statement) if isinstance(name.ctx, ast.Store)}
 
 
 def with_arguments(expression: ast.expr, arguments: Mapping[str, ast.expr]) -> ast.expr:
-    """An expression of a function with the expressions that its caller gives in place of its arguments."""
+    """Return an expression of a function with its parameters replaced by the caller's argument expressions."""
 
     class Replacing(ast.NodeTransformer):
         def visit_Name(self, node: ast.Name) -> ast.expr:
@@ -651,12 +651,12 @@ def with_arguments(expression: ast.expr, arguments: Mapping[str, ast.expr]) -> a
 
 @dataclass(slots=True)
 class _Renaming(ast.NodeTransformer):
-    """Gives groups their names, and local names that some group has another one."""
+    """Transformer that inserts group names, and renames local names that conflict with a group."""
 
     hidden: set[str]
 
     def spelling(self, name: str) -> str:
-        """The name in the module."""
+        """Return the name in the module."""
         return f"{name}_" if name in self.hidden else name
 
     def visit_Name(self, node: ast.Name) -> ast.expr:

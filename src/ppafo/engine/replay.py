@@ -1,6 +1,6 @@
-"""Devices on recorded inputs: the command and any parameter that changed meanwhile, step by step.
+"""Simulation of devices with recorded inputs: the command and any parameters that vary, step by step.
 
-A run goes on its own between two changes, so that a recording with a constant supply costs only a few calls.
+Between two changes of the inputs a run proceeds without interruption, so that constant inputs cost only a few calls.
 """
 
 import math
@@ -19,11 +19,11 @@ from ppafo.engine.rows import row_numbers
 Floats = NDArray[np.float64]
 
 COMMAND = "result.command"
-"""Path of the command in force among the states of a program."""
+"""Path of the present command among the states of a program."""
 
 
 class AngleSegment(NamedTuple):
-    """A straight piece of a recorded angle: a time [s], the angle [rad] then, and the angular velocity [rad/s]."""
+    """Linear segment of a recorded angle: start time [s], angle at the start [rad], and angular velocity [rad/s]."""
 
     start: float
     level: float
@@ -31,12 +31,12 @@ class AngleSegment(NamedTuple):
 
 
 def segment_value(segment: AngleSegment, time: float) -> tuple[float, float, float]:
-    """Angle [rad], angular velocity [rad/s] and angular acceleration [rad/s^2] at a time [s] on a straight piece."""
+    """Angle [rad], angular velocity [rad/s] and angular acceleration [rad/s^2] on a linear segment at a time [s]."""
     return segment.level + segment.rate * (time - segment.start), segment.rate, 0.0
 
 
 def segment_bounds(_segment: AngleSegment) -> tuple[float, float]:
-    """Bounds [rad] of a segment: none, because the next one may lead anywhere between the stops."""
+    """Bounds [rad] of a segment: none, because the next segment may lead to any angle between the stops."""
     return -math.inf, math.inf
 
 
@@ -48,26 +48,26 @@ RECORDED_ANGLE = ProfileKind(
     value=segment_value,
     bounds=segment_bounds,
 )
-"""Not in the catalogue: a scenario file cannot name it, because its values come from a recording.
+"""Profile outside the catalogue: a scenario file cannot name it, because its values come from a recording.
 
-Where it is the angle of a program, its parameters are ``path.start``, ``.level`` and ``.rate``.
+If it prescribes the angle of a program, its parameters are ``path.start``, ``.level`` and ``.rate``.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class StepInputs:
-    """Inputs of every step of a run, which all devices of a batch get alike."""
+    """Inputs of every step of a run, identical for all devices of a batch."""
 
     command: Floats | None
-    """The command of each step (steps,) [-]; None leaves it to the controller of the program."""
+    """Command of each step (steps,) [-]; None leaves the command to the controller of the program."""
     parameters: Mapping[str, Floats]
     """Values of each step (steps,) [SI] by the path of a parameter such as ``plant.supply_pressure``."""
 
 
 def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
-    """Run the devices of a batch on the same recorded inputs.
+    """Run the devices of a batch with the same recorded inputs.
 
-    With a command, the program must leave it to the caller. KeyError for the path of a parameter that it has not.
+    If a command is given, the program must have no controller. Raises KeyError for the path of an unknown parameter.
     """
     runs, lanes = batch.states.shape[1], lanes_of(batch.program)
     blocks = [slice(first, min(first + lanes, runs)) for first in range(0, runs, lanes)]

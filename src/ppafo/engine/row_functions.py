@@ -1,4 +1,4 @@
-"""Plain functions of rows and numbers, called with arrays: compiled, or run by Python where no compiler works."""
+"""Functions of rows and numbers, called with arrays: compiled, or run by Python without a working compiler."""
 
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -13,10 +13,10 @@ from ppafo.model.declaration import PlainFunction
 
 
 def row_functions(*functions: PlainFunction) -> list[Callable[..., None]]:
-    """Return each function as one of arrays: of the numbers of its rows, then of its result, then its own numbers.
+    """Return each function with array arguments: numbers of its rows, numbers of its result, then its own numbers.
 
-    Its parameters are annotated as NamedTuple classes of floats or as ``float``, its result as a NamedTuple class,
-    whose numbers are written into the array.
+    Parameters must be annotated as NamedTuple classes of floats or as ``float``, the result as a NamedTuple class. The
+    numbers of the result are written into the array.
     """
     module = compiled(row_source(functions))
     if module is None:
@@ -30,7 +30,7 @@ def _entry_name(function: PlainFunction) -> str:
 
 @cache
 def row_source(functions: Sequence[PlainFunction]) -> str:
-    """Return the module whose entries are functions of arrays, as ``row_functions`` has them."""
+    """Return the module whose entries are the array functions of ``row_functions``."""
     collector, entries = SourceCollector(INLINE), []
     for function in functions:
         hints = get_type_hints(function)
@@ -49,7 +49,7 @@ def row_source(functions: Sequence[PlainFunction]) -> str:
 
 
 def _by_python(function: PlainFunction) -> Callable[..., None]:
-    """Return a function of arrays that Python runs, with what compiled code gives where Python would raise."""
+    """Return an array function run by Python, with the results of compiled code where Python would raise."""
     kinds = [kind for name, kind in get_type_hints(function).items() if name != "return"]
     own, rows = PythonFunctions({}, {}, {}, GOING_ON).of(function), sum(map(is_row, kinds))
 

@@ -1,7 +1,7 @@
-"""NamedTuples of numbers, nested or not, in a row: the paths of their numbers, and the way there and back.
+"""NamedTuples of numbers, nested or not, as flat rows: paths of the numbers, and conversion in both directions.
 
-A path such as ``state.angle`` or ``law.knots[3]`` names a number; nested rows stand in their place. A field that is a
-tuple of a fixed length is declared as ``Annotated[tuple[float, ...], 16]``, of floats or of NamedTuples.
+A path such as ``state.angle`` or ``law.knots[3]`` names a number; nested rows are expanded in place. A field that is a
+tuple of fixed length is declared as ``Annotated[tuple[float, ...], 16]``, of floats or of NamedTuples.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -15,20 +15,20 @@ from ppafo.model.declaration import number_of
 
 
 class Member(NamedTuple):
-    """A part of a row: what its path ends with (``.name``, ``[3]``), and its type."""
+    """Member of a row: the end of its path (``.name``, ``[3]``), and its type."""
 
     access: str
     kind: Any
 
 
 def is_row(candidate: object) -> bool:
-    """True for a NamedTuple class, of whose numbers a row of a lane is made."""
+    """Return whether an object is a NamedTuple class."""
     return isinstance(candidate, type) and issubclass(candidate, tuple) and hasattr(candidate, "_fields")
 
 
 @cache
 def members(row: Any) -> tuple[Member, ...]:
-    """The parts of a NamedTuple class, or of a declared tuple of a fixed length; none of anything else."""
+    """Return the members of a NamedTuple class, or of a declared tuple of fixed length; empty for anything else."""
     if is_row(row):
         hints = get_type_hints(row, include_extras=True)
         # Unit and range of a declared number are for files: here it is a float.
@@ -42,12 +42,12 @@ def members(row: Any) -> tuple[Member, ...]:
 # Far more than the classes of a process: this is asked again and again while texts are composed.
 @lru_cache(maxsize=4096)
 def is_number(row: Any) -> bool:
-    """True for the type of a single number, false for a NamedTuple class or a declared tuple."""
+    """Return whether a type is a single number, rather than a NamedTuple class or a declared tuple."""
     return not is_row(row) and get_origin(row) is not Annotated
 
 
 def leaf_paths(row: Any, prefix: str) -> list[str]:
-    """Paths of all numbers of a NamedTuple class (or of a float), in order, each beginning with ``prefix``."""
+    """Return the paths of all numbers of a NamedTuple class (or of a float) in order, with the prefix ``prefix``."""
     return list(_leaf_paths(row, prefix))
 
 
@@ -59,15 +59,15 @@ def _leaf_paths(row: Any, prefix: str) -> tuple[str, ...]:
 
 
 def row_numbers(groups: Mapping[str, type], first: int = 0) -> dict[str, int]:
-    """Number of the row of each number of some groups, by its path, from row ``first`` on."""
+    """Return the row index of each number of some groups by path, counted from ``first``."""
     paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
     return {path: number for number, path in enumerate(paths, first)}
 
 
 def row_expression(row: Any, path: str, cells: Mapping[str, str], name_of: Callable[[type], str]) -> str:
-    """Source text that makes a NamedTuple (or a float) of a path; an empty one is ``()``.
+    """Return source text that constructs a NamedTuple (or a float) at a path; ``()`` for an empty NamedTuple.
 
-    ``cells`` has the expression of each number by its path, ``name_of`` gives the name of a class in the text.
+    ``cells`` has the expression of each number by path, ``name_of`` returns the name of a class in the text.
     """
     if is_number(row):
         return cells[path]
@@ -78,7 +78,7 @@ def row_expression(row: Any, path: str, cells: Mapping[str, str], name_of: Calla
 
 
 def leaves(row: Any) -> list[Any]:
-    """All numbers of a NamedTuple, floats or arrays (runs,), in the order of ``leaf_paths``."""
+    """Return all numbers of a NamedTuple, floats or arrays (runs,), in the order of ``leaf_paths``."""
     values: list[Any] = []
     for value in row:
         values += leaves(value) if isinstance(value, tuple) else [value]
@@ -86,12 +86,12 @@ def leaves(row: Any) -> list[Any]:
 
 
 def numbers(row: Any) -> list[float]:
-    """All numbers of a NamedTuple of floats, in the units of its fields, in the order of ``leaf_paths``."""
+    """Return all numbers of a NamedTuple of floats, in field units, in the order of ``leaf_paths``."""
     return [float(value) for value in leaves(row)]
 
 
 def rebuilt(row: Any, values: Iterable[Any]) -> Any:
-    """The NamedTuple of a class with the next of ``values``, floats or arrays, as its numbers: undoes ``leaves``."""
+    """Return a NamedTuple of a class from the next ``values``, floats or arrays; the inverse of ``leaves``."""
     # Of an iterator this is the iterator itself: nested rows go on where the one before ended.
     rest = iter(values)
     if is_number(row):
@@ -101,9 +101,9 @@ def rebuilt(row: Any, values: Iterable[Any]) -> Any:
 
 
 def group_of(name: str, groups: Mapping[str, type], rows: "np.ndarray[Any, np.dtype[np.float64]]") -> Any:
-    """The NamedTuple of one of the ``groups`` that lie in ``rows`` (numbers, runs), with arrays (runs,).
+    """Return the NamedTuple of one of the ``groups`` stored in ``rows`` (numbers, runs), with arrays (runs,).
 
-    KeyError where no group has that name.
+    Raises KeyError for an unknown group name.
     """
     start = 0
     for group, row in groups.items():
@@ -115,7 +115,7 @@ def group_of(name: str, groups: Mapping[str, type], rows: "np.ndarray[Any, np.dt
 
 
 def of_each(function: Callable[..., Any], *rows: Any) -> Any:
-    """Result of a function of NamedTuples of floats; run by run if their fields are arrays (runs,)."""
+    """Return the result of a function of NamedTuples of floats; evaluated run by run if fields are arrays (runs,)."""
     kinds, numbers = [type(row) for row in rows], leaves(rows)
 
     def from_numbers(*numbers: float) -> Any:

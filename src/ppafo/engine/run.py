@@ -1,4 +1,4 @@
-"""Run as values: input of both the lanes and the reference solver."""
+"""Values that define a run, used by the compiled engine and by the reference solver."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -37,20 +37,21 @@ Floats = NDArray[np.float64]
 
 NEVER_FAILED = 1.0e300
 AT_REST = LaneResult(command=0.0, failure_time=NEVER_FAILED, too_many_parts=0.0)
-"""A device before its first step."""
+"""Result of a device before its first step."""
 TOO_MANY_PARTS = (
     f"a step was cut into {MAXIMUM_PARTS:,} parts and was still not done: try a smaller run.step, and check the delays "
     "of the valve, the inertia and the volumes (ppafo sets audit)"
 )
-"""Remedy for a run that ``LaneResult.too_many_parts`` ended."""
+"""Remedy for a run ended by ``LaneResult.too_many_parts``."""
 WHOLE = 1.0e-9
 
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """A leg that a gait leads; ``task_sequence`` None where it walks stride after equal stride.
+    """Leg that follows a gait.
 
-    ``failing`` are the faults of the plant and its shut-off valve, None where it has neither.
+    ``task_sequence`` is None for equal strides. ``failing`` are the faults of the plant and its shut-off valve; None
+    without both.
     """
 
     leg: "LegParameters"
@@ -64,7 +65,7 @@ class Walk:
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """Groups of parameters of the leg and what leads it, by name."""
+        """Groups of parameters of the leg and its gait, by name."""
         failing = {} if self.failing is None else dict(zip(("plant_faults", "shut_off"), self.failing, strict=True))
         return {
             "leg": self.leg,
@@ -78,14 +79,14 @@ class Walk:
 
     @property
     def states(self) -> dict[str, Any]:
-        """Groups of states at the start, by name."""
+        """Groups of initial states, by name."""
         powered = {} if self.failing is None else {"unpowered": kind_at("ppafo.model.shut_off:POWERED")}
         return {"walk": self.initial, "gait_seen": NOTHING_SEEN, **powered}
 
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """Supply lines behind regulators; the regulators are set to the supply pressures of the plant."""
+    """Supply lines behind regulators, whose set pressures are the supply pressures of the plant."""
 
     parameters: "SupplyLines"
     initial: "LineState"
@@ -93,14 +94,14 @@ class Lines:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A device in one experiment, SI units.
+    """Device in one experiment, in SI units.
 
-    ``step`` divides ``period`` (of the controller). ``valve``, ``controller``, ``reference`` and ``path`` are the
-    parameters of the program's pieces, () where it has none. Delays are in seconds. ``tolerance`` is the error over
-    the one that a run is allowed by default. ``effects`` are the rows of those of the program, in their order. Where
-    one ``Run`` stands for an ensemble, any number in it, whole ones and truth values too, may be an array (runs,);
-    ``needs_parts`` and ``record_every`` then say which of the runs have a program that is adaptive, or that has samples
-    inside its steps, whatever ``program`` says.
+    ``step`` divides the controller ``period``. ``valve``, ``controller``, ``reference`` and ``path`` are the parameters
+    of the program's components, () without parameters. Delays are in seconds. ``tolerance`` is the allowed error
+    divided by the default allowed error. ``effects`` are the rows of the program's effects, in their order. For an
+    ensemble, any number in one ``Run``, including integers and truth values, may be an array (runs,). ``needs_parts``
+    and ``record_every`` then determine which runs have an adaptive program or a program with samples inside its steps,
+    whatever ``program`` states.
     """
 
     program: Program
@@ -129,31 +130,31 @@ class Run:
 
     @property
     def period(self) -> float:
-        """Time between two samples of the controller [s]."""
+        """Sampling period of the controller [s]."""
         return self.step * self.steps_per_sample
 
 
 def whole_and_rest(delay: float, step: float) -> tuple[float, float]:
-    """Whole steps in a delay [s] and the rest as a share of a step; either may be an array (runs,)."""
+    """Whole steps in a delay [s], and the remainder as a fraction of a step; either may be an array (runs,)."""
     steps = delay / step
     complete = truncated(steps + WHOLE)
     return complete, larger(0.0, steps - complete)
 
 
 def batch_of(run: Run) -> Batch:
-    """A run as a batch of one lane."""
+    """Return a run as a batch of one run."""
     return batches_of(run, 1)[0][1]
 
 
 def state_row_numbers(run: Run) -> dict[str, int]:
-    """Row of each number of the state, by its path such as ``state.angle``."""
+    """Return the row index of each number of the state, by path such as ``state.angle``."""
     return row_numbers(run.program.state_rows())
 
 
 def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
-    """Batches of ``runs`` runs of one program, those of one clock together, each with the places of its runs.
+    """Return batches of ``runs`` runs of one program, one batch per clock, each with the indices of its runs.
 
-    Any number in ``run`` may be an array (runs,), one for each run.
+    Any number in ``run`` may be an array (runs,), one value per run.
     """
     program = run.program
     command_steps, command_lag = whole_and_rest(run.command_delay, run.step)
@@ -189,7 +190,7 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
 
 
 def _parameters_of(run: Run, timing: LaneTiming) -> dict[str, Any]:
-    """Groups of parameters of a run, by name."""
+    """Return the groups of parameters of a run, by name."""
     return {
         "timing": timing,
         "plant": run.plant,
@@ -208,7 +209,7 @@ def _parameters_of(run: Run, timing: LaneTiming) -> dict[str, Any]:
 
 
 def _states_of(run: Run) -> dict[str, Any]:
-    """Groups of states of a run at its start, by name."""
+    """Return the groups of initial states of a run, by name."""
     program = run.program
     return {
         "result": AT_REST,
@@ -224,10 +225,10 @@ def _states_of(run: Run) -> dict[str, Any]:
 
 
 def _alike_together(run: Run, runs: int, members: Members) -> Members:
-    """Order of some runs in which those beside each other do the same at about the same time.
+    """Return an order of runs in which neighbouring runs do similar things at about the same time.
 
-    Lanes of a block wait for the slowest at every step. When a vane moves depends on how long the valve takes to move
-    the gas.
+    The runs of a block wait for the slowest at every step. The time at which a vane moves depends on how long the valve
+    takes to move the gas.
     """
     plant = run.plant
     gas = (
@@ -238,7 +239,7 @@ def _alike_together(run: Run, runs: int, members: Members) -> Members:
 
 
 def gas_at_start(run: Run) -> Any:
-    """State that the gas of a run has beside ``PlantState`` at its beginning; of columns for each run."""
+    """Return the initial state of the gas in addition to ``PlantState``; with columns if the run has columns."""
     program, start = run.program, run.program.gas.START
     if start is None:
         return NoParameters()
@@ -255,7 +256,7 @@ def gas_at_start(run: Run) -> Any:
 
 
 def states_at_start(run: Run) -> list[Any]:
-    """States of the effects of a run at its beginning, in the order of the program; of columns for each run."""
+    """Return the initial effect states of a run, in the order of the program; with columns if the run has columns."""
     initial, program = run.initial, run.program
     if not program.effect_states:
         return []
@@ -269,13 +270,13 @@ def states_at_start(run: Run) -> list[Any]:
 
 
 def moment_at_start(plant: PlantParameters, initial: PlantState, *, parts: ActuatorFunctions) -> PlantSnapshot:
-    """State of the plant that effects depend on, at the start of the run."""
+    """Return the state of the plant for effects at the start of the run."""
     pressure_1, pressure_2 = parts.pressures(plant, initial.angle, initial.mass_1, initial.mass_2)
     return _at_rest(initial, pressure_1, pressure_2)
 
 
 def _at_rest(initial: PlantState, pressure_1: float, pressure_2: float) -> PlantSnapshot:
-    """The moment of a state with absolute pressures [Pa], before anything flows."""
+    """Return a state of the plant with absolute pressures [Pa] and no flow."""
     return PlantSnapshot(
         angle=initial.angle,
         angular_velocity=initial.angular_velocity,
@@ -288,7 +289,7 @@ def _at_rest(initial: PlantState, pressure_1: float, pressure_2: float) -> Plant
 
 
 def run_together(runs: Sequence[Run], threads: int | None = None) -> list[BatchResult]:
-    """Results of many runs, each exactly as if it ran alone; those of one program and clock share blocks."""
+    """Return the results of many runs, each identical to a separate run; runs of one program and clock share blocks."""
     batches = [batch_of(run) for run in runs]
     groups: dict[tuple[Program, Clock], list[int]] = {}
     for index, batch in enumerate(batches):

@@ -1,8 +1,8 @@
-"""Collects pure functions, with all they call, into the text of one stand-alone compiled module.
+"""Collection of pure functions, with all functions that they call, into the text of one stand-alone compiled module.
 
-The text holds everything that decides the machine code, so its hash names the module: a second start finds the
-compiled code on disk, and a change anywhere in the physics gives another name and is compiled anew. What would run
-otherwise than in Python is refused, in terms of the file that it was written in.
+The text contains everything that determines the machine code, so that its hash identifies the module. A second start
+finds the compiled code on disk; any change of the physics gives another hash and a new compilation. Code that would
+behave differently from Python is refused, with the file and line of its source.
 """
 
 import ast
@@ -24,7 +24,7 @@ from ppafo.wording import one_line
 
 
 class Read(NamedTuple):
-    """A name that was looked up while composing, and what it stood for."""
+    """Name that was looked up during composition, and its value."""
 
     scope: Mapping[str, Any]
     name: str
@@ -32,7 +32,7 @@ class Read(NamedTuple):
 
 
 class Made(NamedTuple):
-    """A function as it was when it was composed."""
+    """Function as it was at composition."""
 
     function: Any
     code: CodeType
@@ -41,7 +41,7 @@ class Made(NamedTuple):
 
 
 def composed_lines(lines: Iterable[str], needs: Mapping[str, tuple[str, ...]]) -> list[str]:
-    """Lines of the text around a module, in which calls hand over the rows of effects that functions need."""
+    """Lines of the text around a module, in which calls pass the rows of effects that functions need."""
     if not needs:
         return list(lines)
     calls = re.compile(rf"\b({'|'.join(map(re.escape, needs))})\(")
@@ -50,13 +50,13 @@ def composed_lines(lines: Iterable[str], needs: Mapping[str, tuple[str, ...]]) -
 
 @dataclass(slots=True)
 class MadeFrom:
-    """Names that were read and functions that were composed for a text, by which it stays current or not."""
+    """Names read and functions composed for a text, which determine whether the text is up to date."""
 
     reads: list[Read] = field(default_factory=list)
     functions: list[Made] = field(default_factory=list)
 
     def is_current(self) -> bool:
-        """True while every name stands for what it stood for, and every function is what it was."""
+        """Return whether all names and functions still have the values used at composition."""
         return all(read.scope.get(read.name, read) is read.value for read in self.reads) and all(
             made.function.__code__ is made.code
             and made.function.__defaults__ is made.defaults
@@ -67,12 +67,12 @@ class MadeFrom:
 
 @dataclass(slots=True)
 class SourceCollector:
-    """Gathers definitions in the order in which they must stand; ``adapt`` may write a definition in another way.
+    """Collector of definitions in dependency order; ``adapt`` may rewrite a definition.
 
-    Where a function is among ``links``, the one that it is linked to is added and called in its place; a link under a
-    pair holds inside the first of it, one under a row and ``"_replace"`` is the class that ``row._replace`` makes. The
-    ``effects`` are laws with the rows that they ask for: whoever calls one is handed these rows in its turn, and so on
-    up to the text around the module (``needs``, ``composed_lines``).
+    If a function is a key of ``links``, the linked function is added and called instead. A link with a pair as key
+    applies only inside the first function of the pair; a link with the key (row, ``"_replace"``) is the class
+    constructed by ``row._replace``. ``effects`` maps laws to the rows that they need. Callers of a law receive these
+    rows in turn, up to the text around the module (``needs``, ``composed_lines``).
     """
 
     decorator: str
@@ -85,11 +85,11 @@ class SourceCollector:
     needs: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def add(self, function: PlainFunction | type) -> str:
-        """Add a function or NamedTuple class and all that it needs; return the name it has in the module."""
+        """Add a function or NamedTuple class and all its dependencies; return its name in the module."""
         return self._add(self.links.get(function, function))
 
     def _add(self, item: Any) -> str:
-        """Add the function or NamedTuple class itself, not what it is linked to. ProgramError where it cannot be."""
+        """Add a function or NamedTuple class itself, not the linked one. ProgramError if it cannot be compiled."""
         if not is_row(item):
             check_is_plain(item)
         name = emitted_name(item)
@@ -109,26 +109,26 @@ class SourceCollector:
         return name
 
     def text(self) -> str:
-        """All definitions, callees first."""
+        """Return all definitions, called functions first."""
         return "\n\n\n".join(self.definitions.values())
 
     def note_read(self, scope: Mapping[str, Any], name: str, value: Any) -> None:
-        """Keep that a name was looked up while composing, and what it stood for."""
+        """Record a name that was looked up during composition, and its value."""
         self.made_from.reads.append(Read(scope, name, value))
 
     def stands_for(self, row: Any) -> Any:
-        """The class that a declared row has in this module."""
+        """Return the class that replaces a declared row in this module."""
         return self.links.get((row, "_replace"), row)
 
     def decorated(self, tree: ast.FunctionDef, file: str) -> str:
-        """The text of a function that is composed, with the lines of its file."""
+        """Return the text of a composed function, with the line numbers of its source file."""
         lines = " ".join(map(str, [tree.lineno, *source_lines(tree.body), (tree.end_lineno or tree.lineno) + 1]))
         return f"{ORIGIN} {one_line(file)}: {lines}\n{self.decorator}\n{ast.unparse(tree)}"
 
     def _function_text(self, function: FunctionType, name: str) -> str:
-        """The text of a function under its name in the module; all that it calls is added before.
+        """Return the text of a function under its name in the module; called functions are added first.
 
-        ProgramError where something in it cannot be compiled, or where it calls itself.
+        Raises ProgramError if the function contains code that cannot be compiled, or calls itself.
         """
         tree = parse_definition(function, self.adapt)
         # Before its body is read, so that one met again inside it calls itself.
@@ -167,7 +167,7 @@ class SourceCollector:
         return self.decorated(tree, function.__code__.co_filename)
 
     def add_inside(self, function: Any, called: Any) -> str:
-        """Add what a function calls; a law of an effect that calls its own port gets what was there before it."""
+        """Add a function called inside another; a law that calls its own port gets the port's previous function."""
         if (function, called) in self.links:
             return self._add(self.links[function, called])
         if called in self.effects and isinstance(called, FunctionType):
@@ -178,7 +178,7 @@ class SourceCollector:
 
 
 def _compose_parameters(composer: Composer, tree: ast.FunctionDef, rows: tuple[str, ...]) -> None:
-    """Write the parameters of a function as the module has them: without annotations, ``rows`` of effects first."""
+    """Rewrite the parameters of a function for the module: without annotations, ``rows`` of effects first."""
     function, arguments = composer.function, tree.args
     if rows:
         # In every function, so that callers can hand them over without knowing the rest.
@@ -195,7 +195,7 @@ def _compose_parameters(composer: Composer, tree: ast.FunctionDef, rows: tuple[s
 
 
 def _row_text(row: Any, name: str) -> str:
-    """The NamedTuple class without what numbers have no use for; refused where that would change what it does."""
+    """Return the text of a NamedTuple class without methods; refused if this would change its behaviour."""
     own = vars(row)
     others = [base for base in row.__bases__[1:] if base is not Generic]
     if row.__bases__[0] is not tuple or others:

@@ -1,7 +1,7 @@
-"""The torque of a walk for OpenSim: a table in its names, zero and signs. Nothing here needs OpenSim.
+"""Export of the torque of a walk to OpenSim: a table with its names, zeros and signs. OpenSim is not required.
 
-Inverse dynamics of OpenSim 4.6 took the torque by PrescribedController and PrescribedForce alike, to 1e-4 N m; static
-optimisation gives every actuator a control of its own, and gave the device 0 N m.
+Inverse dynamics of OpenSim 4.6 applied the torque by PrescribedController and PrescribedForce alike, to 1e-4 N m.
+Static optimisation controls every actuator itself and set the device torque to 0 N m.
 """
 
 from collections.abc import Sequence
@@ -24,15 +24,15 @@ from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import walk
 
 FEW_STRIDES = 0.2
-"""Minutes of a walk without a task sequence, unless given."""
+"""Default duration [min] of a walk without a task sequence."""
 SHORTEST_STRIDE, LONGEST_STRIDE = 0.4, 5.0
-"""Between two heel strikes of a foot [s]."""
+"""Accepted time [s] between two heel strikes of one foot."""
 
 
 def opensim_files(result: WalkResult, side: Side = "right", strikes: Sequence[float] = ()) -> dict[str, bytes]:
-    """Return the files of a walk for OpenSim by name; with ``strikes`` [s] its mean stride lies on these heel strikes.
+    """Return the OpenSim files of a walk by name; ``strikes`` [s] are heel strikes at which to place its mean stride.
 
-    ScenarioError for a walk that failed or has no stride with help, and for times that are no heel strikes.
+    Raises ScenarioError for a failed walk, a walk without an assisted stride, and invalid heel strikes.
     """
     torque = device_torque(result, side, strikes)
     named, _ = opensim_recording(result.recording, side, walk_of(result.scenario).wearer.body_mass)
@@ -47,7 +47,7 @@ def files_of_walk(
     side: Side,
     strikes: tuple[float, ...] | None,
 ) -> dict[str, bytes]:
-    """Return the files of a walk by its name, of ``minutes`` [min] or its task sequence, else ``FEW_STRIDES``."""
+    """Return the OpenSim files of a walk by name, over ``minutes`` [min], its task sequence, or ``FEW_STRIDES``."""
     if strikes is not None:
         check_strikes(strikes)
     check_duration_once(overrides, minutes)
@@ -58,13 +58,13 @@ def files_of_walk(
 
 
 def files_of_recording(path: Path, side: Side, body_mass: float | None) -> tuple[dict[str, bytes], list[str]]:
-    """Return the file of a recording for OpenSim, and the channels left out because they need a ``body_mass`` [kg]."""
+    """Return the OpenSim file of a recording, and the channels omitted since they need a ``body_mass`` [kg]."""
     recording, missing = opensim_recording(read_recording(path), side, body_mass)
     return {"recording.sto": opensim_bytes(recording)}, list(missing)
 
 
 def device_torque(result: WalkResult, side: Side = "right", strikes: Sequence[float] = ()) -> Recording:
-    """Return what the device adds along OpenSim's ankle [N m], above 0 in dorsiflexion, as ``opensim_files`` has it."""
+    """Return the device torque on OpenSim's ankle [N m], positive in dorsiflexion; see ``opensim_files``."""
     if result.status.time is not None:
         raise ScenarioError(f"{result.scenario.name}: {result.status.message}")
     time, torque = result.recording.time, result.recording["external_torque"]
@@ -83,7 +83,7 @@ def device_torque(result: WalkResult, side: Side = "right", strikes: Sequence[fl
 
 
 def check_strikes(strikes: Sequence[float]) -> None:
-    """Refuse times [s] that are no heel strikes of one foot, one after the other; ScenarioError."""
+    """Raise ScenarioError if times [s] are not successive heel strikes of one foot."""
     if len(strikes) < 2:
         raise ScenarioError(f"{argument_text('strikes')}: give two heel strikes or more, such as 0.63,1.86")
     for first, last in pairwise(strikes):

@@ -1,12 +1,13 @@
 """Agreement of the curves of one stride: delay, side and scale of each, estimated against the others.
 
-Healthy walking shows where each curve belongs. Just after toe-off the foot is furthest in plantarflexion, and then the
-shank furthest back; ankle moment and vertical force end the push-off together. While the foot stands flat the ankle
-turns as the shank does, and the largest moment of the push-off is the force times a lever as long as the forefoot. An
-impaired gait may differ in each of these, so that what is unusual is remarked and not refused; but an ankle that fits
-half a stride away is of the other foot.
+Healthy walking relates the curves to each other. Just after toe-off the ankle has its peak plantarflexion, followed by
+the rearmost position of the shank; ankle moment and vertical force end the push-off at the same time. While the foot is
+flat, the ankle rotates with the shank. The largest push-off moment is the force times the length of the forefoot. An
+impaired gait may differ in each of these relations, so an unusual curve causes a remark, not an error. An ankle that
+fits better half a stride later, however, belongs to the other foot.
 
-Ranges in brackets are of 13 recorded strides: 11 of one walker overground and both legs of another on a treadmill.
+Numbers in brackets are the ranges of 13 recorded strides: 11 of one walker overground and both legs of another on a
+treadmill.
 """
 
 import numpy as np
@@ -92,7 +93,7 @@ def _smooth(values: Floats, name: str) -> Floats:
 def delay_remarks(walk: MeanStride) -> list[str]:
     """Return remarks on curves of a mean stride that are delayed relative to the force or, without force, to the shank.
 
-    Curves from the same file as the reference share its clock and are not remarked.
+    Curves from the same file as the reference share its clock and get no remark.
     """
     share = walk.stance_share
     # Of the shank the largest lean backwards, which is its minimum.

@@ -185,7 +185,7 @@ def list_gaits() -> tuple[str, ...]:
 def load_gait(gait: str | Path = NORMATIVE) -> Gait:
     """Return a gait by its name in the package or by the path of a gait file (TOML), in SI units.
 
-    DataError where it cannot be used.
+    Raises DataError if the gait cannot be used.
 
     >>> import ppafo
     >>> gait = ppafo.load_gait("falisse2019-subject1")

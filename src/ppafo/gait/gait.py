@@ -1,14 +1,14 @@
-"""A gait: one periodic stride as Fourier series, in SI units and in the signs of the package.
+"""Gait: one periodic stride as Fourier series, in SI units and in the signs of the package.
 
-- ``shank_angle`` phi [rad]: from the vertical, above 0 while the ankle is in front of the knee.
-- ``ankle_angle`` theta [rad]: 90 deg neutral (foot square to the shank), growing in plantarflexion (toes down).
-- ``ankle_moment`` [N m/kg]: internal moment of the wearer per body mass, above 0 in plantarflexion.
-- ``vertical_force`` [body weights]: ground reaction on this foot, above 0 upwards.
-- ``centre_of_pressure`` [m]: where it acts, forward of the ankle along the foot; without meaning while the foot is off.
+- ``shank_angle`` phi [rad]: from the vertical, positive with the ankle in front of the knee.
+- ``ankle_angle`` theta [rad]: 90 deg neutral (foot square to the shank), increasing in plantarflexion (toes down).
+- ``ankle_moment`` [N m/kg]: internal moment of the wearer per body mass, positive in plantarflexion.
+- ``vertical_force`` [body weights]: ground reaction on this foot, positive upwards.
+- ``centre_of_pressure`` [m]: distance forward of the ankle along the foot; undefined while the foot is off the ground.
 - ``knee_forward``, ``knee_up`` [m/s^2]: acceleration of the knee in the sagittal plane, without gravity.
 
 With a flat foot theta is 90 deg plus phi. The phase counts strides from one heel strike of the foot to its next.
-At another walking speed the stride gets longer or shorter in time, and every motion in it stays.
+At another walking speed the stride time changes; the motion as a function of the phase stays the same.
 """
 
 import math
@@ -113,10 +113,16 @@ class GaitCurve:
 class Gait:
     """Stride of one wearer, as curves over the phase; a curve that was not recorded is None.
 
-    ``body_mass`` [kg] and ``stature`` [m] (None if unknown) are of the subject. ``stride_time`` is in [s],
-    ``stance_share`` is the fraction of the stride until toe-off [-], and ``walking_speed`` is in [m/s], None if it was
-    not recorded. ``stride_time_deviation`` [s] and ``stance_share_deviation`` [-] are standard deviations between
-    strides, 0 if unknown. ``recorded_speed`` [m/s] is the speed of the recording, if it differs from ``walking_speed``.
+    The module docstring defines units and signs of the curves.
+
+    - ``body_mass``, ``stature``: body mass [kg] and stature [m] of the subject; the stature is None if unknown
+    - ``walking_speed``: walking speed [m/s], None if it was not recorded
+    - ``stride_time``: stride time [s]
+    - ``stance_share``: fraction of the stride until toe-off [-]
+    - ``stride_time_deviation``, ``stance_share_deviation``: standard deviations between strides [s] and [-], 0 if
+      unknown
+    - ``strides``: number of strides in the mean
+    - ``recorded_speed``: speed of the recording [m/s], if it differs from ``walking_speed``
     """
 
     name: str
@@ -226,8 +232,8 @@ Sci 29:819 (62 m/min)."""
 def speed_range(gait: Gait) -> tuple[float, float]:
     """Return the lowest and highest speed [m/s] to which a gait may be scaled: within 20 % of the recorded speed.
 
-    For a gait recorded at more than 1.03 m/s, the lowest speed is at least 1.03 m/s. Raises DataError for a gait
-    without a speed.
+    The lowest speed is also limited to 1.03 m/s, or to the recorded speed of a slower gait. Raises DataError for a
+    gait without a speed.
     """
     recorded = _recorded_speed(gait)
     lowest = (1.0 - LARGEST_CHANGE) * recorded

@@ -20,7 +20,7 @@ _TURNED_BACK = 0.1
 Recorded shanks rotate forward by 0.15 to 0.25 of the range.
 """
 REMARKED_TILT, REFUSED_TILT = 5.0, 20.0
-"""Mean tilt of the standing foot in mid-stance [deg] above which it is remarked, and rejected.
+"""Limits of the mean tilt of the standing foot in mid-stance [deg] for a remark, and for an error.
 
 Recorded feet on level ground have 0.5 to 4.6 deg, from the sole of the shoe and the placement of markers. A standing
 foot is not tilted by more than 20 deg: this is a heel of 6 cm on a foot of 17 cm from heel to ball, walking on the

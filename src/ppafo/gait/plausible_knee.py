@@ -20,8 +20,8 @@ SHANK_LENGTHS = (0.25, 0.6)
 _FITS = 0.6
 """Largest relative misfit of the rotation [-, RMS] that counts as a fit; correct recordings have 0.3 to 0.46."""
 _LEFT_BY_MISTAKE, _LEFT_BY_ONE = 0.7, 0.62
-"""Fractions of the misfit that remain after correction of a mistake: below the first it is remarked, below the second
-rejected. Correct knees in units of g leave 0.48 to 0.57, and a correct knee in its own unit has shown 0.68."""
+"""Fractions of the misfit that remain after correction of a mistake: below the first for a remark, below the second
+for an error. Correct knees in units of g leave 0.48 to 0.57, and a correct knee in its own unit has shown 0.68."""
 
 Factors = tuple[float, float]
 

@@ -1,4 +1,4 @@
-"""The device as environments of Gymnasium: ``ppafo/TorqueTask-v0``, ``ppafo/StepAngle-v0`` and ``ppafo/Walk-v0``.
+"""The device as Gymnasium environments: ``ppafo/TorqueTask-v0``, ``ppafo/StepAngle-v0`` and ``ppafo/Walk-v0``.
 
     import gymnasium
     import ppafo.gym
@@ -6,7 +6,7 @@
     one = gymnasium.make("ppafo/TorqueTask-v0")
     many = gymnasium.make_vec("ppafo/TorqueTask-v0", num_envs=4096)
 
-Needs the extra ``gym``. How to learn a controller with them: docs/how-to/export.md.
+Needs the extra ``gym``. Training of a controller with them: docs/how-to/export.md.
 """
 
 try:

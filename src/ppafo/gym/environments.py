@@ -1,4 +1,4 @@
-"""The environments as Gymnasium has them: one, or many side by side."""
+"""Gymnasium environments of the device: a single one, and a vector of many."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,22 +17,22 @@ from ppafo.gym.world import World, settings_of
 
 Observations = np.ndarray[Any, np.dtype[np.float32]]
 PICTURE = "rgb_array"
-"""The render mode, in the word of Gymnasium."""
+"""Gymnasium's name of the render mode."""
 
 
 class PneumaticEnv(gymnasium.Env[Observations, Any]):
-    """Device commanded by an agent, one step per sample period of its scenario or walk.
+    """Device commanded by an agent, with one step per sample period of its scenario or walk.
 
-    ``task`` is 'torque', 'angle' or 'walk'; ``scenario`` the name or file of a scenario, or of a walk, and
-    ``overrides`` change it: of the task's own, with late, noisy sensors with steps, unless one is given. ``actions``
-    are 'continuous', a command from -1 to 1 (and on a leg that walks one above 0 for the vent valve), or 'on_off', 0
-    to 2 for commands of -1, 0 and 1. ``randomise`` draws each episode: what the parameter set has an interval for,
-    what ``vary`` gives lowest and highest values for, by path, the seed of the noise, an angle in ``targets``; or the
-    wearer and the gait of a walk. ``duration`` of an episode [s]. The reward of a sample is
-    -(error_weight error^2 period + gas_weight gas), in N m or rad, s and g. An action is held for ``frame_skip``
-    samples, whose rewards are added up. ``observations`` are 'physical', or 'scaled' between -1 and 1. With
-    ``render_mode`` 'rgb_array' an episode can be shown as a picture. ``plugins`` are modules of your own, files or
-    names, whose objects files may name. ScenarioError or ParameterError for bad input.
+    ``task`` is 'torque', 'angle' or 'walk'. ``scenario`` is the name or file of a scenario or walk, changed by
+    ``overrides``; by default the task's own, with delayed, noisy and quantised sensors. ``actions`` are 'continuous', a
+    command from -1 to 1 (on a leg that walks with a second number, positive to open the vent valve), or 'on_off', 0 to
+    2 for commands of -1, 0 and 1. ``randomise`` draws each episode: numbers with an interval in the parameter set,
+    numbers with lowest and highest values in ``vary`` (by path), the seed of the noise and an angle in ``targets``; in
+    a walk the wearer and the gait. ``duration`` is the length of an episode [s]. The reward of a sample is
+    -(error_weight error^2 period + gas_weight gas), with the error in N m or rad, the period in s and the gas in g. An
+    action applies to ``frame_skip`` samples, whose rewards are added up. ``observations`` are 'physical', or 'scaled'
+    to -1 to 1. With ``render_mode`` 'rgb_array' an episode can be rendered as a picture. ``plugins`` are modules of
+    your own, files or names, whose objects files may name. Raises ScenarioError or ParameterError for bad input.
     """
 
     metadata: dict[str, Any] = {"render_modes": [PICTURE], "render_fps": 25}  # noqa: RUF012 - Gymnasium's own declaration
@@ -49,11 +49,11 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         self._moments: list[EpisodeFrame] = []
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a pickle keeps: the world as it was made, and the state of its lane."""
+        """Return the content of a pickle: the constant ``world`` and the state of the environment."""
         return {**vars(self), "_lanes": self._lanes.state()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Go on from a state: with the lane itself in a copy, from what it held in a pickle."""
+        """Continue from a state: of a copy, or of a pickle."""
         self.__dict__.update(state)
         if isinstance(self._lanes, Mapping):
             held, self._lanes = self._lanes, self.world.lanes(1)
@@ -65,7 +65,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         seed: int | None = None,
         options: dict[str, Any] | None = None,  # noqa: ARG002 - Gymnasium's own signature
     ) -> tuple[Observations, dict[str, Any]]:
-        """Begin an episode; return what is observed at its start, and nothing else. There are no ``options``."""
+        """Start an episode; return its initial observation and empty info. There are no ``options``."""
         super().reset(seed=seed)
         seen, drawn = self.world.begin(self._lanes, np.zeros(1, dtype=np.intp), [self.np_random])
         self._drawn = drawn[:, 0]
@@ -76,9 +76,9 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         return seen.observations[0], {}
 
     def step(self, action: Any) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
-        """Return observation, reward, whether the run failed, whether it is over, error and gas [kg] after an action.
+        """Apply an action; return observation, reward, terminated (failed), truncated (ended), error and gas [kg].
 
-        SimulationError for one that is not finite.
+        Raises SimulationError for an action that is not finite.
         """
         seen = self.world.take(self._lanes, action)
         info = {"error": float(seen.errors[0]), "supplied_mass": float(seen.supplied[0])}
@@ -101,13 +101,13 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         return picture(self._moments, self.world.task.unit, self._period)
 
     def _remember(self, error: float) -> None:
-        """Keep what a picture shows of this moment."""
+        """Store the current frame for the picture."""
         self._moments.append(EpisodeFrame(len(self._moments) * self._period, self.numbers()["state.angle"], error))
 
     def episode(self) -> Any:
-        """Return the scenario of this episode with the numbers that were drawn, or the walk before anything is drawn.
+        """Return the scenario of this episode with the drawn numbers; for a walk the walk before any draw.
 
-        SimulationError before the first ``reset``.
+        Raises SimulationError before the first ``reset``.
         """
         if self._drawn is None:
             raise SimulationError("there is no episode yet: call reset")
@@ -119,7 +119,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
 
 
 class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
-    """Many such devices on the lanes of one program; each goes as it would alone with its seed.
+    """Vector of devices stepped together by one program; each behaves as a single environment with its seed.
 
     Takes the arguments of ``PneumaticEnv``; ``autoreset_mode`` is one of Gymnasium's, or its name.
     """
@@ -147,11 +147,11 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         self._last: Observations = np.zeros(self.observation_space.shape, dtype=np.float32)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a pickle keeps: the world as it was made, and the state of its lanes."""
+        """Return the content of a pickle: the constant ``world`` and the state of the environments."""
         return {**vars(self), "_lanes": self._lanes.state()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Go on from a state, on lanes of its own."""
+        """Continue from a state, in environments of its own."""
         self.__dict__.update(state)
         if isinstance(self._lanes, Mapping):
             held, self._lanes = self._lanes, self.world.lanes(self.num_envs)
@@ -160,9 +160,9 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
-        """Begin episodes of all, or of those that are true in ``options["reset_mask"]`` (environments,).
+        """Start episodes of all environments, or only of those marked in ``options["reset_mask"]`` (environments,).
 
-        A number as ``seed`` seeds the first one; the others count up from it.
+        A number as ``seed`` is the seed of the first environment; the others get the following numbers.
         """
         mask = (options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_))
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
@@ -183,9 +183,10 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         return observations.copy(), {}
 
     def step(self, actions: Any) -> tuple[Observations, Floats, Flags, Flags, dict[str, Any]]:
-        """Return observations, rewards, which runs failed, which are over, errors and gas [kg] after actions.
+        """Apply actions; return observations, rewards, terminated (failed), truncated (ended), errors and gas [kg].
 
-        SimulationError for one that is not finite, and without autoreset for environments that have to be reset.
+        Raises SimulationError for an action that is not finite, and without autoreset for an environment that has
+        ended.
         """
         before = self._ended
         if self.autoreset_mode is AutoresetMode.DISABLED and before.any():
@@ -226,7 +227,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
 
 
 def _masked(values: Mapping[str, Floats], there: Flags) -> dict[str, Any]:
-    """Return numbers (environments,) with the mask of those that have them, as Gymnasium has infos."""
+    """Return numbers (environments,) with the mask of environments that have them, in the form of Gymnasium infos."""
     if not there.any():
         return {}
     kept = {name: np.where(there, column, 0.0) for name, column in values.items()}

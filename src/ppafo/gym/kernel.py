@@ -1,7 +1,7 @@
-"""The kernel that takes all environments of a program a step further, in three compiled calls for a block of them.
+"""Kernel that advances all environments of a program, in three compiled calls per block.
 
-Commands go in; physics, sensors, observations and rewards come out. The lane loop of every other run steps them; what
-stands around it are functions of lanes, as the loop is, on arrays that stay between calls.
+Commands go in; physics, sensors, observations and rewards come out. The steps are made by the same lane loop as in
+every other run; the functions before and after it work on the same arrays, which persist between calls.
 """
 
 from collections.abc import Mapping
@@ -23,32 +23,32 @@ from ppafo.gym.tasks import Goal, Memory, Outcome, Requested, Task, finite, rewa
 
 
 class Action(NamedTuple):
-    """The numbers of an action [-]; a task whose actions have one number does not use the other."""
+    """Numbers of an action [-]; a task whose actions have one number ignores the second."""
 
     first: float
     other: float
 
 
 class ObservationFlag(NamedTuple):
-    """1 where an environment is observed in this call, else 0."""
+    """Flag of an environment: 1 if it is observed in this call, else 0."""
 
     is_observed: float
 
 
 OWN = {"goal": Goal, "memory": Memory}
-"""Rows of an environment beside the rows of its run."""
+"""Rows of an environment in addition to the rows of its run."""
 OWN_PATHS = [path for name, row in OWN.items() for path in leaf_paths(row, name)]
-"""Paths of the numbers in these rows, in their order."""
+"""Paths of the numbers in these additional rows, in order."""
 
 
 def command(parts: Program, lanes: Any, task: Task) -> None:
-    """Give every environment the command of its action."""
+    """Set the command of every environment from its action."""
     for lane in lanes:
         take_action(parts, lane, task)
 
 
 def take_action(parts: Program, lane: Any, task: Task) -> None:  # noqa: ARG001 - a phase
-    """The command of an action."""
+    """Set the command of an environment from its action."""
     lane.result = lane.result._replace(command=task.command(lane.action.first, lane.action.other))
 
 
@@ -63,7 +63,7 @@ def judge(
     steps_per_sample: int,
     signal_delay: int,
 ) -> None:
-    """Sense, observe and judge the environments that are asked, each at the step of its own episode."""
+    """Sense, observe and reward the flagged environments, each at the step of its own episode."""
     slots = lanes.signal_history.shape[1]
     for lane in lanes:
         if lane.asked.is_observed == 0.0:
@@ -101,7 +101,7 @@ def observe(
     gas_weight: float,
     steps_in_all: int,
 ) -> None:
-    """Sense, observe and judge one environment, and say whether its episode ends."""
+    """Sense, observe and reward one environment, and set whether its episode ends."""
     sense(parts, lane, now)
     time = now.step * lane.timing.step
     torque_wanted, rate, _ = parts.reference.value(lane.reference, time)
@@ -125,7 +125,7 @@ def observe(
 
 
 def tables_judged(program: Program, task: Task) -> dict[str, Mapping[str, Any]]:
-    """Groups of the arrays that a judgement takes, by their names."""
+    """Groups of the arrays that ``judge`` takes, by name."""
     return {
         "states": program.state_rows(),
         "parameters": program.parameter_rows(),
@@ -137,19 +137,19 @@ def tables_judged(program: Program, task: Task) -> dict[str, Mapping[str, Any]]:
 
 
 class PythonKernel:
-    """The three calls of a kernel, run by Python itself."""
+    """The three calls of a kernel in plain Python."""
 
     def __init__(self, program: Program, task: Task) -> None:
         self._program, self._task = program, task
         self.advance = PythonProgram(program).advance
 
     def command(self, states: Floats, actions: Floats, signals: Floats) -> None:
-        """Give every environment the command of its action."""
+        """Set the command of every environment from its action."""
         tables = (self._program.state_rows(), states), ({"action": Action}, actions)
         run_lanes(self._program, command, tables, (signals,), (self._task,))
 
     def judge(self, *arrays_and_numbers: Any) -> None:
-        """Sense, observe and judge the environments that are asked."""
+        """Sense, observe and reward the flagged environments."""
         groups = tables_judged(self._program, self._task).values()
         tables, rest = list(zip(groups, arrays_and_numbers, strict=False)), arrays_and_numbers[len(groups) :]
         run_lanes(self._program, judge, tables, rest[:1], (self._task, *rest[1:]))
@@ -157,7 +157,7 @@ class PythonKernel:
 
 @lru_cache(maxsize=16)
 def kernel_source(program: Program, task: Task) -> str:
-    """Return the source text of the module with ``command``, ``advance`` and ``judge``, each of a block of lanes."""
+    """Return the source of the module with ``command``, ``advance`` and ``judge``, each for a block of environments."""
     collector = SourceCollector(INLINE)
     further = {**OWN, "action": Action, "asked": ObservationFlag, "view": task.view, "outcome": Outcome}
     step = StepText(program, collector, further=further)

@@ -1,4 +1,4 @@
-"""Environments of one program side by side: each a lane, with an episode of its own that began at its own step."""
+"""Environments of one program side by side, each with an episode that started at its own step."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -24,24 +24,24 @@ Places = NDArray[np.intp]
 
 _OUTCOMES = len(Outcome._fields)
 _FIRST_FLAG = Outcome._fields.index("failed")
-"""Row of the outcomes from which on they are truth values."""
+"""Index of the first outcome that is a truth value, as are all later ones."""
 
 
 class FromOutside:
-    """Stands for the controller of a scenario whose commands come from an agent."""
+    """Placeholder for the controller of a scenario whose commands come from an agent."""
 
     def reset(self) -> None:
         """Do nothing."""
 
     def update(self, time: float, reference: float, measurement: Measurement) -> float:  # noqa: ARG002 - a protocol
-        """Refuse: an agent is asked through its environment."""
+        """Raise an error, because an agent acts through its environment."""
         raise ScenarioError(
             "in an environment the agent gives the commands; to simulate this scenario, give it a controller"
         )
 
 
 def episode_program(batch: Batch) -> tuple[Program, Clock]:
-    """Return program and clock of a run whose commands come from outside; ScenarioError for samples inside a step."""
+    """Return program and clock of a run with external commands; ScenarioError for samples within a step."""
     if batch.program.samples_inside:
         raise ScenarioError("run.output_interval: must be a whole number of steps in an environment")
     return replace(batch.program, controller=None, starts_apart=True), batch.clock
@@ -49,20 +49,20 @@ def episode_program(batch: Batch) -> tuple[Program, Clock]:
 
 @dataclass(frozen=True, slots=True)
 class EpisodeStarts:
-    """Starts of episodes: parameters and states as the program has them, and goals (rows, episodes)."""
+    """Starts of episodes (rows, episodes): parameters and states of the program, and goals."""
 
     parameters: Floats
     states: Floats
     goals: Floats
 
     def repeated(self, count: int) -> "EpisodeStarts":
-        """Start of ``count`` equal episodes, from the start of one."""
+        """Starts of ``count`` equal episodes, from the start of one."""
         return EpisodeStarts(*(np.repeat(rows, count, axis=1) for rows in (self.parameters, self.states, self.goals)))
 
 
 @dataclass(frozen=True, slots=True)
 class RewardWeights:
-    """Weights of the reward for squared error and gas, and bounds (2, observed) of what is observed."""
+    """Weights of squared error and gas in the reward, and bounds (2, observed) of the observations."""
 
     error_weight: float
     gas_weight: float
@@ -71,7 +71,7 @@ class RewardWeights:
 
 @dataclass(frozen=True, slots=True)
 class BatchStep:
-    """Result of a step in every environment: observations (environments, observed), the rest (environments,)."""
+    """Result of a step in every environment: observations (environments, observed), all else (environments,)."""
 
     observations: NDArray[np.float32]
     rewards: Floats
@@ -81,7 +81,7 @@ class BatchStep:
     truncated: Flags
 
     def then(self, later: "BatchStep") -> "BatchStep":
-        """Return what two samples show one after the other; an episode that ended with the first stays as it was."""
+        """Return the combined result of two successive steps; an episode that ended with the first is unchanged."""
         ended = self.terminated | self.truncated
         return BatchStep(
             observations=np.where(ended[:, None], self.observations, later.observations),
@@ -95,7 +95,7 @@ class BatchStep:
 
 @final
 class Environments:
-    """Some environments of one program side by side, each a lane with an episode of its own."""
+    """Environments of one program side by side, each with an episode of its own."""
 
     def __init__(self, program: Program, clock: Clock, task: Task, count: int, judging: RewardWeights) -> None:
         self.count = count
@@ -132,19 +132,19 @@ class Environments:
             self._blocks.append((command, advance, judge))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Environments":
-        """Return environments that go on from here by themselves; the compiled program is the same."""
+        """Return independent environments in the same state; they share the compiled program."""
         other = Environments(self._program, self._clock, self._task, self.count, self._judging)
         other.resume(self.state())
         memo[id(self)] = other
         return other
 
     def state(self) -> dict[str, Floats | int]:
-        """Return all that changes from step to step: copies of the arrays, and the number of the step."""
+        """Return everything that changes from step to step: copies of the arrays, and the number of the step."""
         arrays = {name: value.copy() for name, value in vars(self).items() if isinstance(value, np.ndarray)}
         return {**arrays, "_now": self._now}
 
     def resume(self, state: Mapping[str, Floats | int]) -> None:
-        """Go on from a state; the compiled program keeps the places of the arrays, so that they are filled."""
+        """Continue from a state, copied into the existing arrays, whose addresses the compiled program uses."""
         for name, value in state.items():
             if isinstance(value, np.ndarray):
                 getattr(self, name)[...] = value
@@ -152,7 +152,7 @@ class Environments:
                 self._now = value
 
     def begin(self, places: Places, columns: EpisodeStarts) -> BatchStep:
-        """Begin episodes of some environments at once; what the others show is not to be used."""
+        """Start episodes in the environments at ``places``; the results of the others are invalid."""
         lanes = self._states.shape[2]
         # Lanes without an environment repeat the last one, so that each has a run that goes on.
         spare = np.arange(self.count, self._states.shape[0] * lanes)
@@ -172,12 +172,12 @@ class Environments:
         return self._call(0)
 
     def step(self) -> BatchStep:
-        """Take ``actions`` for a sample period, and show what follows."""
+        """Apply ``actions`` for a sample period, and return the result."""
         self._chosen[:] = 1.0
         return self._call(self._clock.steps_per_sample)
 
     def numbers(self, place: int) -> dict[str, float]:
-        """Return the state of one environment as the engine has it, in SI units, by path such as ``state.angle``."""
+        """Return the state of one environment in the engine, in SI units, by path such as ``state.angle``."""
         block, lane = divmod(place, self._states.shape[2])
         return {path: float(self._states[block, row, lane]) for path, row in self.rows.items()}
 
@@ -213,5 +213,5 @@ class Environments:
         return BatchStep(shown.astype(np.float32), rewards, errors, supplied, failed, through)
 
     def _by_environment(self, blocks: Floats) -> Floats:
-        """Return copies of numbers (blocks, numbers, lanes) as (environments, numbers)."""
+        """Return copies of arrays (blocks, numbers, lanes) as (environments, numbers)."""
         return blocks.transpose(0, 2, 1).reshape(-1, blocks.shape[1])[: self.count].copy()

@@ -1,4 +1,4 @@
-"""Picture of an episode: the vane at its angle, and angle and error over time, as image bytes."""
+"""Picture of an episode as image bytes: the vane at its angle, and angle and error over time."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -31,9 +31,9 @@ class EpisodeFrame(NamedTuple):
 
 
 def picture(moments: Sequence[EpisodeFrame], unit: str, period: float) -> NDArray[np.uint8]:
-    """Return a picture (height, width, 3) of the moments of an episode, in order; at least one.
+    """Return a picture (height, width, 3) of the frames of an episode, in order; at least one.
 
-    ``unit`` is the unit of their errors, "rad" or "N m"; ``period`` [s] is the shortest span of time that is shown.
+    ``unit`` is the unit of the errors, "rad" or "N m"; ``period`` [s] is the shortest time axis.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -67,7 +67,7 @@ def picture(moments: Sequence[EpisodeFrame], unit: str, period: float) -> NDArra
 
 
 def _finish(axes: "Axes", end: float, label: str, level: float) -> None:
-    """Label the axis of a curve over time, up to its end [s], with a line at a level."""
+    """Label the axes of a curve over time up to ``end`` [s], and draw a line at ``level``."""
     axes.axhline(level, color=GREY, linewidth=0.8, linestyle="--")
     axes.set_ylabel(label)
     axes.set_xlim(0.0, end)

@@ -1,4 +1,4 @@
-"""Episodes of a scenario: as its file has it, or drawn from what is not known about it."""
+"""Episodes of a scenario: as in its file, or with uncertain numbers drawn at random."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -30,18 +30,18 @@ Ranges = Mapping[str, tuple[str | float, str | float]]
 """Lowest and highest value by dotted path, as texts with units."""
 
 MOST_DRAWS = 100
-"""Draws of one episode until one is a run of the program; where none is, too much varies."""
+"""Largest number of draws of one episode until a draw is valid; if none is, the ranges are too wide."""
 _NO_PROFILE = TorqueProfile(peak_torque=0.0, peak_time=0.5, rise_time=1.0, fall_time=1.0)
-"""The torque of a stride, where an episode has no strides."""
+"""Torque profile for episodes without strides."""
 _SEED = "sensors.seed"
 
 
 @dataclass(frozen=True, slots=True)
 class ScenarioEpisodes:
-    """Episodes of a scenario; ``ranges`` in SI by path are drawn evenly, and so is the angle to turn to, ``targets``.
+    """Episodes of a scenario, with uniform draws from ``ranges`` (SI, by path) and of a target from ``targets`` [rad].
 
-    Without ``ranges`` each is the scenario as it stands, noise included, and turns to the middle of ``targets``. Values
-    of the paths in ``gauge`` count from the atmosphere of their episode.
+    Without ``ranges`` every episode is the scenario itself, including its noise, with the middle of ``targets`` as
+    target. Paths in ``gauge`` hold gauge pressures relative to the atmosphere of each episode.
     """
 
     base: Scenario
@@ -53,10 +53,10 @@ class ScenarioEpisodes:
     gauge: frozenset[str] = frozenset()
 
     def draw(self, generators: Sequence[np.random.Generator]) -> tuple[EpisodeStarts, Floats]:
-        """Return an episode for each generator, and what was drawn of each (numbers, episodes) in SI.
+        """Return an episode for each generator, and the drawn numbers (numbers, episodes) in SI.
 
-        Drawn again where a draw breaks a rule of scenarios, or asks for another program, as a chamber that is too quick
-        does. ScenarioError where nothing fits.
+        A draw is repeated if it breaks a rule of scenarios or needs another program, for example for a chamber too fast
+        for the step. Raises ScenarioError if no draw is valid.
         """
         count = len(generators)
         columns, values = self.plain.repeated(count), np.zeros((len(self.ranges), count))
@@ -81,12 +81,12 @@ class ScenarioEpisodes:
         )
 
     def shown(self, drawn: Floats) -> Scenario:
-        """Return the scenario of what was drawn of one episode (numbers,) in SI."""
+        """Return the scenario with the drawn numbers (numbers,) of one episode in SI."""
         numbers = dict(zip(self.ranges, drawn.tolist(), strict=True))
         return with_numbers(self.base, absolute(self.base, numbers, self.gauge))
 
     def _plan(self, columns: EpisodeStarts, values: Floats, left: Places) -> tuple[Places, str]:
-        """Write the columns of some episodes; return the places of those that do not fit, and why one does not."""
+        """Fill the columns of some episodes; return the indices of the invalid ones, and a reason."""
         given = dict(zip(self.ranges, values[:, left], strict=True))
         plan = plan_ensemble(check_columns(self.base, given, self.gauge))
         reason = next(iter(plan.reasons.values()), "another program, step or delay")
@@ -100,9 +100,9 @@ class ScenarioEpisodes:
 
 
 def scenario_episodes(base: Scenario, randomise: bool, vary: Ranges, targets: tuple[str, str]) -> ScenarioEpisodes:
-    """Return the episodes of a scenario: what its parameter set has an interval for, ``vary`` and the seed are drawn.
+    """Return the episodes of a scenario; draws are from the intervals of its parameter set, ``vary`` and the seed.
 
-    ScenarioError for a path or range that cannot be.
+    Raises ScenarioError for an unknown path or an invalid range.
     """
     base = base.controlled_by(FromOutside())
     lowest, highest = (parse_quantity(text, "rad", base.device.supply.atmospheric_pressure) for text in targets)
@@ -138,9 +138,9 @@ def scenario_episodes(base: Scenario, randomise: bool, vary: Ranges, targets: tu
 
 
 def intervals_of(base: Scenario) -> tuple[dict[str, tuple[float, float]], set[str]]:
-    """Return the ends of each interval of the scenario's parameter set, about the scenario's value, in SI by path.
+    """Return the interval ends of uncertain numbers in the parameter set, around the scenario's values, in SI by path.
 
-    And the paths of those that are given in gauge.
+    The second value are the paths of numbers given as gauge pressures.
     """
     origin = base.origin
     folder = Path() if origin.file is None else Path(origin.file).parent

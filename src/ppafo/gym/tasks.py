@@ -1,6 +1,6 @@
-"""Tasks of an agent: what it observes, what its error is, and what a command means.
+"""Tasks of an agent: observation, error, and meaning of an action.
 
-Pure functions of floats, which the kernel has beside the physics.
+All are pure functions of floats, which the kernel compiles together with the physics.
 """
 
 from collections.abc import Callable
@@ -13,24 +13,24 @@ from ppafo.model.sensors import GaitMeasurement, Measurement
 from ppafo.model.valves.kind import VENT
 
 BAR = 1.0e5
-"""Pascals of a bar, the unit in which an agent sees pressures."""
+"""Pascals per bar; observed pressures are in bar."""
 GRAM = 1.0e-3
-"""Kilograms of a gram, the unit in which gas is paid for."""
+"""Kilograms per gram; the gas in the reward is in g."""
 LOADED, UNLOADED = 60.0, 30.0
-"""Force under the heel [N] above which it counts as loaded and below which it does not, as in the walking laws."""
+"""Heel forces [N] above which the heel counts as loaded, and below which as unloaded, as in walking controllers."""
 LONGEST_SINCE = 10.0
 """Longest time since a heel strike that is observed [s]."""
 
 
 class Goal(NamedTuple):
-    """Goal of an episode: an angle [rad] to turn to, or the torque of a stride; each task uses its own field."""
+    """Goal of an episode: a target angle [rad], or the torque profile of a stride; each task uses its own field."""
 
     angle: float
     profile: TorqueProfile
 
 
 class Memory(NamedTuple):
-    """Gas from the supply up to the last sample [kg]; of a walk the time of the last heel strike [s], 1 if loaded."""
+    """Gas from the supply so far [kg]; in a walk also the time of the last heel strike [s], and 1 for a loaded heel."""
 
     supplied_mass: float
     strike: float
@@ -38,7 +38,7 @@ class Memory(NamedTuple):
 
 
 class Requested(NamedTuple):
-    """The reference of a scenario at a sample [N m], and how fast it changes [N m/s]."""
+    """Reference of a scenario at a sample [N m], and its rate [N m/s]."""
 
     torque: float
     rate: float
@@ -73,7 +73,7 @@ class AngleView(NamedTuple):
 class WalkView(NamedTuple):
     """Observation: sensors, forces of heel and toe [N], time since the heel was loaded [s], last command [-].
 
-    The time counts from the last strike that the heel sensor showed; a command is -1 to 1, or 2 for venting.
+    The time is since the last heel strike in the heel sensor; a command is -1 to 1, or 2 for venting.
     """
 
     sensed: Sensed
@@ -84,9 +84,9 @@ class WalkView(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Result of a step: reward [-], error, gas from the supply so far [kg], 1 for a failed or finished episode.
+    """Result of a step: reward [-], error, gas from the supply [kg], and 1 for a failed or finished episode, else 0.
 
-    Gas counts from the begin of the episode.
+    The gas is since the start of the episode.
     """
 
     reward: float
@@ -97,7 +97,7 @@ class Outcome(NamedTuple):
 
 
 def sensed_of(seen: Measurement | GaitMeasurement) -> Sensed:
-    """Readings that an agent of any task is shown of a measurement."""
+    """Sensor readings of a measurement, common to all tasks."""
     return Sensed(
         angle=seen.angle, pressure_1=seen.pressure_1 / BAR, pressure_2=seen.pressure_2 / BAR, torque=seen.torque
     )
@@ -106,21 +106,21 @@ def sensed_of(seen: Measurement | GaitMeasurement) -> Sensed:
 def view_torque(
     seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
 ) -> TorqueView:
-    """Observation while a torque is followed."""
+    """Observation in the torque task."""
     return TorqueView(sensed=sensed_of(seen), requested=wanted.torque, requested_rate=wanted.rate, command=command)
 
 
 def view_angle(
     seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
 ) -> AngleView:
-    """Observation while the vane turns to an angle."""
+    """Observation in the angle task."""
     return AngleView(sensed=sensed_of(seen), requested=goal.angle, command=command)
 
 
 def view_walk(
     seen: GaitMeasurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
 ) -> WalkView:
-    """Readings that an agent is shown at a time [s] of a walk."""
+    """Observation at a time [s] of a walk."""
     return WalkView(
         sensed=sensed_of(seen),
         heel_force=seen.heel_force,
@@ -131,12 +131,12 @@ def view_walk(
 
 
 def remember(memory: Memory, supplied_mass: float, seen: Measurement, time: float) -> Memory:
-    """The memory after a sample, with the gas [kg] that the supply has given by then."""
+    """Memory after a sample, with the gas [kg] supplied so far."""
     return Memory(supplied_mass, memory.strike, memory.loaded)
 
 
 def remember_strike(memory: Memory, supplied_mass: float, seen: GaitMeasurement, time: float) -> Memory:
-    """The memory of a walk after a sample, where the heel sensor shows a force [N] at a time [s]."""
+    """Memory of a walk after a sample; the heel sensor force [N] at ``time`` [s] reveals a heel strike."""
     # Two thresholds, so that noise about one of them is not counted as a row of strikes.
     strikes = (memory.loaded < 0.5) & (seen.heel_force > LOADED)
     stays = 0.0 if seen.heel_force < UNLOADED else memory.loaded
@@ -144,53 +144,54 @@ def remember_strike(memory: Memory, supplied_mass: float, seen: GaitMeasurement,
 
 
 def torque_error(goal: Goal, wanted: Requested, angle: float, phase: float, torque: float) -> float:
-    """Error of the torque [N m]: requested less true."""
+    """Torque error [N m]: requested minus true torque."""
     return wanted.torque - torque
 
 
 def angle_error(goal: Goal, wanted: Requested, angle: float, phase: float, torque: float) -> float:
-    """Error of the angle [rad]: requested less true."""
+    """Angle error [rad]: requested minus true angle."""
     return goal.angle - angle
 
 
 def stride_error(goal: Goal, wanted: Requested, angle: float, phase: float, torque: float) -> float:
-    """Torque of the profile at a phase of the true stride, in turns, less the true torque [N m]."""
+    """Torque error [N m]: torque of the profile at the true stride phase [strides], minus true torque."""
     return profile_torque(goal.profile, phase) - torque
 
 
 def reward_of(error: float, gas: float, error_weight: float, gas_weight: float, period: float) -> float:
-    """Reward of a sample: less the squared error over a period [s] and gas [kg], each times its weight."""
+    """Reward of a sample: minus the weighted squared error times the period [s], minus the weighted gas mass [kg]."""
     return -(error_weight * error * error * period + gas_weight * (gas / GRAM))
 
 
 def finite(value: float) -> float:
-    """The value, 0 where it is not finite: an agent can use nothing of a run that failed."""
+    """The value, or 0 if it is not finite, as in a failed run."""
     return value if value - value == 0.0 else 0.0  # inf - inf and nan - nan are nan
 
 
 def within(value: float, lowest: float, highest: float) -> float:
-    """The value between two bounds, the lowest one for nan: a converter shows nothing else."""
+    """The value, limited to two bounds, as by a converter; the lowest for nan."""
     above = value if value >= lowest else lowest
     return above if above <= highest else highest
 
 
 def valve_command(action: float, other: float) -> float:
-    """Command from -1 to 1 of an action; the other one is not used."""
+    """Command from -1 to 1 of an action; ``other`` is ignored."""
     return within(action, -1.0, 1.0)
 
 
 def valve_or_vent(action: float, other: float) -> float:
-    """Command from -1 to 1, or ``VENT`` where the other action is above 0."""
+    """Command from -1 to 1, or ``VENT`` if ``other`` is positive."""
     return VENT if other > 0.0 else within(action, -1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A task: what is observed, and what its error is.
+    """Task of an agent.
 
-    ``view`` has the observed numbers. ``observed(seen, goal, memory, wanted, command, time)`` makes one of them,
-    ``error(goal, wanted, angle, phase, torque)`` the error, ``kept(memory, supplied_mass, seen, time)`` the memory.
-    ``unit`` is the unit of the error. ``command(action, other)`` makes the command of an action of ``actions`` numbers.
+    ``view`` is the class of the observation. ``observed(seen, goal, memory, wanted, command, time)`` returns an
+    observation, ``error(goal, wanted, angle, phase, torque)`` the error in ``unit``, ``kept(memory, supplied_mass,
+    seen, time)`` the updated memory. ``error_weight`` and ``gas_weight`` are the default weights of the reward.
+    ``command(action, other)`` returns the command of an action of ``actions`` numbers.
     """
 
     name: str
@@ -218,4 +219,4 @@ TASKS = {
         Task("walk", WalkView, view_walk, stride_error, remember_strike, "N m", 1.0, 1.0, valve_or_vent, 2),
     )
 }
-"""Tasks by the name with which an environment is made."""
+"""Tasks by name."""

@@ -1,4 +1,4 @@
-"""Common basis of single and vector environments: settings, spaces, episodes and lanes."""
+"""Common basis of single and vector environments: settings, spaces and episodes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -34,7 +34,7 @@ from ppafo.wording import nearest_name
 
 @dataclass(frozen=True, slots=True)
 class _WalkEpisodes:
-    """Episodes of a walk, ``commanded`` from outside; ``randomise`` draws another wearer with another gait for each."""
+    """Episodes of a walk with external commands; ``randomise`` draws a wearer and a gait for each episode."""
 
     base: Scenario
     commanded: Scenario
@@ -44,7 +44,7 @@ class _WalkEpisodes:
     plain: EpisodeStarts
 
     def draw(self, generators: Sequence[np.random.Generator]) -> tuple[EpisodeStarts, Floats]:
-        """Return an episode for each generator, and no drawn numbers: a wearer is not a list of numbers."""
+        """Return an episode for each generator, and an empty array, because a wearer is not a list of numbers."""
         columns = self.plain.repeated(len(generators))
         for number, generator in enumerate(generators if self.randomise else ()):
             # Person 0 of a population is always the one of the configuration; the second one is drawn.
@@ -57,14 +57,14 @@ class _WalkEpisodes:
         return columns, np.zeros((0, len(generators)))
 
     def shown(self, drawn: Floats) -> Scenario:  # noqa: ARG002 - a wearer is no list of numbers
-        """Return the walk before anything is drawn."""
+        """Return the walk before any draw."""
         return self.base
 
 
 def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> _WalkEpisodes:
-    """Return the episodes of a walk of some length [s]; the profile of its controller is the requested torque.
+    """Return the episodes of a walk of a given length [s]; the profile of its controller is the requested torque.
 
-    ScenarioError for a walk with a task sequence or a bottle, or whose controller has no profile.
+    Raises ScenarioError for a walk with a task sequence or a bottle, or with a controller without a profile.
     """
     for name in ("task_sequence", "bottle"):
         if getattr(walk_of(configuration), name) is not None:
@@ -104,7 +104,7 @@ FLAWED_WALK_SENSORS = (
         for setting in ("kind=distorted", "time=0 s", "delay=3 ms")
     ),
 )
-"""Late from the beginning, which is a fault with a delay and nothing else."""
+"""Flawed sensors of a walk; their delay is a fault from the start that only delays."""
 DEFAULTS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "torque": ("torque-task-proportional", FLAWED_SENSORS),
     "angle": (
@@ -113,7 +113,7 @@ DEFAULTS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     ),
     "walk": ("proportional", FLAWED_WALK_SENSORS),
 }
-"""Scenario or walk of each task where none is given, and the overrides that make it."""
+"""Default scenario or walk of each task, and its overrides."""
 VARIED: Mapping[str, Ranges] = {"torque": {"reference.level": ("1 N m", "4.5 N m")}}
 """Values drawn in these tasks in addition to the intervals of the parameter set."""
 TARGETS = ("40 deg", "110 deg")
@@ -126,12 +126,12 @@ COMMANDS = 3
 LARGEST_RATE, LARGEST_FORCE = 1.0e3, 5.0e3
 """Bounds of the requested rate [N m/s] and of the forces [N] that are observed."""
 HEADROOM = 2.0
-"""Largest pressure that is observed, over the highest supply pressure: a vane that is turned compresses its gas."""
+"""Largest observed pressure divided by the highest supply pressure: a moving vane compresses its gas."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EnvironmentSettings:
-    """Settings of an environment beside its task; ``PneumaticEnv`` explains each."""
+    """Settings of an environment besides its task, explained in ``PneumaticEnv``."""
 
     scenario: str | Path | None = None
     overrides: Sequence[str] = ()
@@ -162,7 +162,7 @@ def _check_word(name: str, word: Any, allowed: tuple[str, str]) -> None:
 
 
 def settings_of(arguments: Mapping[str, Any]) -> EnvironmentSettings:
-    """Return settings by name; ScenarioError for a name that is none."""
+    """Return settings by name; ScenarioError for an unknown name."""
     names = [field.name for field in fields(EnvironmentSettings)]
     for name in arguments:
         if name not in names:
@@ -174,7 +174,7 @@ def settings_of(arguments: Mapping[str, Any]) -> EnvironmentSettings:
 def episodes_of(
     task: str, file: str | Path, overrides: Sequence[str], varied: Ranges, settings: EnvironmentSettings
 ) -> ScenarioEpisodes | _WalkEpisodes:
-    """Return the episodes of a task in a scenario or walk; ScenarioError for one that does not suit the task."""
+    """Return the episodes of a task in a scenario or walk; ScenarioError for a scenario that does not suit the task."""
     duration = settings.duration
     if task == "walk":
         if varied:
@@ -193,7 +193,7 @@ def episodes_of(
 
 
 class World:
-    """Common basis of single and vector environments: episodes, spaces, and lanes for any number of environments."""
+    """Common basis of single and vector environments: episodes, spaces, and creation of environments."""
 
     def __init__(self, task: str, settings: EnvironmentSettings) -> None:
         self.settings = settings
@@ -221,32 +221,32 @@ class World:
             self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.task.actions,), np.float32)
 
     def __reduce__(self) -> "tuple[type[World], tuple[str, EnvironmentSettings]]":
-        """Pickle by what it was made of: programs and what they are compiled to are found again."""
+        """Pickle task and settings only; programs and their compiled code are rebuilt."""
         return World, (self.task.name, self.settings)
 
     def __copy__(self) -> "World":
-        """Return this world itself: nothing in it changes from step to step."""
+        """Return this object itself, which is immutable."""
         return self
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "World":
-        """Return this world itself: an environment copies its spaces, with their generators, on its own."""
+        """Return this object itself; an environment copies its spaces with their generators separately."""
         return self
 
     def lanes(self, count: int) -> Environments:
-        """Return lanes for some environments."""
+        """Return ``count`` environments that run side by side."""
         return Environments(self.episodes.program, self.episodes.clock, self.task, count, self.judging)
 
     def begin(
         self, lanes: Environments, places: Places, generators: Sequence[np.random.Generator]
     ) -> tuple[BatchStep, Floats]:
-        """Draw and begin episodes of some environments; return what is seen of all, and what was drawn."""
+        """Draw and start episodes of some environments; return the observations of all, and the drawn numbers."""
         columns, drawn = self.episodes.draw(generators)
         return self._shown(lanes.begin(places, columns)), drawn
 
     def take(self, lanes: Environments, actions: Any) -> BatchStep:
-        """Return what follows from actions that are held for ``frame_skip`` samples, or to the end of an episode.
+        """Return the result of actions that apply to ``frame_skip`` samples, or up to the end of an episode.
 
-        Rewards are added up. SimulationError for an action that is no finite number.
+        Rewards are added up. Raises SimulationError for an action that is not finite.
         """
         taken = lanes.actions
         if self.is_continuous:

@@ -44,7 +44,7 @@ def with_error(value: float, error: float) -> str:
 
 
 def widened_by(fitted: Fit, name: str) -> str:
-    """Return the tolerances that widen the interval of a number, largest first."""
+    """Return a phrase on the tolerances that widen the interval of a variable, largest first."""
     named = [
         f"{other} ({percentage(share, 2)})" for other, share in fitted.shares[name] if other != name and share >= _SHARE
     ][:_MOST_NAMED]

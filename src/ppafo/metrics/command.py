@@ -1,7 +1,7 @@
-"""Oscillation of a loop: reversals of the command's direction, and the overshoot of the torque.
+"""Oscillation of a loop: reversals of the command, and peak torque; torque error of a walk.
 
-A loop that is too fast for the dead time of its valve opens it fully one way and then the other. A reversal is a
-command from beyond +0.5 to beyond -0.5 or back; in a walk both belong to one task, without venting in between.
+A loop that is too fast for the dead time of its valve opens the valve fully one way and then the other. A reversal is a
+command from beyond +0.5 to beyond -0.5 or back; in a walk both must be in the same task, without venting in between.
 """
 
 from typing import NamedTuple
@@ -23,7 +23,7 @@ HALF_OPEN = 0.5
 
 
 class Reversals(NamedTuple):
-    """Last direction of the command in this task, 1, -1 or 0 for neither; the task; number of reversals so far."""
+    """Last direction of the command in this task (1, -1, or 0 for neither), task, and number of reversals so far."""
 
     way: float
     task: float
@@ -31,12 +31,12 @@ class Reversals(NamedTuple):
 
 
 def way_of(command: float) -> float:
-    """Direction [-] in which a command opens the valve: 1 or -1, 0 if it is at most half open or vents."""
+    """Direction [-] in which a command opens the valve: 1 or -1; 0 if the valve is at most half open, or vents."""
     return (1.0 if HALF_OPEN < command <= VENTS_ABOVE else 0.0) - (1.0 if command < -HALF_OPEN else 0.0)
 
 
 def start_reversals(_course: ReferenceSummary, sample: Sample) -> Reversals:
-    """No reversal at the first sample."""
+    """State without reversals at the first sample."""
     return Reversals(way_of(sample.command), sample.stride.phase, 0.0)
 
 
@@ -52,7 +52,7 @@ REVERSALS = MeterKind("reversals", Reversals, start_reversals, update_reversals)
 
 
 def command_reversals(recording: Recording, samples: slice | None = None) -> float:
-    """Reversals of the command in a recording, or in some samples of it."""
+    """Number of reversals of the command in a recording, or in some samples of it."""
     part = samples or slice(None)
     command = recording["command"][part]
     task = recording["controller_phase"][part] if "controller_phase" in recording else np.zeros(command.size)
@@ -71,9 +71,9 @@ def peak_torque(recording: Recording) -> float:
 
 
 class RequestedTorqueSums(NamedTuple):
-    """Sums over the samples in which a walking controller requests a torque, and their number.
+    """Sums over the samples with a requested torque in a walk, and the number of these samples.
 
-    Squared torque errors and squared requested torques [N^2 m^2].
+    ``squares`` are squared torque errors, ``requested`` squared requested torques [N^2 m^2].
     """
 
     squares: float
@@ -92,7 +92,7 @@ def start_asked(_course: ReferenceSummary, _sample: Sample) -> RequestedTorqueSu
 
 
 def update_asked(state: RequestedTorqueSums, _course: ReferenceSummary, sample: Sample) -> RequestedTorqueSums:
-    """Add a sample to the sums, if a torque is requested."""
+    """Add a sample to the sums if a torque is requested."""
     error, counts = sample.reference - sample.torque, is_asked(sample.command, sample.stride.phase)
     return RequestedTorqueSums(
         state.squares + (error * error if counts else 0.0),
@@ -105,14 +105,14 @@ ASKED = MeterKind("asked", RequestedTorqueSums, start_asked, update_asked)
 
 
 def asked_samples(recording: Recording) -> Masks:
-    """Mark the samples in which a controller requests a torque (samples,): all, except in a walk by its phases."""
+    """Mark the samples with a requested torque (samples,): all samples of a task; in a walk by phase and command."""
     if "controller_phase" not in recording:
         return np.ones(len(recording), dtype=np.bool_)
     return np.asarray((recording["command"] <= VENTS_ABOVE) & (recording["controller_phase"] != MID_STANCE))
 
 
 def torque_error(recording: Recording) -> float | None:
-    """RMS error of the torque [N m] over the samples of a walk with a requested torque; None without any."""
+    """RMS torque error [N m] over the samples of a walk with a requested torque; None if there are none."""
     asked = asked_samples(recording)
     if not asked.any():
         return None
@@ -120,7 +120,7 @@ def torque_error(recording: Recording) -> float | None:
 
 
 def requested_torque(recording: Recording) -> float | None:
-    """RMS of the torque [N m] that a walking controller requests; None if it requests none."""
+    """RMS of the torque requested by a walking controller [N m]; None if none is requested."""
     asked = asked_samples(recording)
     return float(np.sqrt(np.mean(recording["reference"][asked] ** 2))) if asked.any() else None
 

@@ -14,25 +14,25 @@ from ppafo.signals.meter import NO_ENERGY, NO_GAS, EnergySample, GasSample, Mete
 
 
 def gained(recording: Recording, channels: tuple[str, ...], function: PlainFunction | None = None) -> float:
-    """Increase of a cumulative channel from the first to the last sample, or a function of several."""
+    """Increase of a cumulative channel from the first to the last sample, or a function of several increases."""
     # A total counts from the start of the run, and a recording may be a part of one.
     gains = [float(recording[channel][-1] - recording[channel][0]) for channel in channels]
     return gains[0] if function is None else float(function(*gains))
 
 
 def gas_imbalance(supplied: Numeric, vented: Numeric, mass_1: Numeric, mass_2: Numeric) -> Numeric:
-    """Supplied less vented less stored gas [kg]: mass error of a simulation, near 0."""
+    """Supplied minus vented minus stored gas [kg]: mass error of a simulation, near 0."""
     # What leaks goes from one chamber to the other: it leaves neither sum.
     return supplied - vented - (mass_1 + mass_2)
 
 
 def gas_taken(supplied: Numeric) -> Numeric:
-    """Gas [kg] that a source supplies, or that a vacuum takes in."""
+    """Gas [kg] taken from a supply, or drawn in by a vacuum."""
     return abs(supplied)
 
 
 def energy_imbalance(supplied: Numeric, vented: Numeric, heat: Numeric, work: Numeric, stored: Numeric) -> Numeric:
-    """Enthalpy supplied less vented, plus heat, less work and stored energy [J]: energy error of a simulation."""
+    """Energy error of a simulation [J]: enthalpy supplied minus vented, plus heat, minus work and stored energy."""
     return supplied - vented + heat - work - stored
 
 
@@ -42,45 +42,45 @@ def largest_pressure(recording: Recording) -> float:
 
 
 def lowest_temperature(recording: Recording) -> float:
-    """Lowest temperature of the gas in a chamber [K]."""
+    """Lowest gas temperature in any chamber [K]."""
     return float(min(np.min(recording[name]) for name in ("temperature_1", "temperature_2") if name in recording))
 
 
 def mechanical_work(recording: Recording) -> float:
-    """Work of the actuator on the joint [J]: integral of torque over angle, which is torque times speed over time.
+    """Work of the actuator on the joint [J]: integral of the torque over the angle.
 
-    Over the angle it needs no speed, and an impact at a stop costs no accuracy.
+    The integral over the angle needs no velocity, and an impact at a stop causes no error.
     """
     return float(np.trapezoid(recording["torque"], recording["angle"]))
 
 
 def work_per_gas(recording: Recording) -> float | None:
-    """Mechanical work per gas taken from the supply [J/kg]; None where none was taken."""
+    """Mechanical work divided by the gas taken from the supply [J/kg]; None if no gas was taken."""
     gas = gained(recording, ("supplied_mass",), gas_taken)
     return mechanical_work(recording) / gas if gas > 0.0 else None
 
 
 def gas_per_work(recording: Recording) -> float | None:
-    """Gas taken from the supply per mechanical work [kg/J]; None where the actuator gave no work."""
+    """Gas taken from the supply divided by the mechanical work [kg/J]; None if the actuator did no positive work."""
     # A task that takes work from the leg would have a ratio below 0, which would rank as the best.
     work = mechanical_work(recording)
     return gained(recording, ("supplied_mass",), gas_taken) / work if work > 0.0 else None
 
 
 class GasGains(NamedTuple):
-    """Gas at the first sample [kg], and what masses and totals have gained since, up to the last sample."""
+    """Gas at the first sample [kg], and increases of masses and totals from the first to the last sample [kg]."""
 
     first: GasSample
     gained: GasSample
 
 
 def start_gas(course: ReferenceSummary, sample: Sample) -> GasGains:
-    """Zero gains at the first sample."""
+    """Zero increases at the first sample."""
     return GasGains(sample.gas, NO_GAS)
 
 
 def update_gas(state: GasGains, course: ReferenceSummary, sample: Sample) -> GasGains:
-    """Gains after one more sample."""
+    """Increases after one more sample."""
     # A run may go on after its last sample, to the end of a step: what passes there is in no recording.
     gained = GasSample(
         supplied_mass=sample.gas.supplied_mass - state.first.supplied_mass,
@@ -96,19 +96,19 @@ GAS = MeterKind("gas", GasGains, start_gas, update_gas)
 
 
 class EnergyGains(NamedTuple):
-    """Energies of the gas at the first sample [J], and what they have gained since, up to the last sample."""
+    """Energies of the gas at the first sample [J], and their increases from the first to the last sample [J]."""
 
     first: EnergySample
     gained: EnergySample
 
 
 def start_energy(course: ReferenceSummary, sample: Sample) -> EnergyGains:
-    """Zero gains at the first sample."""
+    """Zero increases at the first sample."""
     return EnergyGains(sample.energy, NO_ENERGY)
 
 
 def update_energy(state: EnergyGains, course: ReferenceSummary, sample: Sample) -> EnergyGains:
-    """Gains after one more sample."""
+    """Increases after one more sample."""
     gained = EnergySample(
         gas_energy=sample.energy.gas_energy - state.first.gas_energy,
         supplied_enthalpy=sample.energy.supplied_enthalpy - state.first.supplied_enthalpy,
@@ -123,7 +123,7 @@ ENERGY = MeterKind("energy", EnergyGains, start_energy, update_energy)
 
 
 class Peaks(NamedTuple):
-    """Extremes so far: absolute torque [N m]; pressure [Pa absolute] and lowest temperature [K] in either chamber."""
+    """Extremes so far: absolute torque [N m]; pressure [Pa absolute] and lowest temperature [K] in any chamber."""
 
     torque: float
     pressure: float
@@ -152,7 +152,7 @@ PEAKS = MeterKind("peaks", Peaks, start_peaks, update_peaks)
 
 
 class Work(NamedTuple):
-    """Torque [N m] and angle [rad] of the last sample, work so far [J]."""
+    """Torque [N m] and angle [rad] at the last sample, and work so far [J]."""
 
     torque: float
     angle: float
@@ -160,12 +160,12 @@ class Work(NamedTuple):
 
 
 def start_work(course: ReferenceSummary, sample: Sample) -> Work:
-    """No work at the first sample."""
+    """Zero work at the first sample."""
     return Work(sample.torque, sample.angle, 0.0)
 
 
 def update_work(state: Work, course: ReferenceSummary, sample: Sample) -> Work:
-    """Add one interval by the trapezoidal rule over the angle."""
+    """Add the work of one interval by the trapezoidal rule over the angle."""
     piece = 0.5 * (state.torque + sample.torque) * (sample.angle - state.angle)
     return Work(sample.torque, sample.angle, state.work + piece)
 
@@ -182,12 +182,12 @@ def ratio(above: Floats, below: Floats) -> Floats:
 
 
 def per_gas(work: Floats, supplied: Floats) -> Floats:
-    """Work [J] per gas [kg] that a source moves; nan where there is none."""
+    """Work [J] divided by the absolute gas mass [kg]; nan without gas."""
     return ratio(work, gas_taken(supplied))
 
 
 def of_gas(supplied: Floats, work: Floats) -> Floats:
-    """Gas [kg] that a source moves per work [J]; nan where that is not above 0."""
+    """Absolute gas mass [kg] divided by the work [J]; nan unless the work is positive."""
     return ratio(gas_taken(supplied), work)
 
 
@@ -206,7 +206,7 @@ def _of_gains(
     function: PlainFunction | None = None,
     meter: MeterKind = GAS,
 ) -> MetricKind:
-    """Metric of the increase of a total, or of a function of several."""
+    """Metric of the increase of a total, or of a function of several increases."""
     compute = partial(gained, channels=channels, function=function)
     places = tuple(f"meters.{meter.name}.gained.{channel}" for channel in channels)
     return MetricKind(name, unit, summary, channels, compute, ReadAt(places, function), (meter,))

@@ -1,4 +1,4 @@
-"""Declaration and value of a metric; the two parts of a torque task, the ramp and the hold after it."""
+"""Declaration and value of a metric; the two parts of a task, ramp and subsequent hold."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -24,33 +24,33 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """Value of a metric of a recording, in SI units, and its meaning."""
+    """Value of a metric of a recording, in SI units, with its unit and meaning."""
 
     value: float
     unit: str
     summary: str
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
-        """Return the value in SI as an array without axes, for NumPy; ``copy`` means nothing, it is always new."""
+        """Return the SI value as a zero-dimensional array for NumPy; ``copy`` is ignored, the array is always new."""
         return np.array(self.value, dtype)
 
     def __float__(self) -> float:
-        """Return the value in SI, for arithmetic."""
+        """Return the value in SI."""
         return float(self.value)
 
     def in_unit(self, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-        """Return the value in a unit, such as ``g`` or ``psi_g``; gauge counts from ``atmosphere`` [Pa absolute].
+        """Return the value in a unit, such as ``g`` or ``psi_g``; gauge relative to ``atmosphere`` [Pa absolute].
 
-        UnitError for a unit that does not fit.
+        Raises UnitError for a unit that does not fit.
         """
         return from_si(self.value, unit, "Pa_a" if self.unit == "Pa" else self.unit, atmosphere)
 
 
 class Metrics(dict[str, Metric]):
-    """Metrics by name; an unknown name is refused with the nearest one."""
+    """Metrics by name; an unknown name raises DataError with the nearest name."""
 
     def __missing__(self, name: str) -> Metric:
-        """Refuse a name. DataError with the nearest one, as for a channel of a recording."""
+        """Raise DataError with the nearest name, as for a channel of a recording."""
         raise DataError(
             f"there is no metric '{name}'{nearest_name(name, self)}; available: {', '.join(self) or 'none'}"
         )
@@ -58,11 +58,11 @@ class Metrics(dict[str, Metric]):
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """Final meter states of runs that were not recorded; every number is an array (runs,), or a float for one run.
+    """Final meter states of runs without recording; every number is an array (runs,), or a float for one run.
 
-    ``meters`` has the last state of each meter by its name; ``course`` the reference's, () where none needs it;
-    ``interval`` is the time between two samples [s] and ``samples`` their number; ``traces`` has channels sample by
-    sample (samples, runs).
+    ``meters`` maps each meter's name to its final state. ``course`` is the summary of the reference, () if no meter
+    needs one. ``interval`` is the time between two samples [s] and ``samples`` their number. ``traces`` maps channels
+    to their samples (samples, runs).
     """
 
     meters: Mapping[str, Any]
@@ -74,16 +74,16 @@ class Readings:
 
 @dataclass(frozen=True, slots=True)
 class ReadAt:
-    """Reads a metric that is a number at a place of the readings, ``meters.work.work``, or a function of several.
+    """Reader of a metric: a number at a path of the readings, such as ``meters.work.work``, or a function of several.
 
-    Declared, so that an exported library has one expression for it and no function of its own.
+    Declared as data, so that an exported library has one expression for the metric instead of a function.
     """
 
     places: tuple[str, ...]
     function: PlainFunction | None = None
 
     def __call__(self, readings: Readings) -> Floats:
-        """The metric of metered runs (runs,)."""
+        """Metric of metered runs (runs,)."""
         row: Any = readings
         numbers = [reduce(_entry, place.split("."), row) for place in self.places]
         found: Floats = numbers[0] if self.function is None else self.function(*numbers)
@@ -100,20 +100,20 @@ def less(number: Floats, other: Floats) -> Floats:
 
 
 def mean_of(total: Floats, count: Floats) -> Floats:
-    """A sum over how many there are, in its unit; nan for none (runs,)."""
+    """Sum divided by the number of summands, in the unit of the sum; nan without summands (runs,)."""
     # Both sides of a choice are computed, in the lanes too: the divisor is never 0.
     mean: Floats = choose(count > 0.0, total / larger(count, 1.0), math.nan)
     return mean
 
 
 def root_mean(squares: Floats, count: Floats) -> Floats:
-    """Root of the mean of some squares; nan for none (runs,)."""
+    """Square root of the mean of squares; nan without squares (runs,)."""
     found: Floats = root(mean_of(squares, count))
     return found
 
 
 def time_if_any(time: Floats) -> Floats:
-    """A time [s] of something; nan below 0, which stands for what has not happened."""
+    """Time [s] of an event; nan for a negative time, which stands for no event."""
     # The state of a run is floats alone, and a column has no other word for None.
     found: Floats = choose(time >= 0.0, time, math.nan)
     return found
@@ -121,15 +121,15 @@ def time_if_any(time: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class MetricKind:
-    """A metric in the catalogue: the channels it needs, and a pure function that gives the value.
+    """Metric in the catalogue: required channels, and pure functions that give the value.
 
-    ``compute(recording)`` returns None where the recording has the channels but not what the metric is about, for
-    example no hold for the error on the hold. ``read(readings)`` returns the same for many runs (runs,), nan in place
-    of None, from the meters in ``meters`` and the traces of the channels in ``traced``; without a trace it is a
-    ``ReadAt``, or a plain function, no closure, of arithmetic with the functions of ``model.columns``, which is
-    translated too. It is asked only of runs that have the channels, and what is in ``needs``; of a metric about a
-    reference, ``of_reference`` says of what that is. Without ``compute`` it is counted while a run goes on, and no
-    recording of its channels alone has it.
+    ``compute(recording)`` gives the value from a recording with the ``channels``, or None if the metric does not apply,
+    such as an error on the hold without a hold. ``read(readings)`` gives the values of many runs (runs,), nan instead
+    of None, from the meters in ``meters`` and the traces of the channels in ``traced``; without traces it must be a
+    ``ReadAt`` or a plain function, no closure, that uses arithmetic and the functions of ``model.columns``, because it
+    is translated too. It is called only for runs that have the channels and the requirements in ``needs``.
+    ``of_reference`` is the controlled quantity of a metric about a reference. A metric without ``compute`` cannot be
+    computed from a recording.
     """
 
     name: str
@@ -148,9 +148,9 @@ _WAY = "the largest way of the reference from the start"
 
 
 def for_each_reference(kinds: tuple[MetricKind, ...], rename: Callable[[str, str], str]) -> tuple[MetricKind, ...]:
-    """Return metrics of a torque's reference, and the same of each other one, in its unit.
+    """Return metrics of a torque reference, and the same metrics for each other controlled quantity, in its unit.
 
-    ``rename(name, controlled)`` makes the names of the others.
+    ``rename(name, controlled)`` gives the names of the latter.
     """
     others = (
         replace(
@@ -169,23 +169,23 @@ def for_each_reference(kinds: tuple[MetricKind, ...], rename: Callable[[str, str
 
 
 def controlled_in(recording: Recording) -> ControlledQuantity | None:
-    """Return what the reference of a recording is of; None where it has none."""
+    """Return the quantity that the reference in a recording prescribes; None without a reference."""
     return next((kind for kind in CONTROLLED.values() if kind.reference in recording), None)
 
 
 def reference_of(recording: Recording) -> Floats:
-    """Return the reference of a recording, which has one."""
+    """Return the reference in a recording, which must have one."""
     return next(recording[kind.reference] for kind in CONTROLLED.values() if kind.reference in recording)
 
 
 def followed(recording: Recording) -> tuple[Floats, Floats]:
-    """Return the reference of a recording, which has one, and what follows it."""
+    """Return the reference in a recording, which must have one, and the controlled quantity."""
     channel = next(kind.channel for kind in CONTROLLED.values() if kind.reference in recording)
     return reference_of(recording), recording[channel]
 
 
 def extent(recording: Recording) -> float:
-    """Return how far the reference goes: from 0 for a torque, else from what is controlled at the start."""
+    """Return the largest distance of the reference from 0 for a torque, else from the initial controlled value."""
     if CONTROLLED[TORQUE].reference in recording:
         return float(np.max(np.abs(recording[CONTROLLED[TORQUE].reference])))
     reference, value = followed(recording)
@@ -193,7 +193,7 @@ def extent(recording: Recording) -> float:
 
 
 def hold_start(recording: Recording) -> int | None:
-    """Return the sample from which on the reference stays at its final level; None where it never rests there."""
+    """Return the first sample of the final hold of the reference; None if the reference does not rest at the end."""
     reference, tolerance = reference_of(recording), SAME_LEVEL * extent(recording)
     away = np.flatnonzero(np.abs(reference - reference[-1]) > tolerance)
     first = int(away[-1]) + 1 if away.size else 0
@@ -202,20 +202,20 @@ def hold_start(recording: Recording) -> int | None:
 
 
 def ramp(recording: Recording) -> slice | None:
-    """Return the samples until the reference reaches the level it keeps; None where there is no ramp or no hold."""
+    """Return the samples up to the start of the hold; None without a ramp or without a hold."""
     # With the first sample of the hold, so that ramp and hold together are the whole task.
     start = hold_start(recording)
     return slice(start + 1) if start else None
 
 
 def hold(recording: Recording) -> slice | None:
-    """Return the samples from where the reference stays at its final level; None where it never does."""
+    """Return the samples of the hold at the final level; None without a hold."""
     start = hold_start(recording)
     return None if start is None else slice(start, None)
 
 
 def spans(readings: Readings) -> tuple[Floats, Floats]:
-    """Number of samples before the hold and of intervals on it, of metered runs; nan where there is no such part."""
+    """Number of samples before the hold and of intervals on the hold, of metered runs; nan if there is no such part."""
     # Read at the end of a run, where the course has seen the whole reference.
     start = readings.course.hold_start
     length = readings.samples - 1 - start

@@ -11,16 +11,16 @@ from ppafo.signals import Recording
 from ppafo.signals.meter import LED_SHANK, MeterKind, ReferenceSummary, Sample
 
 TRAVEL_FRACTION = 0.01
-"""A move has begun when this fraction of its travel is done, and has arrived when this fraction is left."""
+"""Fraction of the travel after which a move has started, and remaining fraction at which it has arrived."""
 
 # Travel [rad] below which nothing has moved: fractions of it would be rounding over rounding.
 _STANDSTILL = 1.0e-6
 _RETURNED = 0.1
-"""Fraction of the range of the angle: a move that ends nearer to where it began has come back, and is none."""
+"""Smallest distance between start and end of a move, as a fraction of the range of the angle."""
 
 
 def angle_range(recording: Recording) -> float:
-    """Largest angle less smallest angle [rad]."""
+    """Largest angle minus smallest angle [rad]."""
     return float(np.ptp(recording["angle"]))
 
 
@@ -30,9 +30,9 @@ def largest_speed(recording: Recording) -> float:
 
 
 def time_of_fraction(recording: Recording, fraction: float) -> float | None:
-    """Time [s] at which a fraction of the way from the first to the last angle is first done; None without a move.
+    """Time [s] at which a fraction of the travel from first to last angle is first reached; None without a move.
 
-    One that ends about where it began is no move.
+    A motion that ends near its start is no move.
     """
     travelled = recording["angle"] - recording["angle"][0]
     if abs(travelled[-1]) < max(_STANDSTILL, _RETURNED * float(np.ptp(travelled))):
@@ -57,7 +57,7 @@ def start_extremes(course: ReferenceSummary, sample: Sample) -> Extremes:
 
 
 def update_extremes(state: Extremes, course: ReferenceSummary, sample: Sample) -> Extremes:
-    """The extremes with the next sample among them."""
+    """Extremes including the next sample."""
     return Extremes(
         smallest=min(state.smallest, sample.angle),
         largest=max(state.largest, sample.angle),
@@ -69,7 +69,7 @@ EXTREMES = MeterKind("extremes", Extremes, start_extremes, update_extremes, of_m
 
 
 def read_time_of_fraction(readings: Readings, fraction: float) -> Floats:
-    """Time [s] (runs,) until a fraction of the way is done, of traces (samples, runs); nan where nothing moves."""
+    """Time [s] (runs,) at which a fraction of the travel is reached, from traces (samples, runs); nan if at rest."""
     travelled = readings.traces["angle"] - readings.traces["angle"][0]
     moves = np.abs(travelled[-1]) >= np.maximum(_STANDSTILL, _RETURNED * np.ptp(travelled, axis=0))
     done = travelled / np.where(moves, travelled[-1], np.nan)
@@ -82,18 +82,18 @@ def read_time_of_fraction(readings: Readings, fraction: float) -> Floats:
 
 
 def foot_angle_error(recording: Recording) -> float:
-    """Root of the time average of the foot's angle less the measured one, squared [rad], by the trapezoidal rule."""
+    """RMS over time of foot angle minus measured foot angle [rad], by the trapezoidal rule."""
     error = recording["foot_angle"] - recording["measured_foot_angle"]
     return float(np.sqrt(np.trapezoid(error**2, recording.time) / recording.duration))
 
 
 def toe_clearance_error(recording: Recording) -> float:
-    """Lowest height of the toes against the measured ones at the same instant [m]; below 0 where they hang lower."""
+    """Smallest toe height minus measured toe height at the same instant [m]; negative for toes too low."""
     return float(np.min(recording["toe_difference"]))
 
 
 class FootError(NamedTuple):
-    """Squared error of the foot's angle at the last sample [rad^2], trapezoidal sum of it, and lowest toes [m]."""
+    """Squared foot angle error at the last sample [rad^2], its trapezoidal sum [rad^2], lowest toe difference [m]."""
 
     last: float
     total: float
@@ -101,13 +101,13 @@ class FootError(NamedTuple):
 
 
 def start_foot_error(course: ReferenceSummary, sample: Sample) -> FootError:
-    """The error of the first sample."""
+    """Foot error of the first sample."""
     error = sample.foot.angle - sample.foot.measured_angle
     return FootError(error * error, 0.0, sample.foot.toe_difference)
 
 
 def update_foot_error(state: FootError, course: ReferenceSummary, sample: Sample) -> FootError:
-    """Add one interval."""
+    """Foot error after one more interval."""
     error = sample.foot.angle - sample.foot.measured_angle
     square = error * error
     return FootError(square, state.total + 0.5 * (state.last + square), min(state.lowest, sample.foot.toe_difference))
@@ -125,7 +125,7 @@ def read_foot_angle_error(readings: Readings) -> Floats:
 
 
 def _time(name: str, fraction: float, summary: str) -> MetricKind:
-    """The time at which a fraction of the move is done, of runs with all of their samples."""
+    """Metric of the time at which a fraction of the move is reached, from complete traces."""
     compute = partial(time_of_fraction, fraction=fraction)
     read = partial(read_time_of_fraction, fraction=fraction)
     return MetricKind(name, "s", summary, ("angle",), compute, read, traced=("angle",))

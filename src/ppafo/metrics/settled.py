@@ -1,7 +1,7 @@
-"""Settled part of metered runs: the numbers by which a verdict on tracking judges a run that was not recorded.
+"""Settled part of runs without recording: the numbers from which the tracking verdict is derived.
 
-The settled part is the second half of the hold, or of the run where the reference rests for less than a tenth of it.
-These numbers are for verdicts: no table and no study lists them.
+The settled part is the second half of the hold, or of the run if the reference rests for less than a tenth of the run.
+These numbers are for verdicts only: no table and no study lists them.
 """
 
 from collections.abc import Callable
@@ -16,15 +16,18 @@ from ppafo.model.columns import larger
 from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
 
 SHORTEST_HOLD = 0.1
-"""Share of a run that a hold must last to be judged as one [-]."""
+"""Shortest hold that is judged as a hold, as a fraction of the run [-]."""
 
 
 class SettledSums(NamedTuple):
-    """Sums over the samples of the settled part so far, and extremes of what is controlled over the run.
+    """Sums over the samples of the settled part so far, and extremes of the controlled quantity over the run.
 
-    Squared error, error, number of samples, swing, lowest and highest value of the error, reversals of the command,
-    lowest and highest angle [rad]; then what is controlled
-    at the start, its lowest and highest value, and these since the reference was met from that side (1 once it was).
+    ``squares`` is the sum of squared errors, ``total`` the sum of errors, ``taken`` the number of samples, ``swing``
+    the reversal state of the error, ``lowest_error`` and ``highest_error`` the extremes of the error, ``command`` the
+    reversals of the command, and ``lowest_angle`` and ``highest_angle`` the extremes of the angle [rad]. ``begun`` is
+    the initial controlled value, ``lowest`` and ``highest`` its extremes. ``met_upwards`` is 1 once the value has been
+    at or below the reference, and ``top`` the highest value since then; ``met_downwards`` and ``bottom`` are the
+    opposite.
     """
 
     squares: float
@@ -46,7 +49,7 @@ class SettledSums(NamedTuple):
 
 
 def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
-    """Sums of the first sample."""
+    """Sums with the first sample only."""
     value = sample.value
     error = value - sample.reference
     return SettledSums(
@@ -70,7 +73,7 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
 
 
 def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample) -> SettledSums:
-    """Sums with one more sample; they begin anew where half of the run, or of the hold, is over."""
+    """Sums with one more sample; they restart at half of the run and at half of the hold."""
     value = sample.value
     error = value - sample.reference
     # The first sample of a half is that from which on twice its number is at least this.
@@ -107,7 +110,7 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
 
 
 def is_long_enough(hold_start: float, samples: float) -> bool:
-    """Tell whether a reference rests for long enough to be judged there, from the number of its first sample."""
+    """Tell whether a reference that rests from sample ``hold_start`` on does so for long enough to be judged there."""
     length = samples - 1.0 - hold_start
     return length >= 1.0 and length >= SHORTEST_HOLD * (samples - 1.0)
 
@@ -116,19 +119,19 @@ SETTLED = MeterKind("settled", SettledSums, start_settled, update_settled, True)
 
 
 def farther(highest: Floats, lowest: Floats) -> Floats:
-    """Larger of how far two numbers are from 0, the one above it and the other below."""
+    """Largest absolute value between two extremes, of which ``highest`` is above 0 or ``lowest`` below."""
     found: Floats = larger(highest, -lowest)
     return found
 
 
 def read_reversals(readings: Readings) -> Floats:
-    """``settled_reversals`` of the command [1/s]; of less than a second as of one."""
+    """``settled_reversals`` of the command [1/s]; a duration below a second counts as one second."""
     sums = readings.meters[SETTLED.name]
     return np.asarray(sums.command.turns / larger((sums.taken - 1.0) * readings.interval, 1.0))
 
 
 def read_share_of_hold(readings: Readings) -> Floats:
-    """``settled_share_of_hold`` [-], the hold over the run."""
+    """``settled_share_of_hold`` [-]: duration of the hold divided by duration of the run."""
     return np.asarray((readings.samples - 1 - readings.course.hold_start) / (readings.samples - 1))
 
 
@@ -152,4 +155,4 @@ SETTLED_METRICS = {
     f"settled_{name}": MetricKind(f"settled_{name}", "-", "for verdicts", (), None, read, (SETTLED,))
     for name, read in _NUMBERS.items()
 }
-"""Numbers of the settled part by name, in SI of what is controlled; beside METRICS, since nobody lists them."""
+"""Numbers of the settled part by name, in SI of the controlled quantity; kept out of METRICS and its lists."""

@@ -1,6 +1,6 @@
-"""Metrics of a walk stride by stride, without a recording: one meter that goes through the samples once.
+"""Metrics of a walk stride by stride, without a recording: one meter, updated once per sample.
 
-``walking/strides.py`` counts the same in a recording with its mean curves; tests compare the two.
+``walking/strides.py`` computes the same from a recording with its mean curves; tests compare the two.
 """
 
 from collections.abc import Callable
@@ -12,14 +12,14 @@ from ppafo.model.helping import HELPS, PUSH_OFF
 from ppafo.signals.meter import REQUESTED, STEADY, WALK, MeterKind, ReferenceSummary, Sample, StrideSample
 
 SETTLING = 2
-"""First strides that are left out of averages: the controller learns the stride time in them."""
+"""Number of first strides excluded from averages, in which the controller learns the stride time."""
 NOT_YET = -1.0
-"""Time [s] of what has not happened."""
+"""Time [s] that stands for no event."""
 
 
 @dataclass(frozen=True, slots=True)
 class _StrideQuantity:
-    """A quantity of every stride: unit, meaning, and the running total in the record whose gain it is."""
+    """Quantity per stride: unit, meaning, and path of the running total whose increase it is."""
 
     unit: str
     summary: str
@@ -42,7 +42,7 @@ PER_STRIDE: dict[str, _StrideQuantity] = {
 
 
 class StrideTotals(NamedTuple):
-    """Gas from the supply [kg], works of T_ex [J], clearances of the toes [m] and landings on them, since some moment.
+    """Gas from the supply [kg], works of T_ex [J], toe clearances [m] and number of toe landings, since some instant.
 
     Fields have the names of ``PER_STRIDE``.
     """
@@ -55,11 +55,12 @@ class StrideTotals(NamedTuple):
 
 
 class CurrentStride(NamedTuple):
-    """The stride under way: totals since the start of the walk at its strike, and what its samples have shown.
+    """Stride in progress.
 
-    ``is_whole`` is 1 of one that began with a strike, which the walk itself does not; ``on_toes`` of one that began on
-    the toes: the totals at its strike have that landing already. ``lacked_help`` is 1 where a sample had less help.
-    ``squared_errors`` [(N m)^2] are those of the torque, summed over its ``push_off_samples``.
+    ``is_whole`` is 1 for a stride that started with a heel strike; the first one of a walk did not. ``on_toes`` is 1
+    for a stride that started with a landing on the toes. ``at_strike`` are the totals since the start of the walk at
+    the heel strike, including such a landing. ``lacked_help`` is 1 after a sample with reduced assistance.
+    ``squared_errors`` [(N m)^2] is the sum of squared torque errors over ``push_off_samples`` samples in push-off.
     """
 
     is_whole: float
@@ -71,10 +72,12 @@ class CurrentStride(NamedTuple):
 
 
 class EndedStrides(NamedTuple):
-    """Counts of strides: ``whole``, ``helped`` (with help throughout), and ``averaged`` (helped but the first ones).
+    """Numbers of completed strides.
 
-    Over the averaged ones: sums of what each adds to the totals, of squared errors of the torque in push-off
-    [(N m)^2], and of the samples there.
+    ``whole`` counts all but a partial first one, ``helped`` those with assistance throughout, and ``averaged`` the
+    helped ones without the first strides of the walk. ``sums`` are the increases of the totals, ``squared_errors`` the
+    sum of squared torque errors in push-off [(N m)^2], and ``push_off_samples`` the number of samples in push-off, all
+    over the averaged strides.
     """
 
     whole: float
@@ -86,9 +89,9 @@ class EndedStrides(NamedTuple):
 
 
 class StrideMeter(NamedTuple):
-    """A walk up to a sample: heel strikes, gas [kg] from the supply at the first sample and now, its strides.
+    """State of a walk up to a sample: number of heel strikes, supplied gas [kg] at first and at present, strides.
 
-    ``safe_time`` [s] is the time of the first sample with less help, ``NOT_YET`` without one.
+    ``safe_time`` [s] is the time of the first sample with reduced assistance, ``NOT_YET`` if there was none.
     """
 
     strikes: float
@@ -100,7 +103,7 @@ class StrideMeter(NamedTuple):
 
 
 def totals_at(sample: StrideSample) -> StrideTotals:
-    """Totals since the start of the walk at a sample of it."""
+    """Totals since the start of the walk at a sample."""
     return StrideTotals(
         gas=sample.supplied_mass,
         positive_push_off_work=sample.positive_push_off_work,
@@ -111,9 +114,10 @@ def totals_at(sample: StrideSample) -> StrideTotals:
 
 
 def sums_with_stride(sums: StrideTotals, at_strike: StrideTotals, at_end: StrideTotals, on_toes: float) -> StrideTotals:
-    """Sums over strides with one more, of which the totals at its strike and at its end are given.
+    """Sums over strides including one more, given the totals at its start and its end.
 
-    ``on_toes`` is 1 where it began on the toes: that landing is its own, and not the one with which the next begins.
+    ``on_toes`` is 1 if the stride started on the toes: that landing belongs to this stride, the one at its end to the
+    next.
     """
     # Field by field: compiled code has no loop over a row.
     return StrideTotals(
@@ -127,7 +131,7 @@ def sums_with_stride(sums: StrideTotals, at_strike: StrideTotals, at_end: Stride
 
 
 def begun_stride(sample: StrideSample, is_whole: float, on_toes: float) -> CurrentStride:
-    """A stride that begins at a sample, of which nothing is counted yet."""
+    """Stride that starts at a sample, with empty sums."""
     return CurrentStride(
         is_whole=is_whole,
         on_toes=on_toes,
@@ -169,7 +173,7 @@ def _update(strides: StrideMeter, _course: ReferenceSummary, sample: Sample) -> 
 
 
 def stride_with_sample(stride: CurrentStride, sample: Sample) -> CurrentStride:
-    """The stride under way with one sample more."""
+    """Current stride after one more sample."""
     error = sample.reference - sample.torque
     pushes = sample.stride.phase == PUSH_OFF
     return stride._replace(
@@ -180,7 +184,7 @@ def stride_with_sample(stride: CurrentStride, sample: Sample) -> CurrentStride:
 
 
 def ended_with_stride(ended: EndedStrides, stride: CurrentStride, sample: Sample) -> EndedStrides:
-    """The strides that have ended with the one that ends at ``sample``, the first after a heel strike."""
+    """Completed strides including the one that ends at ``sample``, the first sample after a heel strike."""
     # A stride with less help in a part of it is no example; in the first ones the controller still learns their time.
     is_helped = stride.is_whole > 0.5 and stride.lacked_help < 0.5
     is_averaged = is_helped and ended.whole >= float(SETTLING)
@@ -200,7 +204,7 @@ METER = MeterKind("strides", StrideMeter, _start, _update)
 
 
 def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats], *needs: str) -> MetricKind:
-    """A metric of a walk; ``needs`` is what it needs beside one."""
+    """Metric of a walk; ``needs`` are its further requirements."""
     return MetricKind(name, unit, summary, (), None, read, (METER,), needs=(WALK, *needs))
 
 

@@ -1,10 +1,11 @@
-"""Switching and oscillation of a task: changes of state of the valves, and reversals of the controlled quantity.
+"""Switching and oscillation of a task: state changes of the valves, and reversals of the controlled quantity.
 
-The state of a valve is the one that the command orders, at the samples: valve A of a pair is on above 0, valve B below,
-both are off at 0 and where the command vents. Each change of each valve counts one, so a reversal of a pair counts two.
-A proportional valve has a way from the supply to either chamber, open or shut, which count as the valves of a pair do:
-how often the command leaves 0 or returns, not how far the spool moves. A coil whose ``switching_interval`` is longer
-than the time between two commands changes less often than ordered; so does a spool with a dead band.
+The state of a valve is the one commanded at each sample: valve A of a pair is on above 0, valve B below, and both are
+off at 0 and while the command vents. Each change of each valve counts as one, so a reversal of a pair counts as two. A
+proportional valve has a path from the supply to each chamber, open or shut; these paths count like the valves of a
+pair, by the number of times that the command leaves 0 or returns, not by the spool travel. A coil whose
+``switching_interval`` is longer than the time between two commands changes less often than commanded; so does a spool
+with a dead band.
 """
 
 import math
@@ -32,16 +33,16 @@ from ppafo.signals import Recording
 from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
 
 OSCILLATION_THRESHOLD = 0.05
-"""Smallest swing that counts as an oscillation, as a fraction of how far the reference goes."""
+"""Smallest reversal that counts as an oscillation, as a fraction of the reference's extent."""
 
 SHUT = 1.0e-6
-"""Command up to which a valve counts as off or shut: what rounding leaves at the start of a task opens nothing."""
+"""Command up to which a valve counts as off or shut, so that rounding at the start of a task opens nothing."""
 
 _NEEDED = ("torque", "reference")
 
 
 def switchings(recording: Recording) -> float:
-    """Number of changes of state that the command orders, of both valves together."""
+    """Number of commanded state changes of both valves."""
     # As ``ordered_positions`` says it of one command.
     command = recording["command"]
     positions_a, positions_b = (command > SHUT) & (command < VENTS_ABOVE), command < -SHUT
@@ -51,8 +52,7 @@ def switchings(recording: Recording) -> float:
 def reversals(values: Floats, swing: float) -> int:
     """Return the number of times that a signal turns back by more than ``swing`` (its own unit) from its last extreme.
 
-    Smaller wiggles, noise among them, count for nothing, however many they are. A signal that only rises or only
-    falls has none.
+    Smaller fluctuations, such as noise, do not count, regardless of their number. A monotone signal has no reversal.
     """
     # No way yet: the first swing, up or down, is no reversal.
     count, direction = 0, 0
@@ -74,7 +74,7 @@ def reversals(values: Floats, swing: float) -> int:
 
 
 def oscillations(recording: Recording, part_of: Callable[[Recording], slice | None]) -> float | None:
-    """Number of reversals in a part of the task that swing over 5 % of how far the reference goes; None without."""
+    """Number of reversals by more than 5 % of the reference's extent in a part of a task; None without that part."""
     part, largest = part_of(recording), extent(recording)
     # Without a reference there is nothing that the smallest swing could be a fraction of.
     if part is None or largest == 0.0:
@@ -83,7 +83,7 @@ def oscillations(recording: Recording, part_of: Callable[[Recording], slice | No
 
 
 class Switchings(NamedTuple):
-    """Positions of valves A and B, 1 where on, and changes of both so far."""
+    """Positions of valves A and B (1 for on), and number of changes of both so far."""
 
     position_a: float
     position_b: float
@@ -91,18 +91,18 @@ class Switchings(NamedTuple):
 
 
 def ordered_positions(command: float) -> tuple[float, float]:
-    """Positions [-] of valves A and B that a command orders: 1 on, 0 off."""
+    """Commanded positions [-] of valves A and B: 1 on, 0 off."""
     return (1.0 if command > SHUT and command < VENTS_ABOVE else 0.0), (1.0 if command < -SHUT else 0.0)
 
 
 def start_switchings(course: ReferenceSummary, sample: Sample) -> Switchings:
-    """No change at the first sample."""
+    """Zero changes at the first sample."""
     position_a, position_b = ordered_positions(sample.command)
     return Switchings(position_a, position_b, 0.0)
 
 
 def update_switchings(state: Switchings, course: ReferenceSummary, sample: Sample) -> Switchings:
-    """Count each valve that the command orders to change."""
+    """Count each valve whose commanded position changes."""
     position_a, position_b = ordered_positions(sample.command)
     changes = abs(position_a - state.position_a) + abs(position_b - state.position_b)
     return Switchings(position_a, position_b, state.changes + changes)
@@ -112,12 +112,12 @@ SWITCHINGS = MeterKind("switchings", Switchings, start_switchings, update_switch
 
 
 class Swing(NamedTuple):
-    """State of ``reversals``, in three numbers.
+    """State of ``reversals`` as three numbers.
 
-    ``play`` follows the signal with a slack of one swing, between it and one swing below it: it moves only where the
-    signal has gone on, or has turned back by more. ``turns`` is above 0 while the signal rises and below 0 while it
-    falls; its size is 1 more than the number of reversals. It begins at UNDECIDED, from which a first way up leads to a
-    size between 1 and 2, which is no reversal yet; a first way down leads to -1. ``highest`` is the highest value.
+    ``play`` follows the signal with a backlash of one swing: it stays between the signal and one swing below, and moves
+    only if the signal goes on or turns back by more. ``turns`` is positive while the signal rises and negative while it
+    falls; its absolute value is 1 plus the number of reversals. It starts at UNDECIDED: a first rise leads to an
+    absolute value between 1 and 2, which is no reversal yet, and a first fall to -1. ``highest`` is the highest value.
     """
 
     play: float
@@ -129,7 +129,7 @@ UNDECIDED = -0.5
 
 
 def next_swing(state: Swing, value: float, swing: float) -> Swing:
-    """The state after one more value, in the unit of ``swing``."""
+    """State after one more value, in the unit of ``swing``."""
     # The sign of ``turns`` is the way and its size counts: a turn changes the one and adds 1 to the other.
     play = min(max(state.play, value - swing), value)
     turns_back = (play - state.play) * state.turns < 0.0
@@ -145,20 +145,20 @@ def count_of(turns: Floats) -> Floats:
 
 
 class Oscillations(NamedTuple):
-    """The swing on the ramp, then on the hold; its ``turns`` on the ramp once there is a hold."""
+    """Reversal state of the ramp, then of the hold; ``turns_on_ramp`` is the final ``turns`` of the ramp."""
 
     swing: Swing
     turns_on_ramp: float
 
 
 def start_oscillations(course: ReferenceSummary, sample: Sample) -> Oscillations:
-    """No reversal at the first sample."""
+    """Zero reversals at the first sample."""
     value = sample.value
     return Oscillations(Swing(value, UNDECIDED, value), UNDECIDED)
 
 
 def update_oscillations(state: Oscillations, course: ReferenceSummary, sample: Sample) -> Oscillations:
-    """Add one sample; the first sample of the hold is also the last one of the ramp."""
+    """State after one more sample; the first sample of the hold is also the last one of the ramp."""
     value = sample.value
     swing = next_swing(state.swing, value, OSCILLATION_THRESHOLD * course.largest)
     anew = course.hold_start == sample.number
@@ -180,7 +180,7 @@ def read_oscillations_hold(readings: Readings) -> Floats:
 
 
 def _where_swinging(readings: Readings, span: Floats, count: Floats) -> Floats:
-    """The count; nan without that part of the task or without a reference to measure against."""
+    """Number of reversals; nan without that part of the task, or for a reference that is always 0."""
     found: Floats = choose(span > 0.0, choose(readings.course.largest != 0.0, count, math.nan), math.nan)
     return found
 

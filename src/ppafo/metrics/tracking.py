@@ -18,26 +18,26 @@ ONE_INSTANT = {
     (f"final_{name}error"): (f"rms_{name}error_hold", f"{name}oscillations_hold")
     for name in ("" if controlled == TORQUE else f"{controlled}_" for controlled in CONTROLLED)
 }
-"""Metrics that read one sample, which in a loop that oscillates falls anywhere; those that say whether it does."""
+"""Metrics of a single instant, arbitrary in an oscillating loop, and the metrics that reveal the oscillation."""
 SUSTAINED = 4
-"""Reversals on the hold from which a loop oscillates; one that settles has one or two."""
+"""Number of reversals on the hold from which a loop oscillates; a settling loop has one or two."""
 
 
 def settled_error(final: Floats, on_hold: Floats, reversals: Floats) -> Floats:
-    """Return the error at the end or, where the loop oscillates on the hold, its RMS there if that is larger."""
+    """Return the final error or, if the loop oscillates on the hold, the RMS error there if that is larger."""
     return np.where((reversals >= SUSTAINED) & (on_hold > final), on_hold, final)
 
 
 def error_of(recording: Recording) -> Floats:
-    """Return the reference less what follows it, in the unit of the reference."""
+    """Return reference minus controlled quantity, in the unit of the reference."""
     reference, value = followed(recording)
     return reference - value
 
 
 def rms_error(recording: Recording, part_of: Callable[[Recording], slice | None] | None = None) -> float | None:
-    """Root of the time average of the squared error in all or a part; None where it has no such part.
+    """RMS error over time in all of a recording or a part of it; None without that part.
 
-    By the trapezoidal rule, so that any sampling will do.
+    The integral is by the trapezoidal rule, valid for any sampling.
     """
     part = slice(None) if part_of is None else part_of(recording)
     if part is None:
@@ -58,7 +58,7 @@ def final_error(recording: Recording) -> float:
 
 
 class SquaredError(NamedTuple):
-    """Squared error at the last sample; trapezoidal sums of it before the hold and on it, one a sample."""
+    """Squared error at the last sample, and its trapezoidal sums before the hold and on the hold, in intervals."""
 
     last: float
     before_hold: float
@@ -66,13 +66,13 @@ class SquaredError(NamedTuple):
 
 
 def start_squared_error(course: ReferenceSummary, sample: Sample) -> SquaredError:
-    """The squared error of the first sample."""
+    """Squared error of the first sample."""
     error = sample.reference - sample.value
     return SquaredError(error * error, 0.0, 0.0)
 
 
 def update_squared_error(state: SquaredError, course: ReferenceSummary, sample: Sample) -> SquaredError:
-    """Add one interval."""
+    """Sums including one more interval."""
     error = sample.reference - sample.value
     square = error * error
     # In intervals: all have one length, which cancels where the sum is read.
@@ -88,20 +88,20 @@ SQUARED_ERROR = MeterKind("squared_error", SquaredError, start_squared_error, up
 
 
 class AbsoluteError(NamedTuple):
-    """Absolute error: the largest, and the one of the last sample so far."""
+    """Largest absolute error so far, and absolute error at the last sample."""
 
     largest: float
     last: float
 
 
 def start_absolute_error(course: ReferenceSummary, sample: Sample) -> AbsoluteError:
-    """The error of the first sample."""
+    """Absolute error of the first sample."""
     error = abs(sample.reference - sample.value)
     return AbsoluteError(error, error)
 
 
 def update_absolute_error(state: AbsoluteError, course: ReferenceSummary, sample: Sample) -> AbsoluteError:
-    """The larger one of that and the error of the next sample, and this one."""
+    """Absolute errors including the next sample."""
     error = abs(sample.reference - sample.value)
     return AbsoluteError(max(state.largest, error), error)
 

@@ -1,1 +1,1 @@
-"""The page that simulates: one file of HTML with programs as WebAssembly, controls, plots; nothing is fetched."""
+"""Interactive page: one HTML file with WebAssembly programs, controls and plots, without network access."""

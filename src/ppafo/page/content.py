@@ -1,4 +1,4 @@
-"""Content of a page about its scenarios: settings with units, limits and sliders, relations, channels and metrics."""
+"""Content of a page on its scenarios: settings with units, limits and sliders, relations, channels and metrics."""
 
 import contextlib
 import json
@@ -46,22 +46,22 @@ _UNITS: dict[str, tuple[str, ...]] = {
     "kg m^2/s": ("g m^2/s", "kg m^2/s", "N m s"),
     "": ("", "percent"),
 }
-"""Units in which a person may type a value, beside the unit in which it is shown and that in SI."""
+"""Units accepted for typed values, in addition to the display unit and the SI unit."""
 _GAUGES = ("psi_g", "kPa_g", "bar_g", "Pa_g")
 _ABSOLUTE = ("largest_pressure",)
-"""Metrics whose name says that a pressure is absolute."""
+"""Metrics that are absolute pressures."""
 _NICE = (1.0, 2.0, 2.5, 5.0, 10.0)
 
 
 @cache
 def words() -> dict[str, Any]:
-    """Return the claims, sliders and questions of pages: ``words.toml``."""
+    """Return the texts on claims, sliders and questions of pages, from ``words.toml``."""
     return tomllib.loads(files("ppafo.page").joinpath("words.toml").read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True, slots=True)
 class PageSimulation:
-    """A scenario or walk and the module that simulates it; ``label`` distinguishes it from others of its tab."""
+    """Scenario or walk with the module that simulates it; ``label`` distinguishes it from others in its tab."""
 
     scenario: Scenario
     module: WasmModule
@@ -69,7 +69,7 @@ class PageSimulation:
 
 
 def program_content(simulated: PageSimulation, module: str, intervals: Mapping[str, Interval]) -> dict[str, Any]:
-    """Return what the page knows of a scenario; ``module`` is the element that holds its program."""
+    """Return the page's data on a scenario; ``module`` is the id of the HTML element with its program."""
     described = simulated.module.description
     gauge = _gauge_texts(simulated.scenario, described["settings"])
     keys = {setting["key"] for setting in described["settings"]}
@@ -126,18 +126,18 @@ _SUSTAINED = {
     "lowered": "supply.dorsiflexion_pressure",
     "zero": ATMOSPHERE_PATH,
 }
-"""The settings of which the torques are made that the supplies sustain."""
+"""Settings that determine the static torques reachable with the supply pressures."""
 
 
 def usual_values(scenario: Scenario) -> dict[str, float]:
-    """Return the changes with which a scenario begins as numbers in SI by key: all of them are times."""
+    """Return the initial changes of a scenario on a page as SI numbers by key; all of them are times [s]."""
     return {key: parse_quantity(text, "s") for key, text in usual_changes(scenario).items()}
 
 
 def page_content(
     title: str, form: str, tabs: Sequence[Mapping[str, Any]], programs: Sequence[Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """Return all that a page is made of, but its modules."""
+    """Return all data of a page except its modules."""
     shown = {
         (entry["unit"], entry["shown"])
         for program in programs
@@ -231,7 +231,7 @@ def _setting(
 
 
 def _bare(unit: str) -> str:
-    """A unit as it is typed; a plain number has none."""
+    """Return a unit as typed by the user; empty for a plain number."""
     return "" if unit == "1" else unit
 
 
@@ -247,7 +247,7 @@ def _shown(entry: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _gauge_texts(scenario: Scenario, settings: Iterable[Mapping[str, Any]]) -> dict[str, str]:
-    """Texts of the pressures that count from the atmosphere: they move with it, as they do in Python."""
+    """Return texts of the gauge pressures that follow the atmosphere, as in Python."""
     following = {entry["key"] for entry in settings if entry["follows"]}
     gaps = {
         path: link.gap for path, links in scenario.graph.items() for link in links if link.sources == (ATMOSPHERE_PATH,)
@@ -268,5 +268,5 @@ def _gauge_texts(scenario: Scenario, settings: Iterable[Mapping[str, Any]]) -> d
 
 
 def _typed(unit: str, si: str) -> str:
-    """The unit as it is typed; differences of pressure are shown without their ending."""
+    """Return a unit as typed by the user; the displayed unit of a pressure difference lacks its suffix."""
     return f"{unit}_d" if si == _DIFFERENCE and not unit.endswith("_d") else unit

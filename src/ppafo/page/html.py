@@ -1,4 +1,4 @@
-"""The file that a browser opens: content, modules, script and style in one page with a strict policy."""
+"""HTML file of a page: content, modules, script and style, with a strict content security policy."""
 
 import base64
 import gzip
@@ -40,16 +40,16 @@ _PAGE = """<!DOCTYPE html>
 SCRIPT, CONTENT = "workbench-script", "workbench-content"
 _MARK = b'content="ppafo workbench"'
 _MARKED = 2000
-"""Bytes from the beginning in which a page says what made it."""
+"""Length [bytes] of the start of a page that contains its generator mark."""
 
 
 def bundled(name: str) -> str:
-    """Return a script (``loader.js``, ``page.js``) or ``page.css``; their source is ``page/`` of the repository."""
+    """Return a script (``loader.js``, ``page.js``) or ``page.css``, built from ``page/`` of the repository."""
     return files("ppafo.page").joinpath("bundle", name).read_text(encoding="utf-8").strip()
 
 
 def is_page(path: Path) -> bool:
-    """Tell whether a file is such a page, which may be written anew."""
+    """Return True if a file is a page of this program and may be overwritten."""
     try:
         # A pipe would be waited for.
         if not path.is_file():
@@ -61,9 +61,9 @@ def is_page(path: Path) -> bool:
 
 
 def page_of(title: str, content: Mapping[str, Any], modules: Mapping[str, str], still: str) -> bytes:
-    """Return a page; ``modules`` has the packed programs by the name that the content has for them.
+    """Return a page; ``modules`` maps names used in the content to packed programs.
 
-    ``still`` is the picture, as SVG, for readers whose browser runs no scripts.
+    ``still`` is an SVG picture for browsers without scripts.
     """
     script, style = bundled("loader.js"), bundled("page.css")
     policy = _POLICY.format(script=digest(script), style=digest(style))
@@ -74,9 +74,9 @@ def page_of(title: str, content: Mapping[str, Any], modules: Mapping[str, str], 
 
 
 def block_of(content: Mapping[str, Any], modules: Mapping[str, str]) -> tuple[str, str]:
-    """Return a part of a page, place, data, style and script, and the policy that the page has in its head.
+    """Return an HTML block to embed (container, data, style and script), and the content security policy of its page.
 
-    That allows the one script, nothing fetched, and styles of the page's own.
+    The policy allows this script and inline styles, and no network access.
     """
     place, script = '<div id="workbench"></div>', bundled("loader.js")
     style = f"<style>{bundled('page.css')}</style>"
@@ -85,23 +85,23 @@ def block_of(content: Mapping[str, Any], modules: Mapping[str, str]) -> tuple[st
 
 
 def data_of(content: Mapping[str, Any], modules: Mapping[str, str]) -> str:
-    """Return the elements that hold the script and what it reads, content and programs: compressed, in base 85."""
+    """Return the HTML elements with script, content and programs: compressed, in base 85."""
     text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
     texts = {SCRIPT: packed_once(bundled("page.js").encode()), CONTENT: packed(text.encode()), **modules}
     return "\n".join(f'<script type="text/plain" id="{escape(name)}">{text}</script>' for name, text in texts.items())
 
 
 def digest(text: str) -> str:
-    """Return the SHA-256 of a script or style as a policy names it."""
+    """Return the SHA-256 of a script or style in the form used by a content security policy."""
     return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
 
 
 def packed_once(content: bytes) -> str:
-    """Return content that many pages hold, compressed, in base 85; from the disk where it was packed before."""
+    """Return compressed base-85 text of content shared by many pages; cached on disk."""
     return kept_bytes("packed", hashlib.sha256(content).hexdigest(), lambda: packed(content).encode()).decode()
 
 
 def packed(content: bytes) -> str:
-    """Return bytes as a page holds them: compressed, in base 85; no such text can end the element that it is in."""
+    """Return bytes compressed in base 85; such a text cannot end the HTML element that contains it."""
     # Without the time of packing: the same content gives the same page.
     return base64.b85encode(gzip.compress(content, 9, mtime=0)).decode("ascii")

@@ -1,4 +1,4 @@
-"""Presentation of scenarios and walks on a page: tab, colour, limits of the settings that only a file has."""
+"""Presentation of scenarios and walks on a page: tab, colour, and setting limits known only from files."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -10,16 +10,16 @@ from ppafo.simulation.motion_kind import WALK
 from ppafo.simulation.scenario import Scenario, vane_motion
 
 _WALKED = 6
-"""Length [s] of a walk in a page, unless somebody wants more: five strides."""
+"""Initial duration [s] of a walk on a page: five strides."""
 
 
 def is_walk(scenario: Scenario) -> bool:
-    """Tell whether a scenario is a walk."""
+    """Return True for a walk."""
     return scenario.motion.motion_kind.layout == WALK
 
 
 def declared_content(scenario: Scenario) -> DeclaredContent:
-    """Return what the file of a scenario can hold."""
+    """Return the declared content of a scenario or walk file."""
     if not is_walk(scenario):
         return OF_A_VANE
     from ppafo.walking.declaration import OF_A_WALK
@@ -28,12 +28,12 @@ def declared_content(scenario: Scenario) -> DeclaredContent:
 
 
 def page_look(scenario: Scenario) -> int:
-    """Return the number of a scenario's colour; walks, with and without the device, take colours in their order."""
+    """Return the colour number of a scenario; walks, with and without the device, get 0: colours in order."""
     return 0 if is_walk(scenario) else PAGE_LOOKS.get(scenario.device.valve.kind, 0)
 
 
 def tab_title(scenario: Scenario) -> str:
-    """Return the title of the tab that a scenario shares with others."""
+    """Return the title of the tab for scenarios with the same motion."""
     if is_walk(scenario):
         return "Walk"
     motion = vane_motion(scenario)
@@ -43,7 +43,7 @@ def tab_title(scenario: Scenario) -> str:
 
 
 def usual_changes(scenario: Scenario) -> dict[str, str]:
-    """Return the changes with which a scenario begins, texts by key: a walk is short here."""
+    """Return the initial changes of a scenario on a page, texts by key: a walk is shortened."""
     if not is_walk(scenario):
         return {}
     from ppafo.walking.motion import SHORTEST_STRIDES
@@ -52,7 +52,7 @@ def usual_changes(scenario: Scenario) -> dict[str, str]:
 
 
 def with_limits(entry: Mapping[str, Any], scenario: Scenario) -> dict[str, Any]:
-    """Return a setting with the limits that its file has and its program has not."""
+    """Return a setting with additional limits, which its file has and its program lacks."""
     if is_walk(scenario):
         from ppafo.walking.motion import LONGEST_MINUTES, SHORTEST_STRIDES
 
@@ -66,7 +66,7 @@ def with_limits(entry: Mapping[str, Any], scenario: Scenario) -> dict[str, Any]:
 
 
 def relations_in_files(keys: Collection[str], scenario: Scenario) -> list[dict[str, Any]]:
-    """Return contradictions of settings that a file refuses and its program does not."""
+    """Return the relations between settings that a file checks and the program does not."""
     if not is_walk(scenario):
         return []
     from ppafo.walking.contradictions import COMPRESSION

@@ -1,7 +1,7 @@
-"""Opening of a page, found by running its programs: effect of each setting, and the first panel.
+"""Initial state of a page, computed by running its programs: effect of each setting, and the first panel.
 
-The package keeps this of its own scenarios in ``opening.json``, which ``scripts/page_tables.py`` writes; of others it
-is computed when the page is made.
+For bundled scenarios the package stores it in ``opening.json``, written by ``scripts/page_tables.py``. For others it is
+computed when the page is made.
 """
 
 import hashlib
@@ -23,22 +23,22 @@ from ppafo.simulation.scenario import Scenario
 
 MOST_FIRST = 12
 LEAST_CHANGE = 1e-3
-"""Change, as a fraction, below which a setting changes nothing that could be seen."""
+"""Relative change below which the effect of a setting is invisible."""
 _STEP = 0.2
-"""Change of a setting to either side, as a fraction of its value; for a gauge pressure, of its gauge value."""
+"""Change of a setting up and down, as a fraction of its value (of the gauge value for a pressure)."""
 _PLACES = 300
 _NATURE = ("gas.", "gas_model.", "flow.", "run.", "sensors.seed", "supply.atmospheric_pressure")
-"""Settings that never come first: what nature sets, and how finely a run is computed and for how long."""
+"""Settings excluded from the first sliders: constants of nature, and step and duration of a run."""
 _RANKED = ("published", "task", "changed", "identified", "fitted", "datasheet", "derived", "assumed", "default")
-"""Provenances in order of display: of two settings with one effect, the better known one is shown."""
+"""Provenances in order of preference: of two settings with the same effect, the better known one is displayed."""
 
 
 def opening_of(
     scenario: Scenario, module: WasmModule, changes: Mapping[str, float], claims: Sequence[str]
 ) -> dict[str, Any]:
-    """Return ``changes`` by setting and the ``courses`` of the first panel, of a scenario with some values in SI.
+    """Return ``changes`` by setting and the ``courses`` of the first panel, for a scenario with given SI values.
 
-    A change is a list of fractions: of each claim, and of the span of the first panel.
+    A change is a list of fractions: relative change of each claim, and change divided by the span of the first panel.
     """
     key = _key(module, changes, claims)
     known = _known().get(scenario.name, {})
@@ -54,7 +54,7 @@ def opening_of(
 
 
 def opening_like(module: WasmModule) -> dict[str, Any]:
-    """Return what is known of the shipped scenario that has most settings in common: a report computes nothing."""
+    """Return the stored initial state of the bundled scenario with most settings in common, without any run."""
     keys = {entry["key"] for entry in module.description["settings"]}
     known = _known()
     named = known.get(module.description["name"])
@@ -62,7 +62,7 @@ def opening_like(module: WasmModule) -> dict[str, Any]:
 
 
 def _key(module: WasmModule, changes: Mapping[str, float], claims: Sequence[str]) -> str:
-    """Hash that identifies a scenario with its file, overrides and the changes of a page."""
+    """Return the hash that identifies a scenario by its file, overrides and changes on a page."""
     content = [module.description["document"], module.description["overrides"], sorted(changes.items()), list(claims)]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
@@ -76,7 +76,7 @@ def _known() -> dict[str, Any]:
 def computed_opening(
     scenario: Scenario, module: WasmModule, given: Mapping[str, float], claims: Sequence[str]
 ) -> dict[str, Any]:
-    """Return what a page shows of a scenario before it has simulated anything: runs and bands, computed now."""
+    """Compute the initial state of a page on a scenario, by runs of the reference and of changed settings."""
     from ppafo.simulation.ensemble import run_ensemble  # a report computes nothing
 
     known = [metric["name"] for metric in module.description["metrics"]]
@@ -128,7 +128,7 @@ def computed_opening(
 
 
 def _short(values: Floats) -> list[float | None]:
-    """Values with four digits, as a drawing needs them; None where a run had failed."""
+    """Return values with four digits for plotting; None for samples of a failed run."""
     return [float(f"{value:.4g}") if np.isfinite(value) else None for value in values.tolist()]
 
 
@@ -138,7 +138,7 @@ def _share(change: Floats, of: float) -> float:
 
 
 def first_settings(openings: Sequence[Mapping[str, Any]], programs: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the keys of at most twelve settings of some configurations, that with the largest change first."""
+    """Return the keys of at most twelve settings with the largest changes over all configurations, largest first."""
     origins = {setting["key"]: setting["origin"] for program in programs for setting in program["settings"]}
     rank = {origin: place for place, origin in enumerate(_RANKED)}
     largest: dict[str, float] = {}

@@ -1,4 +1,4 @@
-"""The picture of a page for browsers that run no scripts: the first panel of what it opens with, as SVG."""
+"""Static SVG picture of a page for browsers without scripts: the first panel of its initial state."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from ppafo.report.style import BLACK, GREY, PAGE_COLOURS
 from ppafo.units.shown import quantity_of_unit
 
 Points = list[tuple[float, float]]
-"""Time [s] and value, in the unit in which it is shown."""
+"""Points of time [s] and value in its display unit."""
 
 _WIDTH, _HEIGHT = 720.0, 340.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 12.0, 30.0, 44.0
@@ -27,18 +27,18 @@ _STEPS = (1.0, 2.0, 5.0, 10.0)
 
 
 class Axes(NamedTuple):
-    """Ticks of time [s] and of the value; the picture goes from the first to the last of each."""
+    """Axes by their ticks of time [s] and value; the picture extends from the first to the last tick."""
 
     times: list[float]
     values: list[float]
 
     def x(self, time: float) -> str:
-        """Return the place of a time across the picture, in pixels."""
+        """Return the horizontal position of a time in the picture [pixels]."""
         width = _WIDTH - _LEFT - _RIGHT
         return f"{_LEFT + width * (time - self.times[0]) / (self.times[-1] - self.times[0]):.1f}"
 
     def y(self, value: float) -> str:
-        """Return the place of a value down the picture, in pixels."""
+        """Return the vertical position of a value in the picture [pixels]."""
         height = _HEIGHT - _TOP - _BOTTOM
         return f"{_TOP + height * (self.values[-1] - value) / (self.values[-1] - self.values[0]):.1f}"
 
@@ -46,10 +46,10 @@ class Axes(NamedTuple):
 def still_of(
     tab: Mapping[str, Any], openings: Sequence[Mapping[str, Any]], programs: Sequence[Mapping[str, Any]]
 ) -> str:
-    """Return the first panel of a tab as the text of an SVG: a curve for each configuration, and the reference.
+    """Return the first panel of a tab as SVG text: a curve for each configuration, and the reference.
 
-    ``openings`` and ``programs`` are of the configurations with which the tab opens, in order. Empty where they share
-    no channel that a panel shows.
+    ``openings`` and ``programs`` belong to the initial configurations of the tab, in order. Empty if these have no
+    common channel for a panel.
     """
     channel = next((name for name in _NAMES if all(name in opening["courses"] for opening in openings)), "")
     if not channel:
@@ -89,13 +89,13 @@ def still_of(
 
 
 def _points(opening: Mapping[str, Any], channel: str, quantity: str) -> Points:
-    """The course of a channel as the page opens, without samples that have no value."""
+    """Return the initial curve of a channel as points, without missing samples."""
     samples = zip(opening["times"], opening["courses"][channel], strict=True)
     return [(time, display_value(value, quantity)) for time, value in samples if value is not None]
 
 
 def _frame(axes: Axes, label: str) -> list[str]:
-    """Lines and labels of the ticks, and the titles of both axes."""
+    """Return SVG lines and labels of the ticks, and the titles of both axes."""
     below, middle = _HEIGHT - _BOTTOM + 16, _LEFT + (_WIDTH - _LEFT - _RIGHT) / 2
     lines = "".join(f"M{_LEFT} {axes.y(tick)}h{_WIDTH - _LEFT - _RIGHT}" for tick in axes.values)
     turned = f"translate(14 {_TOP + (_HEIGHT - _TOP - _BOTTOM) / 2}) rotate(-90)"
@@ -112,7 +112,7 @@ def _frame(axes: Axes, label: str) -> list[str]:
 
 
 def _line(axes: Axes, curve: Points, look: str) -> str:
-    """A curve, of whose level stretches the two ends are enough."""
+    """Return the SVG of a curve; intervals of constant value are reduced to their end points."""
     places = [(axes.x(time), axes.y(value)) for time, value in curve]
     heights = [height for _, height in places]
     level = (before == here == after for before, here, after in zip(heights, heights[1:], heights[2:], strict=False))
@@ -126,7 +126,7 @@ def _text(words: str, attributes: str) -> str:
 
 
 def _ticks(values: Sequence[float]) -> list[float]:
-    """Round numbers that enclose some values, five to ten of them."""
+    """Return five to ten round numbers that enclose the given values."""
     low, high = min(values), max(values)
     # A level line has no height of its own.
     size = (high - low) / 8.0 or 1.0

@@ -1,4 +1,4 @@
-"""A workbench of scenarios and walks: which of them share a tab, what they are called there, what the page gets."""
+"""Workbench page of scenarios and walks: tabs, labels and content."""
 
 import json
 from collections import Counter
@@ -26,7 +26,7 @@ TITLE = "The powered ankle-foot orthosis, live"
 DEFAULT = ("torque-task-solenoid", "torque-task-proportional", "step-response", "solenoid")
 MOST_SCENARIOS = 24
 _OPEN = 2
-"""Configurations that a tab opens with."""
+"""Number of configurations initially displayed in a tab."""
 _LABELS = {
     "torque-task-solenoid": "Solenoid pair",
     "torque-task-proportional": "Proportional valve",
@@ -44,7 +44,7 @@ _LABELS = {
 def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides = (), plugins: Plugins = ()) -> bytes:
     """Interactive page, one file of HTML, that simulates scenarios again as their numbers are changed.
 
-    Scenarios with the same kind of motion share a tab, which opens with the first two of them.
+    Scenarios with the same kind of motion share a tab. The first two scenarios of a tab are displayed initially.
 
     Arguments:
         scenarios: names or files of scenarios and walks
@@ -68,9 +68,9 @@ def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides
 
 
 def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
-    """Return a part of a page with the controls that matter most; None where one of the programs cannot be had.
+    """Return a page section with the most important controls; None if one of the programs cannot be built.
 
-    Of scenarios with one name only the first is in it.
+    Of several scenarios with the same name only the first is included.
     """
     # Backwards, so that of two with one name the first stays.
     named = {
@@ -94,9 +94,9 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
 def _content(
     scenarios: "Sequence[str | Scenario]", overrides: Sequence[str], form: str
 ) -> tuple[dict[str, Any], dict[str, str], str]:
-    """Content of a ``"page"`` or of a ``"block"`` of one, its packed modules by name, the picture of its first tab.
+    """Return the content of a ``"page"`` or ``"block"``, its packed modules by name, and the picture of its first tab.
 
-    Programs that are the same share one module. ScenarioError for no scenario, too many, or two of one name.
+    Identical programs share one module. Raises ScenarioError for no scenario, too many, or two of one name.
     """
     if not 1 <= len(scenarios) <= MOST_SCENARIOS:
         raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(scenarios)}")
@@ -143,7 +143,7 @@ def _content(
 
 
 def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Return what ``opening_of`` finds of shipped scenarios and walks as a page opens with them, computed anew."""
+    """Return the newly computed initial states of bundled scenarios and walks on a page, by name."""
     openings = {}
     for name in names:
         simulated = PageSimulation(load_scenario(name), module_of(load_scenario(name)), name)
@@ -157,9 +157,9 @@ def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:
 
 @cache
 def known_intervals() -> Mapping[str, Interval]:
-    """Return 95 % intervals in SI, by key, of numbers of which the set does not say how well they are known.
+    """Return 95 % intervals in SI, by key, of numbers for which the parameter set states no uncertainty.
 
-    They come from a study, which takes long to read: ``scripts/known_intervals.py`` writes the file.
+    They result from a study that takes long to read: ``scripts/known_intervals.py`` writes the file.
     """
     described = json.loads(files("ppafo.page").joinpath("intervals.json").read_text(encoding="utf-8"))
     return {path: (low, high) for path, (low, high) in described.items()}

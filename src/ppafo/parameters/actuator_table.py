@@ -16,17 +16,17 @@ from ppafo.parameters.measured_volumes import MeasuredVolumes, read_measured_vol
 from ppafo.signals.recording import Floats
 
 _POWERS = 4
-"""Coefficients of the cubic that a spline is over its first stretches."""
+"""Number of coefficients of the cubic polynomial in the first intervals of a spline."""
 _UNREACHED = 1.0e12
-"""A gauge pressure [Pa] and a share of the range [-] that nothing comes to, where a stretch or a bend is not needed:
-compiled code has room for a fixed number of both."""
+"""Unreachable gauge pressure [Pa] and fraction of the angle range [-] for unused pressure intervals and knots, as
+compiled code has a fixed number of both."""
 _NOTHING = Curve((0.0,) * _POWERS, (0.0,) * BENDS)
 _CHECKED_SHARES = np.linspace(0.0, 1.0, 201)
-"""Shares of the range of angles [-] at which a curve is looked at; at most 12 angles were measured."""
+"""Fractions of the angle range [-] at which curves are checked; at most 12 angles are measured."""
 _CLEAR = 1.0e-5
-"""Distance of a moved curve from 0, in last digits."""
+"""Margin of a moved curve above 0, in units of the last digit."""
 _ROUNDING = 1.0e-9
-"""Size of a negative volume or a fall with the pressure, over the largest volume, that is rounding of the spline."""
+"""Negative volume or fall with the pressure, divided by the largest volume, that counts as rounding error."""
 
 
 def read_actuator_table(path: Path) -> Table:

@@ -45,9 +45,9 @@ from ppafo.units.shown import counted_from, shown_in, shown_text
 from ppafo.wording import nearest_name, one_line
 
 _SAME = 1.0e-9
-"""Angles [rad] this near are one, written in two ways."""
+"""Angle difference [rad] below which two angles count as the same."""
 _COVERED = 1.01
-"""A supply this much beyond the pressures of a table is still covered by it."""
+"""Ratio by which the supply may exceed the pressures of a table."""
 _BESIDE_ANOTHER = "; the other supply is above it, and both must be on the same side of the atmosphere"
 SUPPLIES = PRESSURE_PATH, SECOND_PRESSURE_PATH
 Reader = Callable[[str, Iterable[Quantity]], dict[str, float]]
@@ -183,7 +183,7 @@ def actuator_problem(actuator: Actuator) -> str:
 
 
 def beyond_pressures(device: Device) -> Problem:
-    """Return the problem of a supply outside the pressures at which a table was measured; elementwise."""
+    """Return the problem of a supply pressure outside the measured range of the actuator table; elementwise."""
     table, supply = device.actuator.table, device.supply
     if table is None:
         lowest, highest = -math.inf, math.inf

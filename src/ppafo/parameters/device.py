@@ -17,7 +17,7 @@ from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.units.shown import counted_from, shown_in, shown_text
 
 VANE = "vane"
-"""The kind of actuator that is the paper's; see the catalogue of actuators."""
+"""Kind of the paper's actuator in the catalogue of actuators."""
 
 
 class _Holding(Protocol):
@@ -87,9 +87,9 @@ class Actuator:
 
     torque_constant [m^3], displacement_per_radian [m^3/rad], angle_min and angle_max [rad], dead_volume_1 and
     dead_volume_2 [m^3], restitution of the stops [-], leak between the chambers. ``kind`` is the name in the catalogue
-    of actuators. ``settings`` are the complete settings [SI] of a kind other than the vane. ``table`` is the
-    ``model.actuators.table.Table`` of a measured actuator. For both of the latter, torque_constant and
-    displacement_per_radian are means over the angle range.
+    of actuators. For kinds other than the vane, ``settings`` are the complete settings [SI], and torque_constant and
+    displacement_per_radian are means over the angle range. ``table`` is the ``model.actuators.table.Table`` of a
+    measured actuator.
     """
 
     torque_constant: float

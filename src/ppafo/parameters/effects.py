@@ -12,11 +12,11 @@ from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device
 
 SEEN_BY_EFFECTS = ("gas", "actuator", "friction", "foot_plate", "supply")
-"""Sections of a device that ``prepare`` of an effect may read; an exported library has them in C."""
+"""Device sections that ``prepare`` of an effect may read; an exported library contains them in C."""
 
 
 Sections = Mapping[str, Any]
-"""Objects whose attributes are settings of effects beside the device's, by section of files."""
+"""Objects with further effect settings as attributes, by file section; for effects outside the device."""
 _NO_SECTIONS: Sections = {}
 
 

@@ -14,13 +14,13 @@ from ppafo.errors import UnitError
 from ppafo.units import flow_of, is_volume_flow, split_number, to_si
 
 USUAL_CRITICAL_RATIO = 0.3
-"""b [-] of spool valves, where a data sheet does not say it."""
+"""Critical pressure ratio b [-] of spool valves, used if a data sheet does not state it."""
 
 CV_PER_KV = 1.156
 """US gal/min at 1 psi per m^3/h at 1 bar, both of water (IEC 60534-1)."""
 
 _BEFORE, _BEHIND = 7.0, 6.0
-"""bar absolute of nominal flow."""
+"""Upstream and downstream pressures of nominal flow [bar absolute]."""
 _NFPA, _PSI_PER_BAR, _RANKINE, _LITRES_PER_CUBIC_FOOT = 22.48, 14.5038, 527.67, 28.3168
 _LITRE_PER_SECOND_BAR = 1.0e-8
 

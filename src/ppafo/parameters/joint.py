@@ -31,4 +31,4 @@ class JointNames:
 
 
 ANKLE = JointNames()
-"""The joint of a set that names none."""
+"""Joint of a set that does not name one."""

@@ -43,15 +43,15 @@ COLUMNS = {
 }
 _NEEDED = ("angle", "pressure", "volume_1")
 _NEAREST_ANGLES = 0.01
-"""Angles nearer to each other than this share of their range make a spline swing."""
+"""Minimum distance of angles as a fraction of their range; closer ones make a spline oscillate."""
 _NEAREST_PRESSURES = 1.0
-"""Pressures [Pa] nearer to each other than this are one that was written twice."""
+"""Minimum distance of pressures [Pa]; closer ones count as one pressure written twice."""
 _STEPS = (1, 2, 5, 10, 20, 50, 100)
-"""Steps, in last digits, in which people round what they read."""
+"""Usual rounding steps of readings, in units of the last digit."""
 _TELLING = 10
-"""Different numbers that have a common step not by chance."""
+"""Count of different numbers above which a common step is no coincidence."""
 _LONGEST = 40
-"""Characters of a cell that a message shows; a longer text is no number that anybody wrote either."""
+"""Maximum length of a cell in characters, in messages and as a number."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -133,7 +133,7 @@ def of_another_valve(path: str, valve: str) -> bool:
 def check_valve(
     overrides: Iterable[Override], valve: str | None, choice: str, error: type[PpafoError] = ParameterError
 ) -> None:
-    """Raise ``error`` if an override concerns another valve than the one chosen beside it; ``valve`` None: no choice.
+    """Raise ``error`` if an override concerns a valve other than the chosen ``valve``; None if none is chosen.
 
     The message quotes the override and the ``choice`` as given.
     """

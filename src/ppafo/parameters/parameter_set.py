@@ -33,11 +33,11 @@ if TYPE_CHECKING:  # few devices have a measured actuator
     from ppafo.model.actuators.table import Table
 
 Origin = Literal["published", "datasheet", "derived", "identified", "fitted", "assumed"]
-"""Provenance of a value; ``fitted`` is neither fixed by its recordings nor explained by a model of them."""
+"""Provenance of a value; ``fitted``: neither determined by its recordings nor explained by a model of them."""
 
 
 CONFIDENCE = 0.95
-"""Confidence of the interval whose half width an entry states."""
+"""Confidence level of the interval whose half width an entry states."""
 
 
 class Entry(StrictTable):
@@ -144,14 +144,14 @@ _SPEAKING = {
     "N m": ("friction.static_torque",),
     "rad": ("actuator.angle_max", "actuator.angle_min"),
 }
-"""Paths whose unit says how the author of a set writes a quantity, by its unit in SI."""
+"""Paths whose unit is taken as the author's unit of a quantity, by SI unit."""
 _SPEAKING_ENDS = {
     "kg/s": (".mass_flow",),
     "m^3/(s Pa)": (".sonic_conductance",),
     "m^2": (".area",),
     "m^3": (".dead_volume_1", ".dead_volume"),
 }
-"""The same of paths that differ from set to set, by their ends."""
+"""Endings of further such paths, which differ from set to set, by SI unit."""
 
 
 def written_units(numbers: Mapping[str, Entry]) -> dict[str, str]:

@@ -12,14 +12,14 @@ from ppafo.parameters.graph import PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.plant import plant_parameters
 
 HIGHEST_PRESSURE = 1.6e6
-"""Highest supply pressure [Pa gauge] that is looked for: what usual pneumatic parts are built for at most."""
+"""Highest supply pressure [Pa gauge] in the search: the usual maximum of pneumatic parts."""
 _HALVINGS = 60
-"""Bisection steps, which bring any bracket down to rounding."""
+"""Number of bisection steps, enough to reduce any bracket to rounding error."""
 _LOWEST_PRESSURE = 1.0e3
-"""Lowest absolute pressure [Pa] of a vacuum that is looked for: what a set may state at least."""
+"""Lowest absolute pressure [Pa] of a vacuum in the search: the lower limit in a parameter set."""
 
 StaticTorque = Callable[[float, float, float], float]
-"""Torque [N m] of an angle [rad] and the absolute pressures [Pa] of chambers 1 and 2."""
+"""Function of an angle [rad] and the absolute pressures [Pa] of chambers 1 and 2 that returns the torque [N m]."""
 
 
 def static_torque(device: Device) -> StaticTorque:

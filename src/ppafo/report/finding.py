@@ -164,11 +164,17 @@ class Finding(Generic[T_co]):
     """Report of an analysis: ``found`` are its results in SI units, and the other fields are for presentation.
 
     The JSON of a report is ``found`` as plain data, or the result of its method ``json_document()`` if defined.
-    ``name`` is the stem of the files, and of the command unless ``command`` is set. ``kicker`` is the line above the
-    title. ``said`` are the first sentences, ``parts`` the sections. ``passed`` is False if a check failed. ``kind`` is
-    the origin of the numbers. ``files`` are functions that return further files, by name. ``live`` returns the
-    interactive part of the page, or None. ``page`` generates a special page from the drawn figures. ``units`` are the
-    display units by SI unit, by default the ones active at creation.
+
+    - ``name``: stem of the files, and name of the command unless ``command`` is set
+    - ``kicker``, ``title``: line above the title, and title
+    - ``said``: first sentences
+    - ``parts``: sections
+    - ``passed``: False if a check failed
+    - ``files``: functions that return further files, by name
+    - ``live``: function that returns the interactive part of the page, or None
+    - ``kind``: origin of the numbers: simulated, synthetic or measured
+    - ``page``: function that makes a special page from the drawn figures
+    - ``units``: display units by SI unit, by default the ones active at creation
     """
 
     name: str

@@ -37,13 +37,19 @@ class Mark:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """Panel of a figure: kinds of numbers on its axes, and the marks.
+    """Panel of a figure.
 
-    ``scale`` is the kind of the numbers shown by colours of a map or of points; consecutive panels with the same scale
-    share a colour bar. ``legend`` is "above", "inside", "figure" (above all panels) or empty. ``then`` is a function
-    called last with the axes. ``tall`` is the height relative to the other panels [-]. Panels in the same column with
-    ``shares_x`` share the horizontal axis and show the label of the vertical axis as title. A panel without marks stays
-    empty.
+    Panels in the same column with ``shares_x`` share the horizontal axis and show the label of the vertical axis as
+    title. A panel without marks stays empty.
+
+    - ``x``, ``y``: kinds of the numbers on the axes
+    - ``marks``: graphical elements
+    - ``title``: title, empty without one
+    - ``scale``: kind of the numbers shown by colours; consecutive panels with the same scale share a colour bar
+    - ``legend``: position: "above", "inside", "figure" (above all panels) or empty
+    - ``then``: function that is called last with the axes
+    - ``tall``: height relative to the other panels [-]
+    - ``shares_x``: True to share the horizontal axis
     """
 
     x: Kind

@@ -1,4 +1,4 @@
-"""Recordings: measured and simulated alike, time and named channels with units, never changed once made."""
+"""Recordings, measured or simulated: time and named channels with units, immutable."""
 
 from ppafo.signals.recording import CHANNELS, Channel, ChannelKind, Recording, RecordingKind, recording_kind
 

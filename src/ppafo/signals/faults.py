@@ -1,4 +1,4 @@
-"""Faults of recorded numbers, detected in the numbers alone: gaps in time, and sensors at their limit."""
+"""Faults of recorded data, detected from the data alone: gaps in time, and saturated sensors."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ppafo.signals.recording import Floats
 
 GAP_SAMPLES = 10.0
-"""Shortest gap, in usual sampling intervals."""
+"""Shortest gap, in median sampling intervals."""
 
 FEWEST_AT_LIMIT = 20
 """Fewest equal samples that indicate a sensor at its limit."""
@@ -19,13 +19,13 @@ MINIMUM_SAMPLES = 10
 """Fewest samples for an estimate of the noise."""
 
 _SPREAD_OF_MEDIAN = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation, which is robust to jumps [-]."""
+"""Standard deviation of a normal distribution divided by its median absolute deviation, robust to steps [-]."""
 _KEPT = 3.0
 """Largest usual difference, in standard deviations."""
 _SHARE_OF_KEPT = 0.98658
-"""Standard deviation of a normal distribution truncated at 3 standard deviations, over the whole's [-]."""
+"""Standard deviation of a standard normal distribution truncated at 3 standard deviations [-]."""
 _GAIN_OF_DIFFERENCES = math.sqrt(20.0)
-"""Standard deviation of the third difference of white noise over the noise's."""
+"""Standard deviation of the third difference of white noise divided by the standard deviation of the noise."""
 _NOISY_FRACTION = 0.2
 """Fraction of turning points above which a signal is noisy: white noise has 2/3, a smooth curve hardly any."""
 _ABRUPT_FRACTION = 0.3
@@ -33,7 +33,7 @@ _ABRUPT_FRACTION = 0.3
 _BEFORE = 5
 """Samples before a plateau by which its approach is assessed."""
 _EXCEPTIONAL = 5
-"""Length of a plateau over the next longest one above which it is no converter step [-]."""
+"""Length of a plateau divided by the next longest one, above which it is no converter step [-]."""
 _PARTS = 20
 """Parts of a signal whose means show a lasting change."""
 _SMOOTH = 1.0e-6
@@ -42,7 +42,7 @@ _SMOOTH = 1.0e-6
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """Samples missing after the sample with this index: the time [s] between it and the next one."""
+    """Gap after the sample ``index``: time [s] between this sample and the next one."""
 
     index: int
     duration: float
@@ -50,7 +50,7 @@ class Gap:
 
 @dataclass(frozen=True, slots=True)
 class Plateau:
-    """The longest time at exactly the largest or smallest value: indices of first and last sample, and the value."""
+    """Longest interval at exactly the largest or smallest value: first and last sample index, value, and ``word``."""
 
     first: int
     last: int
@@ -59,12 +59,12 @@ class Plateau:
 
     @property
     def count(self) -> int:
-        """Number of samples in it."""
+        """Number of samples in the plateau."""
         return self.last - self.first + 1
 
 
 def longest_gap(time: Floats) -> Gap | None:
-    """Return the longest gap if it lasts many usual sampling intervals, else None."""
+    """Return the longest gap if it exceeds ten median sampling intervals, else None."""
     # Against the median, which one gap does not move.
     intervals = np.diff(time)
     if intervals.size < 2:
@@ -75,13 +75,13 @@ def longest_gap(time: Floats) -> Gap | None:
 
 
 def lasting_change(values: Floats) -> float:
-    """Return the range of the means of at most 20 equal parts of a signal."""
+    """Return the range of the means of up to 20 equal parts of a signal."""
     parts = np.array_split(values, min(_PARTS, values.size))
     return float(np.ptp([part.mean() for part in parts]))
 
 
 def plateaus(values: Floats) -> tuple[Plateau, Plateau]:
-    """Return the longest times at exactly the largest and at exactly the smallest value."""
+    """Return the longest intervals at exactly the largest and at exactly the smallest value."""
     largest, smallest = float(values.max()), float(values.min())
     return (
         Plateau(*longest_run(values == largest), largest, "largest"),
@@ -90,7 +90,7 @@ def plateaus(values: Floats) -> tuple[Plateau, Plateau]:
 
 
 def longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
-    """Return the first and the last index of the longest run of True; at least one must be."""
+    """Return the first and last index of the longest run of True; at least one flag must be True."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
     starts, ends = edges[::2], edges[1::2]
     longest = int(np.argmax(ends - starts))
@@ -98,9 +98,9 @@ def longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 def is_at_limit(values: Floats, plateau: Plateau) -> bool:
-    """Tell whether a plateau is a sensor at its limit: the noise stops there, or the signal runs into it.
+    """Tell whether a plateau is a saturated sensor: the noise stops there, or the signal runs into it at speed.
 
-    A signal that comes to rest by itself has noise there too, or slows down before.
+    A signal that comes to rest by itself keeps its noise, or slows down before.
     """
     if plateau.count < FEWEST_AT_LIMIT or plateau.count == values.size:
         return False
@@ -115,12 +115,12 @@ def is_at_limit(values: Floats, plateau: Plateau) -> bool:
 
 
 def scatters(values: Floats) -> bool:
-    """Tell whether at least half of the values are off the line between their neighbours, as with noise."""
+    """Tell whether at least half of the values deviate from the line between their neighbours, as with noise."""
     return values.size > 2 and float(np.median(np.abs(np.diff(values, 2)))) > _SMOOTH * float(np.ptp(values))
 
 
 def stands_out(values: Floats, plateau: Plateau) -> bool:
-    """Tell whether a plateau lasts far longer than any other, and is no step of a coarse converter."""
+    """Tell whether a plateau is far longer than any other, so that it is no step of a coarse converter."""
     if plateau.count < FEWEST_AT_LIMIT or plateau.count == values.size:
         return False
     # A coarse converter has such plateaus everywhere: they are compared with the longest of the others.
@@ -131,19 +131,21 @@ def stands_out(values: Floats, plateau: Plateau) -> bool:
 
 
 def isolated_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
-    """Mark the samples that stand out alone from the four around them; ``noise`` is a standard deviation.
+    """Mark isolated outliers, which differ from the four samples around them; ``noise`` is a standard deviation.
 
-    They are off the median of five by more than 6 times the noise, and more than 3 times what the four range over.
+    Their distance from the median of five is more than 6 times the noise and more than 3 times the range of the four
+    other samples.
     """
     others = np.ptp(_five_around(values)[:, [0, 1, 3, 4]], axis=1)
     return np.asarray(outlying_samples(values, noise) & (off_neighbours(values) > 3.0 * others))
 
 
 def outlying_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
-    """Mark the outliers of residuals, adjacent ones included; ``noise`` is a standard deviation.
+    """Mark the outliers of residuals, including adjacent ones; ``noise`` is a standard deviation.
 
-    They are off the median of five by more than 6 times the noise, and more than 3 times what three of the four others
-    range over. An event that a model has at another time leaves a longer course, which is none of them.
+    Their distance from the median of five is more than 6 times the noise and more than 3 times the range of the closest
+    three of the four other samples. An event at a different time in the model leaves a longer deviation, which is not
+    marked.
     """
     others = np.sort(_five_around(values)[:, [0, 1, 3, 4]], axis=1)
     spread = np.minimum(others[:, 2] - others[:, 0], others[:, 3] - others[:, 1])
@@ -152,12 +154,12 @@ def outlying_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
 
 
 def off_neighbours(values: Floats) -> Floats:
-    """Return the distance of each value from the median of the five around it, itself included."""
+    """Return the distance of each value from the median of five: the value and two neighbours on each side."""
     return np.asarray(np.abs(values - np.median(_five_around(values), axis=1)))
 
 
 def _five_around(values: Floats) -> Floats:
-    """Return each value with the two before and the two after it (values, 5)."""
+    """Return each value with the two values before and after (values, 5)."""
     # Mirrored at the ends, where an outlier would else be three of its own five neighbours.
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="reflect"), 5)
 
@@ -169,9 +171,9 @@ _SHARE_THAT_DIFFERS = 0.5
 
 
 def resolution_of(values: Floats) -> float:
-    """Return the converter step of the values [their unit], the smallest difference; 0 if none is visible.
+    """Return the resolution of the converter [unit of the values], from the smallest difference; 0 if none is visible.
 
-    One shows where most values come again, as no noise and no motion makes them.
+    A resolution is visible if most values occur repeatedly, which neither noise nor motion causes.
     """
     steps = np.diff(np.unique(values))
     steps = steps[steps > _ROUNDING * steps.sum()]
@@ -179,10 +181,10 @@ def resolution_of(values: Floats) -> float:
 
 
 def rounding_of(values: Floats, resolution: float) -> Floats:
-    """Return the standard deviation [their unit] of each value by the rounding of its converter.
+    """Return the standard deviation of each value due to rounding by the converter [unit of the values].
 
-    It is the resolution over sqrt(12) (GUM, JCGM 100:2008, F.2.2.1). A sensor at rest repeats one value with one error,
-    so that a run of n equal values says no more than one: each of them speaks with sqrt(n) times that.
+    It is the resolution divided by sqrt(12) (GUM, JCGM 100:2008, F.2.2.1). A sensor at rest repeats one value with the
+    same error, so that a run of n equal values has the weight of one: each has sqrt(n) times the standard deviation.
     """
     edges = np.flatnonzero(np.diff(values, prepend=np.nan, append=np.nan))
     lengths = np.diff(edges)
@@ -190,9 +192,9 @@ def rounding_of(values: Floats, resolution: float) -> Floats:
 
 
 def noise_of(values: Floats) -> float:
-    """Return the standard deviation of white noise [unit of the signal], from the usual third differences.
+    """Return the standard deviation of white noise [unit of the signal], from the median third difference.
 
-    What the signal itself does between four samples counts as noise where it is larger; a few jumps do not matter.
+    Changes of the signal itself within four samples count as noise if they are larger; a few steps have no effect.
     """
     if values.size < MINIMUM_SAMPLES:
         return 0.0
@@ -203,7 +205,7 @@ def noise_of(values: Floats) -> float:
 
 
 def _third_differences(values: Floats, lag: int) -> Floats:
-    """Return the sizes of third differences of samples ``lag`` apart, each less a fitted parabola."""
+    """Return the absolute third differences of samples ``lag`` apart, which vanish for a parabola."""
     first, second, third, fourth = (values[place * lag : values.size - (3 - place) * lag] for place in range(4))
     return np.asarray(np.abs(fourth - 3.0 * third + 3.0 * second - first))
 
@@ -212,18 +214,18 @@ _SHARE_OF_LAGS = 0.1
 """Largest correlation time of noise, as a fraction of a recording: slower residuals are model error."""
 
 _BY_CHANCE = 8.0
-"""Four standard errors of a quarter's size among differences that share samples, times the root of their number."""
+"""Four standard errors of the quartile of overlapping differences, times the square root of their number."""
 
 _QUARTER = 0.31864
 """Lower quartile of the absolute value of a standard normal deviate."""
 
 
 def correlated_noise_of(values: Floats) -> float:
-    """Return the standard deviation of possibly correlated noise in residuals [their unit].
+    """Return the standard deviation of possibly correlated noise in residuals [unit of the residuals].
 
-    Third differences of samples further apart see the noise that neighbours share. A quarter of the recording, where
-    they are smallest, speaks for all of it, as a model that is wrong is so while something moves. The spread about the
-    median, which a constant error does not move, is never exceeded.
+    Third differences with larger lags include noise that neighbouring samples share. The quarter of the recording with
+    the smallest differences is used, because model errors occur during motion. The result never exceeds the spread
+    about the median, which is insensitive to a constant error.
     """
     if values.size < MINIMUM_SAMPLES:
         return 0.0

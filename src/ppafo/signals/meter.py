@@ -1,7 +1,7 @@
-"""Samples of a recording in sequence, for metrics that need no recording.
+"""Samples of a run in sequence, for metrics that need no recording.
 
-A meter is a state of a few floats that goes through the samples of a run once. Its functions are pure and scalar, so
-that the engine can compile them into its lanes.
+A meter is a state of a few floats, updated once per sample of a run. Its functions are pure and scalar, so that the
+engine can compile them into its loop.
 """
 
 from collections.abc import Callable
@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 WALK, STEADY, REQUESTED, LED_SHANK = "walk", "steady strides", "requested torque", "shank of a gait"
-"""Needs of a metric beside channels: walk, equal strides, requested torque of a walk, or a gait-led shank."""
+"""Requirements of a metric besides channels: walk, equal strides, requested torque of a walk, shank led by a gait."""
 
 
 class FootSample(NamedTuple):
-    """Foot on the shank of a gait: its angle and the measured one over the horizontal [rad].
+    """Foot on the shank of a gait: ``angle`` and ``measured_angle`` relative to the horizontal [rad].
 
-    ``toe_difference`` is how much higher its toes are than the measured ones [m].
+    ``toe_difference`` is the toe height minus the measured toe height [m].
     """
 
     angle: float
@@ -24,11 +24,11 @@ class FootSample(NamedTuple):
 
 
 class StrideSample(NamedTuple):
-    """Stride of a walk at a sample.
+    """State of a walk at a sample.
 
     ``supplied_mass`` [kg], ``strides``, ``positive_push_off_work`` and ``net_push_off_work`` [J], ``clearances`` [m]
-    and ``toe_landings`` are totals since the start, as in the state of the leg; ``phase`` is the one that the
-    controller sees, ``level`` how much it helps. ``time`` [s] since the start.
+    and ``toe_landings`` are totals since the start, as in the state of the leg. ``phase`` is the gait phase seen by the
+    controller, ``level`` its level of assistance, and ``time`` [s] is since the start.
     """
 
     supplied_mass: float
@@ -53,7 +53,7 @@ class GasSample(NamedTuple):
 
 
 class EnergySample(NamedTuple):
-    """Energies of the gas at a sample [J]: internal energy now, the others totals since the start of the run."""
+    """Energies of the gas at a sample [J]: current internal energy, and totals since the start of the run."""
 
     gas_energy: float
     supplied_enthalpy: float
@@ -68,11 +68,11 @@ NO_ENERGY = EnergySample(**dict.fromkeys(EnergySample._fields, 0.0))
 
 
 class Sample(NamedTuple):
-    """Sample of a recording: its number from 0, channels in SI units, and those of gas, foot and stride.
+    """Sample of a run: its number from 0, channels in SI units, and records of gas, energy, foot and stride.
 
-    ``value`` is the controlled quantity, and ``reference`` in its unit. What a run does not have is 0: reference,
-    temperatures and ``energy`` of gas without an energy balance, ``foot`` but on the shank of a gait, ``stride`` but in
-    a walk. There ``reference`` is the torque that the controller requests.
+    ``value`` is the controlled quantity and ``reference`` its reference, in the same unit; in a walk the reference is
+    the torque requested by the controller. Values that a run lacks are 0: the reference, temperatures and ``energy`` of
+    gas without an energy balance, ``foot`` unless on the shank of a gait, ``stride`` except in a walk.
     """
 
     number: float
@@ -93,11 +93,12 @@ class Sample(NamedTuple):
 
 
 class ReferenceSummary(NamedTuple):
-    """Summary of the whole reference, in its unit, and the start of its rest.
+    """Summary of the whole reference, in its unit, and the start of its hold.
 
-    Its last value; the farthest that it goes over all samples, from 0 or, where it is no torque, from what is
-    controlled as the run begins; ``tolerance`` is the difference from the last value up to which it counts as resting;
-    ``hold_start`` is the number of the sample after the last one that did not rest, ``samples`` how many the run has.
+    ``last`` is the last value. ``largest`` is the largest distance over all samples from 0 for a torque, otherwise from
+    the initial value of the controlled quantity. ``tolerance`` is the difference from the last value up to which the
+    reference rests. ``hold_start`` is the number of the sample after the last one not at rest, ``samples`` the number
+    of samples.
     """
 
     last: float
@@ -108,16 +109,16 @@ class ReferenceSummary(NamedTuple):
 
 
 SAME_LEVEL = 1.0e-9
-"""Fraction of the largest reference up to which two values of it are the same level."""
+"""Difference between equal levels of a reference, as a fraction of its largest value."""
 
 
 def is_away(reference: float, last: float, tolerance: float) -> bool:
-    """Tell whether a reference differs from its last value; all in its unit."""
+    """Tell whether a reference differs from its last value by more than ``tolerance``; all in its unit."""
     return abs(reference - last) > tolerance
 
 
 def advance_course(course: ReferenceSummary, sample: Sample) -> ReferenceSummary:
-    """Course of a monotone reference after one more sample: away from its last value first, then at rest."""
+    """Summary of a monotone reference after one more sample: first away from its last value, then at rest."""
     # Sample by sample, because a run is not kept; the last value and the largest are known from the profile before.
     away = is_away(sample.reference, course.last, course.tolerance)
     return ReferenceSummary(
@@ -131,11 +132,11 @@ def advance_course(course: ReferenceSummary, sample: Sample) -> ReferenceSummary
 
 @dataclass(frozen=True, slots=True)
 class MeterKind:
-    """Meter: a running evaluation of samples; ``state`` is a NamedTuple class of floats, nested ones included.
+    """Meter: a running evaluation of samples; ``state`` is a NamedTuple class of floats, which may be nested.
 
-    ``start(course, sample)`` makes it at the first sample, ``update(state, course, sample)`` at each later one. What
-    ``course`` says of the hold is right up to this sample. A meter without ``needs_course`` must not look at it; one
-    that is ``of_motion`` stays as it started while the vane stands still.
+    ``start(course, sample)`` creates the state at the first sample, ``update(state, course, sample)`` updates it at
+    each later one. The start of the hold in ``course`` is valid up to this sample. A meter without ``needs_course``
+    must not use ``course``; a meter that is ``of_motion`` keeps its initial state while the vane stands still.
     """
 
     name: str

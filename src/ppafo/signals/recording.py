@@ -1,6 +1,6 @@
 """Recording: time and named channels with units, and the channels that the package knows by name.
 
-Measured and simulated data take the same road from here on.
+Measured and simulated data are processed in the same way from here on.
 """
 
 import re
@@ -28,9 +28,9 @@ BETWEEN: tuple[Between, ...] = get_args(Between)
 
 @dataclass(frozen=True, slots=True)
 class ChannelKind:
-    """Known channel; a held one keeps its value until the next sample, the others are linear in between.
+    """Known channel; ``is_held`` for zero-order hold between samples, otherwise linear interpolation.
 
-    So it is where a recording does not declare otherwise.
+    A recording may declare another interpolation for its channel.
     """
 
     unit: str
@@ -121,13 +121,13 @@ CHANNELS: dict[str, ChannelKind] = {
 }
 """Known channels. To add one: one line here. A recording may also have channels that are not listed."""
 OF_SECOND_CHAMBER = frozenset({"pressure_2", "mass_2", "temperature_2", "leaked_mass", "pressure_difference"})
-"""Channels that runs of an actuator with one chamber lack."""
+"""Channels that are missing in runs of an actuator with one chamber."""
 
 
 Floats = NDArray[np.float64]
 
 RecordingKind = Literal["measured", "simulated", "synthetic"]
-"""Origin of a recording: sensors, the output of a model, or the simulated test bench."""
+"""Origin of a recording: sensors, simulation of a model, or the simulated test bench."""
 
 _NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _KINDS: tuple[RecordingKind, ...] = get_args(RecordingKind)
@@ -137,8 +137,8 @@ _KINDS: tuple[RecordingKind, ...] = get_args(RecordingKind)
 class Channel:
     """Values of one quantity, read-only, and their unit as SI text: ``rad``, ``Pa`` (absolute), ``N m``, ``-``.
 
-    ``between`` says what it does between two samples, ``hold`` or ``linear``; None is what its name usually means: a
-    command holds. ``stated`` is the unit in which a file has it, in which messages about the file speak.
+    ``between`` is the interpolation between two samples, ``hold`` or ``linear``; None is the default for the channel's
+    name: ``hold`` for a command. ``stated`` is the unit in the source file, which messages about the file use.
     """
 
     values: Floats
@@ -176,7 +176,8 @@ class Channel:
 class Recording:
     """Channels over a common, strictly increasing time [s]; all values are finite.
 
-    ``kind`` says where it comes from; figures and files say so where nobody measured it.
+    ``label`` names the recording; ``kind`` is its origin (measured, simulated, synthetic), which figures and files
+    state for data that are not measured.
     """
 
     label: str
@@ -218,7 +219,7 @@ class Recording:
     __hash__ = None  # type: ignore[assignment]  # arrays have no hash
 
     def __repr__(self) -> str:
-        """Return label, kind, samples, span and channels with their units."""
+        """Return label, kind, number of samples, time span and channels with their units."""
         samples = count_of(len(self), "sample")
         channels = ", ".join(f"{name} [{channel.unit}]" for name, channel in self.channels.items())
         span = f"from {self.time[0]:g} s to {self.time[-1]:g} s"
@@ -233,9 +234,9 @@ class Recording:
         return self._channel(name).values
 
     def in_unit(self, name: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> Floats:
-        """Return the values of a channel in a unit, such as ``psi_g``; gauge counts from ``atmosphere`` [Pa absolute].
+        """Return the values of a channel in a unit, such as ``psi_g``, relative to ``atmosphere`` [Pa absolute].
 
-        DataError for a channel that is not there, UnitError for a unit that does not fit it.
+        Raises DataError for an unknown channel, and UnitError for a unit that does not fit the channel.
         """
         channel = self._channel(name)
         # Channels write Pa for a level and - for a plain number.
@@ -248,7 +249,7 @@ class Recording:
         return converted
 
     def _ipython_key_completions_(self) -> list[str]:
-        """Return the channels, which a notebook completes between brackets."""
+        """Return the channel names, which a notebook offers as completions between brackets."""
         return list(self.names)
 
     def __contains__(self, name: object) -> bool:
@@ -260,12 +261,12 @@ class Recording:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the channels, in the order in which they were given."""
+        """Names of the channels, in the given order."""
         return tuple(self.channels)
 
     @property
     def duration(self) -> float:
-        """Time from the first sample to the last [s]."""
+        """Time from the first to the last sample [s]."""
         return float(self.time[-1] - self.time[0])
 
     def unit(self, name: str) -> str:
@@ -273,7 +274,7 @@ class Recording:
         return self._channel(name).unit
 
     def is_held(self, name: str) -> bool:
-        """Tell whether a channel keeps its value until the next sample; otherwise it is linear in between."""
+        """Tell whether a channel keeps its value until the next sample; otherwise it is interpolated linearly."""
         between = self._channel(name).between
         return (name in CHANNELS and CHANNELS[name].is_held) if between is None else between == "hold"
 
@@ -284,7 +285,7 @@ class Recording:
         return Recording(self.label, self.time, {**self.channels, name: channel}, self.kind)
 
     def between(self, start: float, end: float) -> "Recording":
-        """Return the samples with ``start`` <= time <= ``end`` [s]; times stay as they are."""
+        """Return the samples with ``start`` <= time <= ``end`` [s]; times are not shifted."""
         # Times stay: where a recording is cut must not move what happens in it.
         inside = (self.time >= start) & (self.time <= end)
         if not inside.any():
@@ -296,7 +297,7 @@ class Recording:
         return Recording(self.label, self.time[inside], kept, self.kind)
 
     def resample(self, times: ArrayLike) -> "Recording":
-        """Return the recording at other times [s] within its span, interpolated by channel: held or linear."""
+        """Return the recording at other times [s] within its span, each channel by zero-order hold or linearly."""
         wanted = np.asarray(times, dtype=np.float64)
         if wanted.size and (wanted.min() < self.time[0] or wanted.max() > self.time[-1]):
             raise DataError(
@@ -324,9 +325,9 @@ def recording_kind(name: str) -> RecordingKind:
 
 
 def between_samples(recording: Recording, name: str, times: Floats, start: float = 0.0) -> Floats:
-    """Return a channel [SI] at times [s] counted from ``start``, interpolated as declared: held or linear.
+    """Return a channel [SI] at times [s] relative to ``start``, interpolated as declared: zero-order hold or linear.
 
-    Before its first sample and after its last one it stands still.
+    Before the first and after the last sample the value is constant.
     """
     values, own_times = recording[name], recording.time - start
     if recording.is_held(name):

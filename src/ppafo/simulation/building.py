@@ -80,7 +80,7 @@ from ppafo.wording import nearest_name, one_line
 
 _SECTION = "assumed"
 _SPEAKING = ("initial", "motion", "controller", "reference")
-"""Sections whose quantities say in which units their author writes, the ones that say it first last."""
+"""Sections whose quantities define the display units of their author, in increasing priority."""
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
 
 

@@ -25,7 +25,7 @@ from ppafo.units import without_exponent
 from ppafo.units.shown import in_units, units_in_force
 
 SHORTER = 4
-"""Ratio by which the steps of a finer run are shorter; its allowed error is smaller by the square."""
+"""Factor by which the finer run shortens the steps; its allowed error is smaller by the square of this factor."""
 MARGIN = 1.5
 """Safety factor on the change: the estimate then exceeds the error in 99 % of drawn runs (docs/evidence.md)."""
 LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, LARGEST_OF_TEMPERATURE = 2.0e-4, 1.0e-3, 2.0e-3
@@ -103,7 +103,7 @@ class NumberCheck:
 
     ``value`` is the value of a metric, or the range of a channel. ``changes`` maps each kind of repeat to the change of
     the metric, or to the largest change of the channel over time; inf if the repeat lacks the value. ``allowed`` is the
-    largest change that is ignored, ``allowed_error`` the one for the run with finer steps.
+    largest allowed change under perturbation, ``allowed_error`` the largest allowed change with finer steps.
     """
 
     name: str
@@ -244,7 +244,7 @@ def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstima
     if temperature is not None:
         over.append(temperature / (LARGEST_OF_TEMPERATURE * device.gas.temperature))
     # The allowed error goes with the tolerance; with half of what is needed it is met.
-    less = max(0.5 * own / max(over), SMALLEST_TOLERANCE)
+    less = max(0.5 * own / max(over), SMALLEST_TOLERANCE) if max(over) > 0.0 else own
     return ErrorEstimate(
         angle=angle,
         pressure=pressure,
@@ -288,7 +288,7 @@ def _pressure_range(result: RecordedResult) -> float:
 def checked(result: RecordedResult, run: Run, again: Again) -> Check:
     """Return the repeatability check of a result, from its planned run.
 
-    Raises SimulationError for a Python controller that gives a different run each time, so that changes say nothing.
+    Raises SimulationError for a Python controller that gives a different run each time, which makes a check impossible.
     """
     scenario, recording = result.scenario, result.recording
     controller = scenario.controller.custom

@@ -18,7 +18,7 @@ from ppafo.wording import one_line
 PLAIN = ("", "1")
 """Units of a plain number."""
 REFERENCE_OF = "reference.of"
-"""Path of the controlled quantity, a word of ``CONTROLLED``."""
+"""Path of the name of the controlled quantity, one of ``CONTROLLED``."""
 
 
 def kind_at(document: Mapping[str, Any], section: str) -> str:

@@ -70,7 +70,7 @@ class Gains:
     dead_time: float
     unit: str = "N m"
     unknown_loads: tuple[str, ...] = ()
-    """Effects that load a joint that they may move, where a gain is computed: none of them is in it."""
+    """Effects that load a movable joint and are not included in the computed gains."""
 
     @property
     def sentence(self) -> str:

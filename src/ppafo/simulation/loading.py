@@ -56,7 +56,7 @@ VANE = Layout(FILE, OF_A_VANE, scenario_file, lambda _: whole_scenario_file(), b
 
 
 def list_scenarios() -> tuple[str, ...]:
-    """Return the names of the scenarios that come with the package.
+    """Return the names of the shipped scenarios.
 
     >>> import ppafo
     >>> [name for name in ppafo.list_scenarios() if name.startswith("torque-task-p")]
@@ -68,11 +68,11 @@ def list_scenarios() -> tuple[str, ...]:
 def load_scenario(
     name_or_path: str | Path, overrides: Iterable[str] = (), parameter_set: ParameterSet | None = None
 ) -> Scenario:
-    """Return a scenario by its name in the package or by the path of a TOML file, in SI units.
+    """Return a scenario by the name of a shipped one or by the path of a TOML file, in SI units.
 
-    ``overrides`` are texts whose path begins in the scenario, ``run.duration=1 s``, or in its device,
-    ``valve.area=12.6mm^2``. ``parameter_set`` takes the place of the set that the scenario names; what the scenario
-    changes in its device is changed in this one. ScenarioError or ParameterError for anything that cannot be used.
+    ``overrides`` are texts whose path starts in the scenario, ``run.duration=1 s``, or in its device,
+    ``valve.area=12.6mm^2``. ``parameter_set`` replaces the set that the scenario names; the scenario's changes of its
+    device apply to this one. Raises ScenarioError or ParameterError for anything that cannot be used.
     """
     document = FILE.parse(FILE.read(name_or_path), label(str(name_or_path)))
     folder, file, given = Path(name_or_path).parent, str(name_or_path), read_overrides(overrides, ScenarioError)
@@ -94,9 +94,9 @@ def scenario_or_load(
 
 
 def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()) -> Scenario:
-    """Return a scenario from nested dictionaries that are laid out as a scenario file is.
+    """Return a scenario from nested dictionaries laid out as a scenario file.
 
-    Quantities are texts with their unit, ``{"angle": "75 deg"}``; relative paths begin in the working folder.
+    Quantities are texts with their unit, ``{"angle": "75 deg"}``; relative paths start from the working folder. Raises
     ScenarioError or ParameterError for anything that cannot be used.
     """
     return scenario_of(request_of_dict(content, overrides), VANE)

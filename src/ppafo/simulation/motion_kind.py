@@ -49,7 +49,7 @@ class LawSignals(NamedTuple):
 
 
 Measured = tuple["Recording", Mapping[str, "Metric"], str]
-"""Recording and metrics of a run, and how it ended if it was completed, in words."""
+"""Recording and metrics of a run, and a sentence on the end of a completed run."""
 
 
 @runtime_checkable

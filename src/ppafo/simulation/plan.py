@@ -135,9 +135,9 @@ def compose_run(
     start: Start,
     walk: Walk | None = None,
 ) -> Run:
-    """Return the run of components: ``rule`` determines the steps, ``start`` the initial state, ``walk`` adds a leg.
+    """Return the run of components: ``rule`` gives the time grid, ``start`` the initial state, ``walk`` a walking leg.
 
-    A leg without ground contact is one of the components, and ``plant`` is the plant without it.
+    A leg without ground contact is one of the components, and ``plant`` is the plant without the leg.
 
     Every controller, valve, motion, gas and supply can be combined with every other here.
     """

@@ -142,7 +142,7 @@ class Result:
 
     @in_units(_units_of)
     def __str__(self) -> str:
-        """Return what ``ppafo simulate`` prints: status, verdict, warnings and metrics in the units of the device."""
+        """Return the output of ``ppafo simulate``: status, verdict, warnings and metrics in the units of the device."""
         from ppafo.report.display_units import metrics_lines
 
         said = filter(None, (self.following, *self.warnings))
@@ -213,7 +213,7 @@ class Result:
 
 
 def simulate(scenario: Scenario) -> Result:
-    """Run one scenario. A run that diverges is a Result with that status, up to the time of failure."""
+    """Run one scenario; a run that diverges gives a Result with that status, up to the time of failure."""
     return results_of(scenario, [plan_run(scenario)])[0]
 
 

@@ -238,7 +238,7 @@ def gain_of_joint(
     *,
     parts: GainOfJointParts,
 ) -> float:
-    """Gain by a rule for the torque loop and the joint of a device, with ``travel`` [rad] per move."""
+    """Gain from ``parts.rule`` for the torque loop and the joint of a device, with ``travel`` [rad] per move."""
     loop = parts.torque_loop_of(settings, stops, around, numbers, valve, signals)
     return parts.rule(loop, parts.joint_of(settings, stops, around, signals, travel))
 
@@ -253,7 +253,7 @@ def gain_of_loop(
     *,
     parts: GainParts,
 ) -> float:
-    """Gain by a rule for the torque loop of a device."""
+    """Gain from ``parts.rule`` for the torque loop of a device."""
     return parts.rule(parts.loop_of(settings, stops, around, numbers, valve, signals))
 
 
@@ -267,7 +267,7 @@ def share_of_reach(
     *,
     parts: ReachParts,
 ) -> float:
-    """Number by a rule for the torque or pressure reach of a device."""
+    """Number from ``parts.rule`` for the torque or pressure reach of a device."""
     return parts.rule(parts.reach_of(settings, stops, around, numbers, valve, signals))
 
 
@@ -282,7 +282,7 @@ def gain_of_loop_and_setting(
     *,
     parts: GainParts,
 ) -> float:
-    """Gain by a rule for the torque loop of a device and another setting of the controller."""
+    """Gain from ``parts.rule`` for the torque loop of a device and another setting of the controller."""
     return parts.rule(parts.loop_of(settings, stops, around, numbers, valve, signals), setting)
 
 
@@ -297,7 +297,7 @@ def opening_beyond_band(
     *,
     parts: GainParts,
 ) -> float:
-    """Command [-] for the valve opening given by a rule, for a valve with a dead band."""
+    """Command [-] for the valve opening from ``parts.rule``, for a valve with a dead band."""
     opening = parts.rule(parts.loop_of(settings, stops, around, numbers, valve, signals), setting)
     return float(valve.dead_band + (1.0 - valve.dead_band) * opening)
 

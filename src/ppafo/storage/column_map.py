@@ -78,7 +78,7 @@ Trials = Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(strict=False, 
 
 
 class ColumnMap(StrictTable):
-    """Format of a file and meaning of its columns."""
+    """Format of a foreign table, and channels of its columns."""
 
     delimiter: Annotated[
         Literal["comma", "semicolon", "tab", "whitespace"], Field(description="what separates columns")

@@ -12,17 +12,17 @@ from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make
 from ppafo.documents.problems import LABEL, NAME
 
 MAXIMUM_RUNS = 2**32
-"""Draws after which a Sobol sequence of 32 bits repeats; no other method needs a lower limit."""
+"""Largest number of draws: a Sobol sequence of 32 bits then repeats; no other method needs a lower limit."""
 MAXIMUM_RUNS_OF_CHUNK = 1_000_000
-"""Rows that are held in memory until they are on the disk: of some ten columns about 100 MB."""
+"""Largest number of rows kept in memory until written to disk: about 100 MB for ten columns."""
 LARGEST_SEED = 2**32 - 1
 """Largest seed: 32 bits, so that it is exact in a column of floats."""
 DEFAULT_SEED = 1
-"""Seed of draws unless given."""
+"""Default seed of the draws."""
 MAXIMUM_GRID_VALUES = 1_000_000
-"""Values of one axis, which are made before anything is run."""
+"""Largest number of values of one axis, which are computed before the first run."""
 DEFAULT_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""Fractions of the runs: nine tenths of them, half of them, and the middle."""
+"""Default quantiles: the central 90 % of the runs, the central 50 %, and the median."""
 
 _Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
 _Values = Annotated[tuple[_Value, ...], Field(strict=False, min_length=1)]
@@ -204,9 +204,9 @@ Varied = (
     | Stated
 )
 VARIED = get_args(Varied)
-"""The classes of ``Varied``, one for each kind of ``[[vary]]``."""
+"""Classes of ``Varied``, one for each kind of ``[[vary]]``."""
 NOT_RANDOM = (SameAs, Grid, Listed)
-"""The classes of ``Varied`` that are no distribution."""
+"""Classes of ``Varied`` that are not distributions."""
 
 
 class StudyFile(StrictTable):

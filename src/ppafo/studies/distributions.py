@@ -208,7 +208,7 @@ def jackknife_reach(left_out: Floats, confidence: float) -> Floats:
 
 
 def effective_sample_size(values: Floats) -> float:
-    """Return the effective number of draws for the mean: their number divided by the squared skewness, if above 1.
+    """Return the effective number of draws for the mean: their number divided by max(1, squared skewness).
 
     The coverage error of a confidence interval by the central limit theorem is about a quarter of the inverse of this
     number (Hall, The Bootstrap and Edgeworth Expansion, 1992, section 2.6). The number is 1 if a single draw dominates.

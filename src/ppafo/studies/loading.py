@@ -38,7 +38,7 @@ STUDY_FILES = TomlKind("study", "study", resources.files("ppafo") / "studies" / 
 
 
 def list_studies() -> tuple[str, ...]:
-    """Return the names of the studies that come with the package.
+    """Return the names of the shipped studies.
 
     >>> import ppafo
     >>> ppafo.list_studies()

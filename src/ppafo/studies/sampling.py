@@ -166,7 +166,7 @@ def with_noise(
 
 
 NOISE_DRAWS = 512
-"""Largest number of draws repeated with other noise; enough to know the noise fraction of the variance to some percent."""
+"""Largest number of draws repeated with other noise: enough for the noise fraction of the variance to some percent."""
 
 
 def with_new_noise(columns: Mapping[str, Floats]) -> dict[str, Floats]:

@@ -144,7 +144,7 @@ class Study:
     scores, None for none. ``runs_of_chunk`` is the number of runs computed together, None for a number that keeps
     memory small. ``units`` maps each varied path to its SI unit. ``only`` maps a path to its configurations, if it does
     not vary in all. ``document`` is the study file as plain data, with changes from the command line; ``text`` is the
-    file in bytes, None for a study from data. Paths in ``gauge`` hold gauge pressures [Pa] relative to the atmosphere
+    file in bytes, empty for a study from data. Paths in ``gauge`` hold gauge pressures [Pa] relative to the atmosphere
     of each run, all others absolute ones. ``given`` maps a path to the unit in which its values were given, if not the
     package's own.
     """

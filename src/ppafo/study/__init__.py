@@ -1,1 +1,1 @@
-"""Runs over columns of values, and what an analysis found: one form for all of them."""
+"""Runs over columns of values and results of an analysis, in one form for all analyses."""

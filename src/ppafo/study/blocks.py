@@ -1,7 +1,7 @@
-"""A study divided into blocks of runs (chunks), and what varies in each of its runs.
+"""Division of a study into blocks of runs (chunks), and the varied values of each run.
 
-Runs are numbered configuration by configuration, in each grid point by grid point (the last axis fastest), at each
-draw by draw. A chunk never holds runs of two configurations.
+Runs are numbered configuration by configuration, within a configuration grid point by grid point (the last axis
+fastest), and within a grid point draw by draw. A chunk never contains runs of two configurations.
 """
 
 from dataclasses import dataclass
@@ -15,20 +15,24 @@ from ppafo.studies.sampling import correlate, uniform_numbers
 from ppafo.studies.study import Configuration, Study, with_followers
 
 MAXIMUM_RUNS_OF_CHUNK = 65_536
-"""Runs of a chunk at most, unless the study says another number."""
+"""Largest number of runs of a chunk, unless the study sets another number."""
 _FEWEST_RUNS_OF_CHUNK = 512
-"""Runs of a chunk at least, however much memory their channels over time take."""
+"""Smallest number of runs of a chunk, whatever memory its traces take."""
 _MAXIMUM_STEPS = 2**25
-"""Steps of all runs between two reports: some seconds of a processor."""
+"""Largest number of steps of all runs between two reports: some seconds of a processor."""
 _SLOW_RUNS_OF_CHUNK = 64
-"""Runs of a chunk with a Python controller: a few seconds between reports, so that little is lost."""
+"""Number of runs of a chunk with a Python controller: a few seconds between reports, so that little can be lost."""
 _MAXIMUM_BYTES_OF_TRACES = 48_000_000
-"""Bytes of the channels over time of a chunk, while it is computed."""
+"""Largest size of the traces of a chunk during computation [bytes]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """Some runs of one configuration: number of the chunk, first run of its configuration, and how many."""
+    """Block of runs of one configuration.
+
+    ``number`` is the chunk number, ``configuration`` the index of its configuration, ``first`` the index of its first
+    run within the configuration, and ``runs`` the number of runs.
+    """
 
     number: int
     configuration: int
@@ -37,7 +41,7 @@ class Chunk:
 
 
 def chunk_size(study: Study) -> int:
-    """Return the runs of a full chunk: fewer where channels over time are kept, so that memory stays small."""
+    """Return the number of runs of a full chunk; it is smaller if traces are kept, to limit memory."""
     if study.runs_of_chunk is not None:
         return study.runs_of_chunk
     if any(configuration.scenario.controller.custom is not None for configuration in study.configurations):
@@ -52,7 +56,7 @@ def chunk_size(study: Study) -> int:
 
 
 def runs_at_once(scenario: Scenario, most: int) -> int:
-    """Return how many runs of a scenario are made between two reports: ``most``, or fewer where they are long."""
+    """Return the number of runs between two progress reports: ``most``, or fewer for long runs."""
     steps = scenario.run.duration / scenario.run.step
     while most > _FEWEST_RUNS_OF_CHUNK and most * steps > _MAXIMUM_STEPS:
         most //= 2
@@ -60,7 +64,7 @@ def runs_at_once(scenario: Scenario, most: int) -> int:
 
 
 def samples_of(study: Study, configuration: Configuration) -> int:
-    """Return how many samples a channel over time has in a configuration."""
+    """Return the number of samples of a trace in a configuration."""
     return int(configuration.scenario.run.duration / study.outputs.every + 1.0e-9) + 1
 
 
@@ -70,7 +74,7 @@ def chunk_count(study: Study) -> int:
 
 
 def chunk(study: Study, number: int) -> Chunk:
-    """Return the chunk of a number, counted over all configurations from 0."""
+    """Return the chunk with a number, counted over all configurations from 0."""
     size = chunk_size(study)
     configuration, index = divmod(number, -(-study.runs_of_configuration // size))
     first = index * size
@@ -78,7 +82,7 @@ def chunk(study: Study, number: int) -> Chunk:
 
 
 def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
-    """Return the values [SI] of all varied paths for ascending runs of one configuration; the same in each of them."""
+    """Return the values [SI] of all varied paths for ascending runs of a configuration, equal in each of them."""
     point, draw = np.divmod(runs, study.sample.runs)
     columns: dict[str, Floats] = {}
     for axis in reversed(study.axes):
@@ -102,6 +106,6 @@ def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
 
 
 def varied_columns(study: Study, configuration: Configuration, values: dict[str, Floats]) -> dict[str, Floats]:
-    """Return the values that the runs of a configuration get."""
+    """Return the varied values that apply to the runs of a configuration."""
     own = {path: column for path, column in values.items() if study.varies(path, configuration.name)}
     return with_followers(own, study.same_in(configuration.name))

@@ -1,7 +1,8 @@
-"""The folder of a study's results: a file in it is written aside and renamed, and is there whole or not at all."""
+"""Folder of a study's results; files are written under a temporary name, then renamed, so that none is incomplete."""
 
 import contextlib
 import io
+import re
 import shutil
 import stat
 import time
@@ -14,23 +15,23 @@ from ppafo.errors import DataError
 from ppafo.storage.files import LEFT_ASIDE, write_file
 
 _MAXIMUM_BYTES_OF_DOCUMENT = 100_000_000
-"""Bytes of a document that is read; no document of a study comes near."""
+"""Largest document that is read [bytes]; documents of studies are far smaller."""
 _BLOCK = 1_000_000
-"""Bytes that are read at once."""
+"""Size of a read block [bytes]."""
 _LONGEST_WRITING = 86400.0
-"""Nobody writes a file for longer [s]."""
+"""Age from which a temporary file counts as abandoned [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class StudyFolder:
-    """The folder of a study's results; names of files are relative to ``path``, with ``/`` between folders."""
+    """Folder of a study's results; file names are relative to ``path``, with ``/`` between folders."""
 
     path: Path
 
     def names(self) -> frozenset[str]:
-        """Return the names of all files, those left aside by a killed process not among them.
+        """Return the names of all files except temporary files left by a killed process.
 
-        DataError where it is a file.
+        Raises DataError if the path is a file.
         """
         if self.path.exists() and not self.path.is_dir():
             raise DataError(f"{self.path}: is a file; the results need a folder")
@@ -38,14 +39,14 @@ class StudyFolder:
         return frozenset(path.relative_to(self.path).as_posix() for path in files)
 
     def open(self, name: str) -> io.BufferedIOBase:
-        """Return a file for reading. OSError where it is no regular file."""
+        """Return a file opened for reading; OSError if it is not a regular file."""
         path = self.path / name
         if not stat.S_ISREG(path.stat().st_mode):
             raise OSError(None, f"{path} is not a regular file")
         return path.open("rb")
 
     def read_document(self, name: str) -> Any:
-        """Return what a JSON file of ours holds, as plain data; OSError or ValueError where that is not possible."""
+        """Return the content of a JSON file of this package as plain data; OSError or ValueError on failure."""
         with self.open(name) as file:
             content = bytearray()
             # In blocks: Python takes the room for as much as is asked for.
@@ -56,20 +57,20 @@ class StudyFolder:
         return json_document(bytes(content))
 
     def write(self, name: str, content: bytes) -> None:
-        """Write a file aside, then rename it."""
+        """Write a file under a temporary name, then rename it."""
         write_file(self.path / name, content)
 
     def remove(self, name: str) -> None:
-        """Remove a file if it is there."""
+        """Remove a file if it exists."""
         (self.path / name).unlink(missing_ok=True)
 
     def free_bytes(self) -> int:
-        """Return the free space of the disk."""
+        """Return the free disk space [bytes]."""
         there = next(ancestor for ancestor in (self.path, *self.path.parents) if ancestor.exists())
         return shutil.disk_usage(there).free
 
     def tidy(self) -> None:
-        """Remove files that were being written when a process was killed: a younger one may belong to another."""
+        """Remove old temporary files left by killed processes; recent ones may belong to a running process."""
         # By age and not by process: the folder may be shared by machines that cannot see each other's processes.
         latest = time.time() - _LONGEST_WRITING
         for path in self.path.rglob(f"*{LEFT_ASIDE}*"):
@@ -79,7 +80,7 @@ class StudyFolder:
 
 
 def study_folder(path: str | Path) -> StudyFolder:
-    """Return the folder at a path; DataError for an address of another computer."""
-    if "://" in str(path):
+    """Return the folder at a path; DataError for the address of another computer."""
+    if re.match(r"[a-z][a-z0-9+]+:/", str(path)):
         raise DataError(f"{path}: is an address; results of a study go into a folder of this computer")
     return StudyFolder(Path(path).absolute())

@@ -1,4 +1,4 @@
-"""``study.json``: what a study computes, by which its folder refuses another study, and what a reader finds there."""
+"""``study.json``: definition of the computed study, checked when its folder is used again, and index for readers."""
 
 import copy
 import hashlib
@@ -37,17 +37,17 @@ from ppafo.wording import one_line
 # A controller in Python as plain data: its class with a hash of the source, and its settings after a reset.
 
 DIGITS = 16
-"""Digits that are kept of a SHA-256 in hexadecimal."""
+"""Number of hexadecimal digits kept of a SHA-256 hash."""
 _DEEPEST = 12
-"""Levels of settings that are looked into."""
+"""Largest nesting depth of settings."""
 _LONGEST = 64
-"""Elements up to which a list is kept itself, and above which its hash is."""
+"""Number of elements up to which a list is stored itself; of a longer list the hash is stored."""
 _Enclosing = tuple[int, ...]
-"""Identities of the values that a value lies in, so that one which holds itself comes to an end."""
+"""Identities of the enclosing values, to detect a value that contains itself."""
 
 
 def controller_document(controller: PythonController) -> dict[str, Any]:
-    """Return type, hash of the source text and settings of a controller as it is after a reset, as plain data."""
+    """Return type, source hash and settings of a controller after a reset, as plain data."""
     try:
         fresh = copy.deepcopy(controller)
     except (TypeError, copy.Error, NotImplementedError, RecursionError):  # it holds what has no copy, such as a port
@@ -58,7 +58,7 @@ def controller_document(controller: PythonController) -> dict[str, Any]:
 
 
 def _object(value: object, enclosing: _Enclosing) -> dict[str, Any]:
-    """Return class and attributes of an object as plain data; one of compiled code has no attributes."""
+    """Return class and attributes of an object as plain data; no attributes for an object of compiled code."""
     try:
         state = object.__getstate__(value)
     except TypeError:  # a class of compiled code
@@ -69,9 +69,9 @@ def _object(value: object, enclosing: _Enclosing) -> dict[str, Any]:
 
 
 def _source(code: type | FunctionType, parts: tuple[type | FunctionType, ...]) -> dict[str, Any]:
-    """Return the name of a class or function, and a hash of the files of its parts: of a class, all that it inherits.
+    """Return the name of a class or function, and a hash of its source files (of a class and all its base classes).
 
-    A part without a file counts by its compiled code.
+    For a part without a file, the hash is of its compiled code.
     """
     digest = hashlib.sha256()
     for part in parts:
@@ -90,14 +90,14 @@ def _source(code: type | FunctionType, parts: tuple[type | FunctionType, ...]) -
 
 
 def _instructions(code: CodeType) -> Iterator[object]:
-    """Give name, instructions, names and constants of compiled code, not the file and the lines it came from."""
+    """Yield name, instructions, names and constants of compiled code, without file name and line numbers."""
     yield from (code.co_name, code.co_code, code.co_names)
     for constant in code.co_consts:
         yield list(_instructions(constant)) if isinstance(constant, CodeType) else constant
 
 
 def _plain_setting(value: object, enclosing: _Enclosing) -> Any:
-    """Return a setting as data that JSON can hold; one that holds itself, or lies too deep, is its type's name."""
+    """Return a setting as JSON data; a recursive or too deeply nested value is replaced by its type's name."""
     if value is None or isinstance(value, str | bytes | bool | numbers.Number | np.generic):
         bare = value.item() if isinstance(value, np.generic) else value
         bare = hashlib.sha256(bare).hexdigest()[:DIGITS] if isinstance(bare, bytes) else bare
@@ -127,13 +127,13 @@ STUDY_COPY = "study.toml"
 FORMAT = "ppafo study results"
 SCHEMA_VERSION = 2
 _NAMED = 4
-"""Differences that a message names."""
+"""Number of differences named in a message."""
 _COMPARED = ("ppafo", "study", "scenarios", "varied", "drawn", "programs")
-"""Keys of the document in which a study must be the same to go on with its results."""
+"""Keys of the manifest that must be equal for a study to continue with earlier results."""
 
 
 def manifest(study: Study) -> dict[str, Any]:
-    """Return the document: study, base scenarios in SI units, runs, columns with units; no time and no machine."""
+    """Return the manifest: study, base scenarios in SI units, runs, columns with units; without time and computer."""
     scenarios: dict[str, Any] = {}
     programs: dict[str, str] = {}
     for configuration in study.configurations:
@@ -177,7 +177,7 @@ def manifest(study: Study) -> dict[str, Any]:
 
 
 def read_manifest(folder: StudyFolder) -> dict[str, Any]:
-    """Return the document of a folder of results; DataError where it is none."""
+    """Return the manifest of a folder of results; DataError if there is none."""
     try:
         document = folder.read_document(MANIFEST)
     except (OSError, ValueError) as error:
@@ -194,7 +194,7 @@ def read_manifest(folder: StudyFolder) -> dict[str, Any]:
 
 
 def _channel(name: str) -> str:
-    """Return the name of a channel; ValueError where there is none of that name."""
+    """Return the name of a channel; ValueError for an unknown name."""
     if name not in CHANNELS:
         raise ValueError(f"there is no channel '{one_line(name)}'")
     return name
@@ -204,7 +204,7 @@ _Channel = Annotated[str, AfterValidator(_channel)]
 
 
 class _Part(BaseModel):
-    """A table of the document; what a later version writes beside it is left alone."""
+    """Table of the manifest; unknown keys, written by later versions, are ignored."""
 
     model_config = ConfigDict(strict=True)
 
@@ -253,7 +253,7 @@ class _StoredGiven(_StoredUnit):
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        """Refuse a unit in which no such value can be given."""
+        """Raise ValueError for a display unit of another dimension."""
         if self.given and not fits(self.given, self.unit):
             raise ValueError(f"given: '{one_line(self.given)}' is no unit of what is in '{one_line(self.unit)}'")
         return self
@@ -270,7 +270,7 @@ class _StoredScenario(_Part):
 
 
 class _Stored(_Part):
-    """Guaranteed fields of the document; ``check_same_study`` compares it with the requested study."""
+    """Guaranteed fields of the manifest; ``check_same_study`` compares it with the requested study."""
 
     study: _StoredStudy
     scenarios: dict[str, _StoredScenario]
@@ -283,7 +283,7 @@ class _Stored(_Part):
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
-        """Refuse chunks that the configurations cannot share, and an axis that does not vary."""
+        """Raise ValueError for a number of chunks unfit for the configurations, or a varied path without unit."""
         names = [configuration.name for configuration in self.study.configurations]
         if len(set(names)) < len(names) or self.chunks % len(names) or self.chunks > self.runs:
             raise ValueError(f"{self.chunks} chunks of {self.runs} runs do not fit {len(names)} configurations")
@@ -299,7 +299,7 @@ class _Stored(_Part):
 
 
 def check_same_study(folder: StudyFolder, stored: Mapping[str, Any], requested: Mapping[str, Any]) -> None:
-    """Refuse to go on with the results of another study, or of this one before it was changed."""
+    """Raise StudyError for results of another study, or of an earlier version of this study."""
     before, now = stored.get("study", {}), requested["study"]
     if before.get("name") != now["name"]:
         raise StudyError(
@@ -316,7 +316,7 @@ def check_same_study(folder: StudyFolder, stored: Mapping[str, Any], requested: 
 
 
 def _plain(document: Any) -> Any:
-    """Return a document as it is once it was written and read: lists for tuples."""
+    """Return a document as it is after writing and reading as JSON: lists for tuples."""
     return json.loads(json.dumps(document))
 
 

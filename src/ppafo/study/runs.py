@@ -1,4 +1,4 @@
-"""Runs of a scenario over columns of values: numbers in, metrics out, one table that grows."""
+"""Runs of a scenario over columns of values: numbers in, metrics out, accumulated in one table."""
 
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -27,24 +27,24 @@ from ppafo.studies.limits import check_metrics
 from ppafo.study.blocks import runs_at_once
 
 Rows = dict[str, NDArray[Any]]
-"""Columns of one length: metrics by name [SI], nan where a run has none, and whether each run ``failed``."""
+"""Columns of one length: metrics by name [SI], nan if a run lacks the metric; and ``failed``, True for a failed run."""
 _Made = Callable[[Mapping[str, Floats]], tuple[Rows, str]]
-"""Columns in; rows out, and why the first of them failed."""
+"""Function from columns to rows and the reason why the first run failed."""
 FAILED = "failed"
 _AT_ONCE, _SLOW_AT_ONCE = 16_384, 32
-"""Runs between two reports at most: as a rule, and where a Python object controls."""
+"""Largest number of runs between two reports: in general, and for a Python controller."""
 
 
 @final
 class RunCounter:
-    """Counts runs for whoever watches, on from those ``done`` earlier; ``runs`` is doubled where there are more."""
+    """Counter of runs for progress reports, starting from ``done``; the total ``runs`` doubles if exceeded."""
 
     def __init__(self, runs: int, progress: Report | None, done: int = 0, failed: int = 0) -> None:
         self._runs, self._report, self._started = max(1, runs), progress, 0.0
         self.done, self.failed, self._earlier = done, failed, 0
 
     def add(self, runs: int, failed: int) -> None:
-        """Count runs that are done; the rate leaves out the first ones, before which models may be compiled."""
+        """Count finished runs; the rate excludes the first ones, which may include compilation of models."""
         self.done += runs
         self.failed += failed
         if not self._earlier:
@@ -61,7 +61,8 @@ class RunCounter:
 class Runs:
     """Runs of a scenario: ``run(columns)`` returns their rows and appends columns and rows to ``table``.
 
-    ``count`` runs were made, ``failures`` of them diverged or were refused; ``reason`` states why the first did.
+    ``count`` is the number of runs made, ``failures`` the number that diverged or were refused; ``reason`` says why the
+    first of these failed.
     """
 
     def __init__(
@@ -72,9 +73,9 @@ class Runs:
         gauge: Collection[str] = (),
         threads: int | None = None,
     ) -> None:
-        """Refuse a metric that does not exist or that the scenario cannot have.
+        """Raise StudyError for a metric that does not exist or that the scenario cannot have.
 
-        Columns of the paths in ``gauge`` count from the atmosphere of their run.
+        Paths in ``gauge`` hold gauge pressures relative to the atmosphere of each run.
         """
         check_metrics([name for name in metrics if name not in SETTLED_METRICS], scenario)
 
@@ -91,7 +92,7 @@ class Runs:
 
     @classmethod
     def of_model(cls, model: Callable[[Mapping[str, Floats]], Mapping[str, Any]], metrics: Sequence[str]) -> "Runs":
-        """Return runs of a function of the columns in place of a scenario; a run without a finite metric failed."""
+        """Return runs of a function of the columns instead of a scenario; a run without a finite metric has failed."""
         runs = cls.__new__(cls)
 
         def rows(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
@@ -124,13 +125,13 @@ class Runs:
 
     @property
     def table(self) -> Rows:
-        """All rows so far, with the columns that made them."""
+        """All rows so far, together with their columns of values."""
         return joined(self._parts) if self._parts else {}
 
     def check(self, rows: Rows, maximum_failed: float, what: str, metrics: Sequence[str] = ()) -> None:
-        """Refuse to continue where more than a fraction of some rows failed, or lacks one of some metrics.
+        """Raise StudyError if more than a fraction of the rows failed, or lacks one of some metrics.
 
-        The rest would be the survivors, whose statistics are other ones. ``what`` names the rows in the message.
+        Statistics of the remaining runs would be biased. ``what`` names the rows in the message.
         """
         failures, runs = failures_of(rows), rows[FAILED].size
         if failures > maximum_failed * runs:
@@ -145,7 +146,7 @@ class Runs:
 
 
 def unvaried(scenario: Scenario, runs: int) -> dict[str, Floats]:
-    """Return columns that leave a scenario as it is: an ensemble needs one column at least."""
+    """Return columns that leave a scenario unchanged, because an ensemble needs at least one column."""
     return {"supply.pressure": np.full(runs, scenario.device.supply.pressure)}
 
 
@@ -155,14 +156,14 @@ def joined(parts: Sequence[Rows]) -> Rows:
 
 
 def failures_of(rows: Rows) -> int:
-    """Return how many runs of a table failed."""
+    """Return the number of failed runs in a table."""
     return int(np.count_nonzero(rows[FAILED]))
 
 
 def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ...]:
-    """Return metrics with those that a judgement needs beside them, where the scenario offers them.
+    """Return metrics, with the further metrics that their evaluation needs and that the scenario has.
 
-    A metric at one instant needs oscillations of what is controlled, and the verdict on tracking its own metrics.
+    A metric at one instant needs the oscillations of the controlled quantity, and the tracking verdict its own metrics.
     """
     companions = [name for metric in metrics for name in ONE_INSTANT.get(metric, ())]
     offered = (
@@ -176,9 +177,9 @@ def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ..
 def excess(
     rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
 ) -> Floats:
-    """Return the largest tracking number of metered runs over its limit (runs,); nan where that is not known.
+    """Return the largest tracking number of each run divided by its limit (runs,); nan if unknown.
 
-    ``columns`` are the values of the runs by path, of which those in ``gauge`` count from the atmosphere.
+    ``columns`` are the values of the runs by path; paths in ``gauge`` hold gauge pressures.
     """
     if not set(needed_metrics(scenario)) & set(rows):
         return np.full(next(iter(rows.values())).size, np.nan)
@@ -190,7 +191,7 @@ def excess(
 def follows(
     rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
 ) -> Floats:
-    """Return whether metered runs follow their reference (runs,): 1, 0, or nan where that is not known."""
+    """Return for each run (runs,) 1 if it follows its reference, 0 if not, nan if unknown."""
     share = excess(rows, scenario, columns, gauge)
     return np.where(np.isfinite(share), np.where(share > 1.0, 0.0, 1.0), share)
 
@@ -198,9 +199,9 @@ def follows(
 def tracking_violation(
     rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
 ) -> Floats:
-    """Return by which share metered runs exceed the limits of tracking (runs,); 0 where they follow or it is unknown.
+    """Return the relative excess of each run over the tracking limits (runs,); 0 for a run that follows or is unknown.
 
-    A reference that its scenario announces to lie beyond reach is followed by no run, and counts as followed.
+    A reference that its scenario declares to be beyond reach cannot be followed, and counts as followed.
     """
     if scenario.beyond_reach and not changes_reach(columns):
         return np.zeros(next(iter(rows.values())).size)
@@ -208,14 +209,14 @@ def tracking_violation(
 
 
 def oscillating(rows: Mapping[str, Floats], scenario: Scenario) -> NDArray[np.bool_]:
-    """Return in which runs the torque loop oscillates, from ``command_reversals`` of metered runs; none without it."""
+    """Tell for each run whether its torque loop oscillates, from ``command_reversals``; False without this metric."""
     if REVERSALS not in rows:
         return np.zeros(next(iter(rows.values())).size, dtype=np.bool_)
     return np.asarray(rows[REVERSALS] > most_reversals(scenario))
 
 
 def settled(rows: Rows, metric: str) -> Floats:
-    """Return a metric for a judgement: no instant of a loop that oscillates counts as its error."""
+    """Return a metric for evaluation; for an oscillating loop, the final error becomes the RMS error if larger."""
     companions = ONE_INSTANT.get(metric, ())
     if not companions or not set(companions) <= set(rows):
         return rows[metric]

@@ -1,7 +1,7 @@
-"""The results of a study in a folder: chunks of rows, each with a note of its checksum.
+"""Results of a study in a folder: chunks of rows, each with a note of its checksum.
 
-A chunk counts as finished once its note is written, last; a file that does not match its note is computed again. Page
-checksums of Parquet miss a flipped bit here and there: SHA-256 does not.
+A chunk counts as finished once its note is written, after the chunk itself; a file that does not match its note is
+recomputed. Page checksums of Parquet miss some flipped bits; SHA-256 does not.
 """
 
 import hashlib
@@ -40,24 +40,24 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _TRIED_RUNS = 8
-"""Runs of each configuration that are made before a study begins, so that it is refused at once where it cannot run."""
+"""Number of runs of each configuration made before a study starts, to detect errors at once."""
 STATUSES = ("completed", "diverged", "refused")
 _PLAIN, _OVER_TIME = "-", "_over_time"
 ASKED_ABOVE = 10_000_000_000
-"""Bytes above which a study is only started with ``--yes``."""
+"""Size [bytes] above which a study only starts with ``--yes``."""
 _FIXED_BYTES_OF_ROW = 3
-"""Bytes of the texts of a row, each by its number in a list of texts."""
+"""Bytes of the texts of a row, each stored as an index into a list of texts."""
 _BYTES_OF_NUMBER = 8
-"""Bytes of a number of a row."""
+"""Bytes per number of a row."""
 _BYTES_OF_SAMPLE = 4
-"""Bytes of a sample of a channel over time, which is kept in single precision unless bands are made of it."""
+"""Bytes per sample of a trace, stored in single precision unless needed for bands."""
 _BYTES_OF_FILE = 12_000
-"""Bytes of a file beside its rows, with its note: names, units and meanings of the columns."""
+"""Bytes of a file in addition to its rows, with its note: names, units and meanings of the columns."""
 
 
 @dataclass(frozen=True, slots=True)
 class FinishedChunk:
-    """A chunk that is written: its number, its runs, and how many of them failed."""
+    """Chunk that has been written: its number, its number of runs, and the number of failed runs."""
 
     number: int
     runs: int
@@ -66,14 +66,14 @@ class FinishedChunk:
 
 @dataclass(frozen=True, slots=True)
 class StudyStore:
-    """The results of a study in a folder, written chunk by chunk."""
+    """Results of a study in a folder, written chunk by chunk."""
 
     study: Study
     folder: StudyFolder
 
     @classmethod
     def claim(cls, study: Study, folder: StudyFolder, agreed: bool, threads: int | None) -> "StudyStore":
-        """Give a folder to a study, or refuse it: of another study, of an earlier version, without room."""
+        """Assign a folder to a study; error for results of another study or version, and for a lack of space."""
         names = folder.names()
         if MANIFEST in names:
             check_same_study(folder, read_manifest(folder), manifest(study))
@@ -97,7 +97,7 @@ class StudyStore:
         return cls(study, folder)
 
     def finished(self) -> list[FinishedChunk]:
-        """Return the chunks whose files are as they were written."""
+        """Return the chunks whose files match their notes."""
         there, found = self.folder.names(), []
         for number in range(chunk_count(self.study)):
             name = chunk_file(number)
@@ -116,7 +116,7 @@ class StudyStore:
         return found
 
     def write(self, finished: FinishedChunk, content: bytes) -> FinishedChunk:
-        """Write the file of a chunk, and last the note by which it counts as finished; return that."""
+        """Write the file of a chunk, then the note that marks it as finished; return the chunk."""
         name = chunk_file(finished.number)
         self.folder.write(name, content)
         checksums = {name: hashlib.sha256(content).hexdigest()}
@@ -128,7 +128,7 @@ class StudyStore:
 def stored_rows(
     folder: StudyFolder, numbers: Sequence[int], columns: Sequence[str] | None = None
 ) -> "Iterator[pa.Table]":
-    """Give the tables of some chunks one after the other; DataError where one is missing or damaged."""
+    """Yield the tables of some chunks; DataError for a missing or damaged one."""
     for number in numbers:
         name = chunk_file(number)
         try:
@@ -143,12 +143,12 @@ def stored_rows(
 
 
 OSCILLATES, FOLLOWS = "oscillates", "follows"
-"""Columns of the flags of runs whose loop oscillates, and of runs that follow their reference."""
+"""Columns of flags: the loop of the run oscillates; the run follows its reference."""
 _TEXTS = ("configuration", "status", "reason", "channel")
 
 
 def check_types(table: "pa.Table", name: str) -> None:
-    """Refuse columns of another type than a study writes: texts, numbers, lists of numbers; DataError says which."""
+    """Raise DataError for columns of a type that a study never writes: only texts, numbers and lists of numbers."""
     import pyarrow as pa
 
     for field in table.schema:
@@ -167,7 +167,7 @@ def check_types(table: "pa.Table", name: str) -> None:
 
 
 def compute_chunk(study: Study, number: int, threads: int | None) -> tuple[FinishedChunk, bytes]:
-    """Return the file of a chunk, computed here and not yet written: a row for every run, in SI units, nan for none."""
+    """Return the content of a chunk file, not yet written: a row per run in SI units, nan for missing values."""
     part = chunk(study, number)
     values = drawn_values(study, np.arange(part.first, part.first + part.runs))
     result = _result(study, part, values, threads)
@@ -183,7 +183,7 @@ def compute_chunk(study: Study, number: int, threads: int | None) -> tuple[Finis
 
 
 def _columns_of_runs(study: Study, part: Chunk, values: dict[str, Floats]) -> dict[str, TableColumn]:
-    """Return the number of each run, its configuration, and what varies: nan where it does not vary in that one."""
+    """Return the columns of run number, configuration and varied values; nan for a path that does not vary here."""
     configuration = study.configurations[part.configuration]
     first = part.configuration * study.runs_of_configuration + part.first
     numbers = np.arange(first, first + part.runs, dtype=np.int64)
@@ -205,7 +205,7 @@ def _columns_of_runs(study: Study, part: Chunk, values: dict[str, Floats]) -> di
 def _columns_of_endings(
     study: Study, part: Chunk, values: dict[str, Floats], result: EnsembleResult
 ) -> dict[str, TableColumn]:
-    """Return how each run ended, when and why it failed, whether its loop oscillates, and whether it follows."""
+    """Return the columns of status, time and reason of failure, oscillation, and tracking of the reference."""
     configuration = study.configurations[part.configuration]
     varied = varied_columns(study, configuration, dict(values))
     counted = result.metrics.get(REVERSALS, np.full(result.status.size, np.nan))
@@ -228,7 +228,7 @@ def _columns_of_endings(
 
 
 def _columns_of_metrics(study: Study, result: EnsembleResult, runs: int) -> dict[str, TableColumn]:
-    """Return the metrics of each run, each with its estimated error where the study asks for it."""
+    """Return the columns of metrics and, if the study asks for them, of estimated errors."""
     columns = {}
     for name in study.outputs.metrics:
         metric = METRICS[name]
@@ -242,7 +242,7 @@ def _columns_of_metrics(study: Study, result: EnsembleResult, runs: int) -> dict
 
 
 def _columns_of_traces(study: Study, part: Chunk, result: EnsembleResult) -> dict[str, TableColumn]:
-    """Return the channels over time that the study keeps of each run."""
+    """Return the columns of the traces that the study keeps."""
     columns = {}
     samples = samples_of(study, study.configurations[part.configuration])
     for channel in study.outputs.traces:
@@ -256,22 +256,22 @@ def _columns_of_traces(study: Study, part: Chunk, result: EnsembleResult) -> dic
 
 
 def trace_column(channel: str) -> str:
-    """Return the name of the column with the values of a channel over time."""
+    """Return the name of the column with the trace of a channel."""
     return f"{channel}{_OVER_TIME}"
 
 
 def chunk_file(number: int) -> str:
-    """Return the name of the file of a chunk, relative to the folder."""
+    """Return the file name of a chunk, relative to the folder."""
     return f"runs/chunk-{number:07d}.parquet"
 
 
 def note_file(number: int) -> str:
-    """Return the name of the note by which a chunk counts as finished."""
+    """Return the file name of the note that marks a chunk as finished."""
     return f"finished/chunk-{number:07d}.json"
 
 
 def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int | None) -> EnsembleResult:
-    """Return the runs of a chunk, whose varied ``values`` [SI] are by path; StudyError for one that cannot vary so."""
+    """Return the results of a chunk with varied ``values`` [SI] by path; StudyError for a path that cannot vary."""
     configuration, outputs = study.configurations[part.configuration], study.outputs
     columns = varied_columns(study, configuration, values) or unvaried(configuration.scenario, part.runs)
     every = outputs.every if outputs.traces else 0.0
@@ -289,15 +289,15 @@ def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int |
 
 
 def stored_unit(unit: str) -> str:
-    """Return the unit as tables state it: a pressure is absolute (``Pa_a``) or a difference (``Pa_d``), never bare.
+    """Return the unit for tables: pressures are absolute (``Pa_a``) or differences (``Pa_d``), never plain Pa.
 
-    What metrics and channels call Pa is absolute.
+    Pa as the unit of a metric or channel is absolute.
     """
     return "Pa_a" if unit == "Pa" else unit
 
 
 def estimate_bytes(study: Study) -> int:
-    """Return an upper estimate of the bytes on disk: as if nothing could be compressed."""
+    """Return an upper estimate of the disk space [bytes], without compression."""
     outputs, samples = study.outputs, max(samples_of(study, configuration) for configuration in study.configurations)
     numbers = 2 + len(study.paths) + len(outputs.metrics) * (2 if outputs.errors else 1)
     traces = sum(_BYTES_OF_NUMBER if name in outputs.bands else _BYTES_OF_SAMPLE for name in outputs.traces)
@@ -306,7 +306,7 @@ def estimate_bytes(study: Study) -> int:
 
 
 def check_room(study: Study, folder: StudyFolder, agreed: bool) -> None:
-    """Refuse a study that does not fit onto the disk, or that takes much of it and was not agreed to with ``--yes``."""
+    """Raise StudyError for a study that does not fit onto the disk, or is very large without ``--yes``."""
     needed, free = estimate_bytes(study), folder.free_bytes()
     size = f"{study.runs:,} runs of '{study.name}' need about {_bytes_text(needed)}"
     if needed > free:
@@ -318,7 +318,7 @@ def check_room(study: Study, folder: StudyFolder, agreed: bool) -> None:
 
 
 def _bytes_text(size: int) -> str:
-    """Return a number of bytes as text, ``1.2 GB``."""
+    """Return a number of bytes as text, such as ``1.2 GB``."""
     for unit, scale in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
         if size >= scale:
             return f"{size / scale:.3g} {unit}"

@@ -72,7 +72,7 @@ def pressures_to_write(unit: str, si_unit: str) -> str:
 
 
 SI = "SI"
-"""Unit of a number that is in SI already, whatever its quantity: set by programs."""
+"""Unit of a number that is already in SI, for any quantity; written by programs."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _NOT_ZERO = re.compile(r"[^eE]*[1-9]", re.ASCII)

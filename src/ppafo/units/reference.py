@@ -43,7 +43,7 @@ CONDITIONS: dict[str, Condition] = {
     "DIN 1343": Condition(273.15, STANDARD_ATMOSPHERE),
     "ISO 2533": Condition(288.15, STANDARD_ATMOSPHERE),
 }
-"""Reference conditions by name: of pneumatics, of normal litres, of the standard atmosphere at sea level."""
+"""Reference conditions by name: pneumatics, normal litres, standard atmosphere at sea level."""
 
 _BEHIND = re.compile(r"(?P<flow>.*[^/ ]) *\((?P<words>[^()]*)\)|(?P<bare>.*[^/ ])[ _]+(?P<name>ANR)")
 _NORMAL = re.compile(
@@ -136,7 +136,7 @@ def density(condition: Condition, molar_mass: float) -> float:
 
 
 _AS_AIR = 5.0e-3
-"""Fraction by which a molar mass of air may differ from the one of the package."""
+"""Relative deviation from the package's molar mass of air within which a gas counts as air."""
 
 
 def condition_of(text: str, unit: str) -> Condition:

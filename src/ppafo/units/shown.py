@@ -67,24 +67,24 @@ QUANTITIES: Mapping[str, Units] = MappingProxyType(
         "conductance": Units("m^3/(s Pa)", "L/(s bar)"),
     }
 )
-"""Units by the kind of quantity."""
+"""Units by kind of quantity."""
 NAMED = ("gas mass", "part mass", "body length", "duration", "fraction")
-"""Kinds that no unit tells from another kind: whoever shows one has to name it."""
+"""Kinds of quantity that share their SI unit with another kind and must be named explicitly."""
 _OF_UNIT = {
     **{units.si: quantity for quantity, units in QUANTITIES.items() if quantity not in NAMED},
     # Metrics and channels write Pa for a level; of the quantities in kg the plain one is meant.
     "Pa": "pressure",
     "kg": "mass",
 }
-"""Kind of quantity by its unit in SI."""
+"""Kind of quantity by SI unit."""
 _WRITTEN = {"Pa": "Pa_a", "-": "1"}
 """Unit of a number in a file for the unit of a metric or a channel."""
 _PER_PRESSURE = {"N/Pa": "N", "N m/Pa": "N m"}
-"""Units in SI of what a pressure gives, and of what it gives; the pressure is in the unit of the set."""
+"""SI unit of the numerator for each quantity per pressure; the pressure is in the unit of the set."""
 _DIGITS = 9
-"""Digits that stay of what is written to be read again: what lies beyond them is the rounding of a unit."""
+"""Significant digits of written numbers; further digits are rounding errors of the unit conversion."""
 GAUGE_ZERO = "gauge_zero"
-"""Key, beside units by their unit in SI, of the absolute pressure from which gauge pressures count."""
+"""Key, among the SI units, of the absolute pressure that is the zero of gauge pressures."""
 
 _chosen: ContextVar[Mapping[str, str]] = ContextVar("_chosen", default=MappingProxyType({}))
 
@@ -114,7 +114,7 @@ def in_units(units: Callable[..., Mapping[str, str]]) -> Callable[[Callable[P, R
 
 
 def pressure_units(level: str) -> dict[str, str]:
-    """Return the display units of pressure levels and differences, by SI unit, for levels in ``bar_g``, say."""
+    """Return the display units of pressure levels and differences, by SI unit, for a level unit such as ``bar_g``."""
     unit, kind = split_pressure_kind(level)
     return {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
 

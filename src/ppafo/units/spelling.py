@@ -15,7 +15,7 @@ UNITS = (
     *("L", "in", "ft", "lb", "lbf", "oz", "ozf", "kgf", "percent"),
 )
 PRESSURES = ("Pa", "bar", "psi", "atm", "Torr", "mHg", "inHg", "mWC", "inWC")
-"""Units of pressure of one word."""
+"""Pressure units that consist of one word."""
 
 LONGEST_UNIT = 60
 _MOST_FACTORS = 4
@@ -91,7 +91,7 @@ _MEANT = {
 }
 _WORDS = {word: unit for unit, words in _MEANT.items() for word in words}
 _COLUMNS_OF = re.compile(r"\b(mm|cm|m|in) ?(?:H2O|h2o|WS|wc)(?![A-Za-fh-z0-9])")
-"""Heads of water, whose unit is the water column, WC."""
+"""Water heads, written with the unit WC (water column)."""
 
 _SQUARE_OR_CUBIC = (
     (re.compile(r"\bsq\.? ?(mm|cm|m|in|ft)\b"), r"\1^2"),

@@ -93,7 +93,7 @@ class ComparedCurve:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """Delay [s] of the measurement with respect to the model, 0 if undetectable; ``is_at_limit`` if limited."""
+    """Delay [s] of the measurement with respect to the model, 0 if undetectable, and whether the limit is reached."""
 
     value: float
     is_at_limit: bool

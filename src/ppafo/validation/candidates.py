@@ -193,7 +193,7 @@ _OF_SUPPLY = {"supply.pressure": SUPPLY, "supply.dorsiflexion_pressure": DORSIFL
 
 
 def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> Iterator[CandidateCause]:
-    """Yield each parameter of the set with trial values, and a wrong atmospheric pressure for gauge sensors."""
+    """Yield each parameter of the set with trial values, and a wrong atmospheric pressure of gauge sensors."""
     request = replay_of(measured, device, settings)
     scenario = replace(replayed_scenario(request), device=request.device)
     # Supply pressures that a replay follows in the recording, whatever the set has.
@@ -217,7 +217,7 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
 
 
 def _other_atmosphere(device: Device, pressures: Mapping[str, float]) -> CandidateCause:
-    """Return a wrong atmospheric pressure as cause; shifts gauge readings and supply ``pressures`` [Pa] by path."""
+    """Return a wrong atmospheric pressure as cause; it shifts gauge readings and supply ``pressures`` [Pa] by path."""
     atmosphere = device.supply.atmospheric_pressure
 
     def change(factor: float) -> ModelChange:

@@ -285,7 +285,7 @@ def _samples(records: Sequence[Record]) -> list[CandidateCause]:
 
 
 def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[CandidateCause]:
-    """Return a locked vane as candidate cause if the recorded angle is constant in a model that moves; else nothing."""
+    """Return a locked vane as candidate cause if the recorded angle is constant while the model moves, else nothing."""
     if settings.motion not in ("free", "leg"):
         return []
     angles = [record.values[record.channels.index(ANGLE)] for record in records if ANGLE in record.channels]

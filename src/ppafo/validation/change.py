@@ -106,7 +106,7 @@ class CandidateCause:
 
     @property
     def is_of_bench(self) -> bool:
-        """True for a usual error of a single sensor; errors of sensor groups are sums of these."""
+        """True for a usual error of a single sensor; an error of a sensor group is a sum of single errors."""
         return self.usual > 0.0 and len(self.at(self.usual).sensors) <= 1
 
     @property

@@ -73,7 +73,7 @@ class ErrorLimit:
     is_fraction: bool
 
     def fraction_of(self, full_range: float) -> float:
-        """The limit as a fraction [-] of a full range in the SI unit of the channel."""
+        """Return the limit as a fraction [-] of a full range, given in the SI unit of the channel."""
         return self.value if self.is_fraction else self.value / full_range
 
 

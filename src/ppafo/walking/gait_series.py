@@ -217,12 +217,13 @@ def heel_rocker(gait: Gait, wearer: Wearer) -> HeelRocker:
 
 
 def fit_rocker(gait: Gait) -> tuple[float, float, float]:
-    """The lever over the tilt of the measured foot while it comes down on its heel alone, by least squares.
+    """Return the heel lever as a function of foot tilt, fitted by least squares to the landing on the heel alone.
 
-    These are the lever [m] nearly flat, its gain [m] far up, and the tilt [rad] at half the gain. They come from the
-    measured moment, which horizontal forces are part of, or without one from the centre of pressure. A heel that is
-    still up when the toes of the measured foot take over keeps the last lever. The lever of the heel itself
-    bounds it, and stands in where nothing was measured.
+    The result is the lever of the nearly flat foot [m], the increase of the lever for a raised foot [m], and the tilt
+    at half of the increase [rad]. The lever is the measured ankle moment, which includes horizontal forces, divided by
+    the vertical force, or else the centre of pressure. If the heel is still raised when the toes of the measured foot
+    take over the load, the last lever remains. Without a measurement the lever is ``LONGER_THAN_A_FOOT``, to be
+    bounded by the heel lever of the wearer.
     """
     not_measured = LONGER_THAN_A_FOOT, 0.0, ROLL_ANGLES[0]
     if gait.vertical_force is None:

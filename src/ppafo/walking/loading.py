@@ -122,7 +122,7 @@ def load_walk(
 ) -> Scenario:
     """Load a walk as a scenario in SI units.
 
-    The subject of a gait that the file or ``gait`` names is the default wearer.
+    The default wearer is the subject of the gait named in the file or by ``gait``.
 
     Arguments:
         scenario: name of a walk, or a .toml file

@@ -37,12 +37,20 @@ from ppafo.walking.wearer import WEARER, Wearer, who_walks
 class WalkMotion:
     """Walk of a wearer with the device; the gait prescribes shank and loaded foot, the device moves the free foot.
 
-    ``timing`` is the name of the gait phase estimator. ``forces`` holds the settings [SI] of the force sensors by name,
-    ``faults`` the sensor faults by sensor, ``broken`` the faults of the plant by part, and ``shut_off`` the settings of
-    the shut-off valve, {} without one. ``task_sequence`` is None for equal strides, ``bottle`` is None for an unlimited
-    supply. ``wearer_origin`` describes the origin of the body mass. ``person`` is the number of the person of the
-    population, 0 for the wearer with the unchanged gait, or a ``Person`` drawn before. ``person`` and the numbers of
-    wearer, ``forces`` and ``faults`` may be arrays (runs,).
+    ``person`` and the numbers of ``wearer``, ``forces`` and ``faults`` may be arrays (runs,).
+
+    - ``motion_kind``: functions of this kind of motion
+    - ``gait``: prescribed gait
+    - ``wearer``: leg of the wearer
+    - ``timing``: name of the gait phase estimator
+    - ``forces``: settings [SI] of the force sensors, by name
+    - ``faults``: sensor faults, by sensor
+    - ``task_sequence``: task sequence, None for equal strides
+    - ``bottle``: gas bottle, None for an unlimited supply
+    - ``wearer_origin``: description of the origin of the body mass
+    - ``person``: number of the person of the population, 0 for the wearer with the unchanged gait, or a ``Person``
+    - ``broken``: faults of the plant, by part
+    - ``shut_off``: settings of the shut-off valve, {} without one
     """
 
     motion_kind: MotionKind[Scenario] = field(compare=False)

@@ -163,15 +163,23 @@ def _units_of(walked: "WalkResult | Scenario", *_: Any) -> Mapping[str, str]:
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
 class WalkResult:
-    """Result of a walk.
+    """Result of a walk. Averages and metrics use assisted strides after the first ones, in which the controller adapts.
 
-    ``recording`` has the channels over time, ``strides`` the numbers of each stride (strides,), ``averages`` the mean
-    curves and ``metrics`` the numbers of the whole walk. Averages and metrics use assisted strides only, without the
-    first strides, in which the controller adapts; for a task sequence they use steady strides on level ground.
-    ``vented_metrics`` use the strides with reduced assistance (lifted only, paused or stopped) and are {} without any.
-    ``starts`` are the samples directly after each heel strike, and ``helped`` is True for each stride with full
-    assistance. ``events`` are pauses, the stop and returns of assistance. ``segments`` are the segments of a task
-    sequence, () without one. ``supply`` is the bottle over the walk, None without a bottle.
+    For a task sequence, averages and metrics use steady strides on level ground only.
+
+    - ``scenario``: scenario of the walk
+    - ``recording``: channels over time [SI]
+    - ``strides``: numbers of each whole stride [SI], each (strides,), by name
+    - ``averages``: mean curves over the stride, by channel
+    - ``metrics``: numbers of the whole walk, by name
+    - ``status``: completed, or diverged with the time [s]
+    - ``starts``: samples directly after each heel strike
+    - ``helped``: True for each stride with full assistance (strides,)
+    - ``vented_metrics``: metrics of the strides with reduced assistance (lifted only, paused or stopped), {} without
+      any
+    - ``events``: pauses, the stop and returns of assistance
+    - ``segments``: results of the segments of a task sequence, () without one
+    - ``supply``: gas bottle over the walk, None without a bottle
     """
 
     scenario: Scenario

@@ -138,7 +138,7 @@ def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Fl
 
 
 def event_lines(events: Sequence[SafetyEvent]) -> list[str]:
-    """Return each event as a line of text; of many events only the first and last, with the number between."""
+    """Return each event as a line of text; of many events only the first few and the last, with the number omitted."""
     lines = [event.message for event in events]
     if len(lines) <= SHOWN:
         return lines

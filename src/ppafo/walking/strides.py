@@ -210,13 +210,17 @@ def healthy_toe_height(configuration: Scenario) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class SegmentResult:
-    """Result of one segment of a task sequence, from ``start`` to ``end`` [s], SI units.
+    """Result of one segment of a task sequence, in SI units.
 
-    ``strides`` is the number of strides that start in the segment, and ``helped`` how many of these were fully assisted
-    up to the next strike or the end. ``gas`` is the consumed gas [kg] and ``net_push_off_work`` [J] the work of the
-    strides that start in the segment. ``lowest_toes`` [m] is the lowest toe clearance in mid-swing, None without a
-    swing. ``flat_push`` [N m] is the largest plantarflexion torque with a loaded heel. ``safe_time`` [s] is the first
-    time with reduced assistance (lifted only, paused or stopped), None without any.
+    - ``kind``, ``title``: kind of the segment, and its title for tables
+    - ``start``, ``end``: time interval of the segment [s]
+    - ``strides``: number of strides that start in the segment
+    - ``helped``: number of these strides that were fully assisted up to the next strike or the end
+    - ``gas``: consumed gas [kg]
+    - ``net_push_off_work``: net push-off work of the strides that start in the segment [J]
+    - ``lowest_toes``: lowest toe clearance in mid-swing [m], None without a swing
+    - ``flat_push``: largest plantarflexion torque with a loaded heel [N m]
+    - ``safe_time``: first time with reduced assistance (lifted only, paused or stopped) [s], None without any
     """
 
     kind: str

@@ -64,23 +64,23 @@ def walk(
 ) -> WalkResult:
     """Simulate a walk for ``minutes`` [min]: a scenario that is a walk, the name of a shipped one, or a file.
 
-    Unless ``minutes`` are given it is as long as the file says, or its task sequence, or one minute where there is
-    none, and up to ten on a bottle, which may end it before.
+    The default duration is stated in the file, or it is the duration of the task sequence, or otherwise one minute,
+    and ten minutes on a bottle, which may end the walk earlier.
 
     Arguments:
-        scenario: a Scenario that is a walk, the name of a shipped one, or a .toml file; what follows changes one that
-            is given by name or file
-        overrides: values to change, texts or a dictionary as of ``simulate``
+        scenario: a Scenario that is a walk, the name of a shipped one, or a .toml file; the arguments up to ``bottle``
+            need a name or a file
+        overrides: values to change, as texts or as a dictionary, as in ``simulate``
         gait: name or file of a gait in place of the scenario's
         task_sequence: name or file of a task sequence in place of the scenario's
         bottle: name or file of a bottle in place of the scenario's
         minutes: length of the walk [min]
         plugins: modules of your own, files or names, whose objects files may name
-        progress: called with the minutes done and those in all, part by part
+        progress: called repeatedly with the minutes done and the total number of minutes
 
     Returns:
-        a WalkResult: recording, strides and metrics in SI units. A walk that diverges has that status, and what was
-        recorded up to the time of failure
+        a WalkResult: recording, strides and metrics in SI units. A diverged walk has the status "diverged" and the
+        recording up to the time of failure
 
     Raises:
         ScenarioError: a scenario that cannot be used, or is no walk
@@ -317,10 +317,15 @@ TRAITS: dict[str, WearerQuantity] = {
 class Population:
     """Wearers and the outcomes of their walks, each an array (wearers,) by name, in SI units.
 
-    ``diverged`` is the number of wearers whose simulation diverged; they are excluded from ``outcomes`` and ``traits``.
-    ``vented`` is the number of wearers whose controller stopped permanently, ``paused`` the number of other wearers
-    with reduced assistance for a while. ``fault_flags`` counts the wearers of both groups by their last fault flag, the
-    most frequent first.
+    - ``scenario``: walk of the first wearer
+    - ``minutes``: duration of each walk [min]
+    - ``seed``: random seed of the wearers
+    - ``traits``, ``outcomes``: traits of the wearers, and outcomes of their walks, without wearers whose simulation
+      diverged
+    - ``diverged``: number of wearers whose simulation diverged
+    - ``vented``: number of wearers whose controller stopped permanently
+    - ``paused``: number of other wearers with reduced assistance for a while
+    - ``fault_flags``: number of vented and paused wearers by their last fault flag, the most frequent first
     """
 
     scenario: Scenario

@@ -1,11 +1,11 @@
-"""Who wears the device: segments of one leg and the ankle, in SI units, and how wearers differ.
+"""Wearer of the device: segments of one leg and the ankle, in SI units, and the variation between wearers.
 
-A person is scaled in mass and length. A segment keeps its fraction of the body mass, its fraction of the body's length,
-and where its mass lies in it (as in table 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th ed.
-2009). So masses go with body mass, lengths with stature, and inertias with mass times length squared; the fractions are
-those of the wearer that is scaled. Tissue stays as it is. Where a walk file does not say who walks, it is the subject
-of the gait, or the paper's where no gait is named. Where it gives the stature, each segment that it does not give
-follows body mass and stature.
+A person is scaled in mass and length. Each segment keeps its fraction of the body mass, its fraction of the stature and
+the relative position of its mass centre (as in table 4.1 of Winter, Biomechanics and Motor Control of Human Movement,
+4th ed. 2009). Masses are therefore proportional to body mass, lengths to stature, and inertias to mass times length
+squared; the fractions are taken from the original wearer. The tissue of the ankle is not scaled. The default wearer of
+a walk file is the subject of the named gait, or the paper's subject if no gait is named. If the file states the
+stature, all segments without a stated value are scaled with body mass and stature.
 """
 
 from collections.abc import Callable, Mapping
@@ -55,7 +55,7 @@ class HeelRocker(NamedTuple):
     """Heel rocker: lever of the ground force behind the ankle as a function of foot tilt.
 
     ``flat`` [m] is the lever with the foot nearly flat, ``raised`` [m] the lever of a raised foot, ``half`` [rad] the
-    tilt half of the way between.
+    tilt at which the lever is halfway between both.
     """
 
     flat: float
@@ -65,9 +65,10 @@ class HeelRocker(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Wearer:
-    """Leg of a person; fields without a number here are declared with the foot of a leg alone.
+    """Leg of a person, in SI units; fields without a declaration here are declared in ``FOOT``.
 
-    Defaults: the paper's subject (after equation (12)); what it does not print is said in docs/decisions/0008.
+    Default values are of the paper's subject (after equation (12)); docs/decisions/0008 explains values that the paper
+    does not state.
     """
 
     body_mass: Annotated[float, Number("kg", "mass of the body", 72.5, 10.0, 300.0)]

@@ -32,11 +32,14 @@ _WARMTH = Kind("Temperature of the bottle", "K", "temperature", ".1f")
 class Endurance:
     """Request for the duration of a bottle, and its result.
 
-    ``draw`` is the gas demand, ``schedule`` the times of walking and rest, and ``discharge`` the bottle over time.
-    ``strides_when_warm`` is the number of strides from a bottle at constant room temperature, so the difference to the
-    result is the effect of cooling. ``is_of_task_sequence`` is True if a repetition is a task sequence,
-    ``is_of_recording`` if it is a whole recording. ``device_units`` are the display units of the device, by SI unit, if
-    it is known.
+    - ``bottle``: the bottle
+    - ``draw``: gas demand
+    - ``schedule``: times of walking and rest
+    - ``discharge``: state of the bottle over time, and its end
+    - ``strides_when_warm``: number of strides from a bottle at constant room temperature, to show the effect of cooling
+    - ``is_of_task_sequence``: True if a repetition is a task sequence
+    - ``is_of_recording``: True if a repetition is a whole recording
+    - ``device_units``: display units of the device by SI unit, if it is known
     """
 
     bottle: Bottle

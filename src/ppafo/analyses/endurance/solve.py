@@ -28,11 +28,11 @@ WITHOUT_REST = Schedule(LONGEST, 0.0, LONGEST)
 
 @checked
 def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -> Endurance | None:
-    """Duration of a bottle when the walk continues without rest; None where the walk took no gas.
+    """Return the duration of a bottle when the walk continues without rest, or None if the walk took no gas.
 
-    The same device, without faults, walks on the bottle until that ends it, as ``ppafo walk --bottle`` does;
-    ``bottle`` is its own, or the paper's, unless given. A stride is one of the leg with the device, or a whole
-    task sequence.
+    The same device, without faults, walks on the bottle until the bottle is exhausted, as with ``ppafo walk --bottle``.
+    The default of ``bottle`` is the bottle of the walk, or else the paper's. A stride is one of the leg with the
+    device, or a whole task sequence.
 
     >>> import ppafo
     >>> endurance = ppafo.endurance_of_walk(ppafo.walk("solenoid", minutes=0.1))

@@ -50,7 +50,7 @@ _OVER_TIME = (
 )
 _TORQUE = Kind("", "N m", "torque", ".3g")
 _FAR_ABOVE = 2.0
-"""Ratio of absolute chamber pressure to supply pressure above which it is remarked; healthy wearers stay below."""
+"""Ratio of absolute chamber pressure to supply pressure for a remark; healthy wearers stay below."""
 
 
 @in_units(lambda worn: worn.scenario.device.shown)

@@ -1,1 +1,1 @@
-"""Verbs: one typed, documented function a command, which loads what does the work when it is called."""
+"""Functions of the commands: typed and documented, importing their implementation only when called."""

@@ -1,4 +1,4 @@
-"""Bench commands: recordings of a bench, real or simulated, a parameter set from them, and its agreement with them."""
+"""Bench commands: recordings of a real or simulated bench, parameter sets from them, and their agreement with a set."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def rig_record(
 
 
 def list_rig() -> CommandOutput:
-    """Return the experiments and the presets with what they are."""
+    """Return the lists of experiments and presets with their descriptions."""
     from ppafo.cli.output import CommandOutput
     from ppafo.rig.experiments import overview
 

@@ -1,4 +1,4 @@
-"""Your device: parameter sets and parts."""
+"""Commands on the user's device: parameter sets and parts."""
 
 from __future__ import annotations
 

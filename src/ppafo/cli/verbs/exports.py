@@ -1,4 +1,4 @@
-"""A scenario or a walk for other programs: as a library in C, or as a functional mock-up unit."""
+"""Export commands for a scenario or walk: C library or functional mock-up unit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Walking with the device, and the gaits of those who walk."""
+"""Commands on walking with the device, and on gaits."""
 
 from __future__ import annotations
 

@@ -123,14 +123,14 @@ class FreeEnd(NamedTuple):
 
 
 class FreePart(NamedTuple):
-    """First stage of a part of a step, which ends at a stop at the latest.
+    """First stage of a part of a step; the part ends at a stop at the latest.
 
     Attributes:
-        way: direction of sliding, 1 or -1; 0 at rest
-        acceleration: acceleration [rad/s^2]
+        way: direction of sliding, 1 or -1; 0 at rest [-]
+        acceleration: angular acceleration [rad/s^2]
         torque: driving torque at the start [N m]
         next_angle: angle at the end without reversal [rad]
-        meets_stop: 1 if the part ends at a stop, else 0
+        meets_stop: 1 if the part ends at a stop, else 0 [-]
     """
 
     way: float

@@ -378,7 +378,7 @@ def thermal_matrix(
 
 
 def solve_thermal_stage(matrix: ThermalMatrix, right: ThermalFlows) -> ThermalFlows:
-    """Stage slopes [kg/s] from the right-hand sides [kg/s]."""
+    """Stage slopes [kg/s] of a step with an energy balance, from the right-hand sides [kg/s]."""
     # Right-hand sides of the contents after the masses are eliminated.
     right_1 = right.content_1 + matrix.slopes.kept_1 * matrix.wall_1 * right.mass_1
     right_2 = right.content_2 + matrix.slopes.kept_2 * matrix.wall_2 * right.mass_2

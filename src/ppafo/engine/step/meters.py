@@ -74,7 +74,7 @@ def gas_of(parts: Program, lane: Lane) -> GasSample:
 
 
 def energy_of(parts: Program, lane: Lane) -> EnergySample:
-    """Energies of the gas [J]; zeros for gas without an energy balance."""
+    """Energies of the gas and energy totals [J]; zeros for gas without an energy balance."""
     if not parts.is_thermal:
         return NO_ENERGY
     per_content = energy_per_content(lane.plant.gas_product, lane.thermal.heat_capacity_ratio)

@@ -1,4 +1,4 @@
-"""A scenario as a library in C99, with an example and make files."""
+"""Export of a scenario as a C99 library, with an example and make files."""
 
 from collections.abc import Iterable, Sequence
 from functools import partial
@@ -35,9 +35,9 @@ _FLAWS_OF_WALK = (
 
 
 def c_library(scenario: Scenario) -> dict[str, bytes]:
-    """Files of a library in C by name, with a run of Python to compare it with.
+    """Return the files of a C library by name, with a Python run for comparison.
 
-    ProgramError for what cannot be translated, with file and line.
+    Raises ProgramError, with file and line, for code that cannot be translated.
     """
     library = library_of(scenario)
     metrics = [kind.name for kind in library.program.metrics]
@@ -45,7 +45,7 @@ def c_library(scenario: Scenario) -> dict[str, bytes]:
 
 
 def scenario_library(scenario: Scenario) -> Library:
-    """A library whose settings are all numbers of a scenario. ProgramError for a fixed-point controller."""
+    """Return a library whose settings are all numbers of a scenario; ProgramError for a fixed-point controller."""
     if CONTROLLERS[scenario.controller.kind].plan is not None:
         raise ProgramError(
             f"{scenario.name}: a fixed-point controller has no library yet; 'ppafo export firmware' writes it"
@@ -83,7 +83,7 @@ def scenario_library(scenario: Scenario) -> Library:
 
 
 def walk_library(configuration: Scenario) -> Library:
-    """A library whose settings are all numbers of a walk; ScenarioError for one that cannot be exported."""
+    """Return a library whose settings are all numbers of a walk; ScenarioError for a walk that cannot be exported."""
     from ppafo.exports.c_library.walk_preparation import (
         WALK_PREPARATION,
         check_can_leave,
@@ -122,7 +122,7 @@ _LIBRARIES = {VANE: scenario_library, WALK: walk_library}
 
 
 def library_of(scenario: Scenario) -> Library:
-    """The library of a scenario or a walk; ProgramError where an object of Python controls it."""
+    """Return the library of a scenario or a walk; ProgramError for a controller that is a Python object."""
     if scenario.controller.is_outside:
         raise ProgramError(
             f"{scenario.name}: a Python object cannot be exported as a controller; export the plant alone, or write "
@@ -132,7 +132,7 @@ def library_of(scenario: Scenario) -> Library:
 
 
 def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> tuple[Switch, ...]:
-    """Settings that choose the program by being 0 or not: of the valve, and others."""
+    """Settings of the valve and others for which zero or nonzero selects the program."""
     settings = device.valve.settings
     of_valve = [((f"valve_{name}",), settings[name] > 0.0) for name in choosing(device)]
     of_effects: list[Switch] = [

@@ -12,7 +12,7 @@ _SIGNS = {"below": "<", "at most": "<=", "at least": ">=", "above": ">"}
 
 
 def conditions_of_program(library: Library) -> list[tuple[str, str]]:
-    """Conditions in C under which the settings ask for another program, with the setting that is named."""
+    """C conditions under which the settings need another program, each with the name of the setting to report."""
     values = {setting.name: setting.value for setting in library.settings}
     conditions = []
     for names, is_above in library.switches:
@@ -26,7 +26,7 @@ def conditions_of_program(library: Library) -> list[tuple[str, str]]:
 
 
 def conditions_of(library: Library) -> list[tuple[str, str]]:
-    """Conditions on settings as text in C, each with the setting that is named where it fails, also for NaN."""
+    """C conditions on single settings, each with the name of the setting to report on failure; NaN fails."""
     ranges = []
     for setting in library.settings:
         value, sign = f"settings->{setting.name}", ">=" if setting.quantity.minimum_allowed else ">"
@@ -45,7 +45,7 @@ RULES_OF_TIMES: tuple[Rule, ...] = (
 
 
 def relations_of_library(library: Library) -> list[tuple[str, str]]:
-    """Conditions between settings as text in C, each with the setting that is named."""
+    """C conditions between settings, each with the name of the setting to report on failure."""
     relations = []
     for relation in library.relations:
         other, sign = f"settings->{relation.other}", "-" if relation.relation == "at least" else "+"
@@ -61,13 +61,13 @@ def relations_of_library(library: Library) -> list[tuple[str, str]]:
 
 
 def limits_in_c(quantity: Quantity) -> tuple[float, float]:
-    """Lowest and highest value of a setting as literals in C can have them."""
+    """Lowest and highest value of a setting, as representable by C literals."""
     # C can write no infinity as a literal; no setting is that large.
     return max(quantity.minimum, -sys.float_info.max), min(quantity.maximum, sys.float_info.max)
 
 
 def choosing(device: Device) -> list[str]:
-    """Settings of the valve that choose its functions by being 0 or not."""
+    """Settings of the valve for which zero or nonzero selects its functions."""
     kind = VALVES[device.valve.kind]
     names = [quantity.name for quantity in kind.quantities]
     chosen = {}

@@ -1,4 +1,4 @@
-"""Entries of an exported module that prepare a run: their lines around the functions that prepare it."""
+"""Entries of an exported module that prepare a run: source lines that wrap the preparation functions."""
 
 import ast
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ def prepare_entry(
     collector: SourceCollector,
     boundary: Boundary,
 ) -> str:
-    """Entry ``prepare`` of an exported module, made of functions that prepare a run.
+    """Return the source of the entry ``prepare`` of an exported module, composed of preparation functions.
 
     Arguments:
         preparation: scenario and program
@@ -74,7 +74,7 @@ def prepare_entry(
 def follow_entry(
     settings: Sequence[ExportParameter], links: Graph, collector: SourceCollector, boundary: Boundary
 ) -> str:
-    """The composed function ``follow``: settings that still have their default follow others; see ``Graph``."""
+    """Return the source of ``follow``: settings at their default follow other settings; see ``Graph``."""
     places = {setting.path: index for index, setting in enumerate(settings)}
 
     def cell(array: str, path: str) -> str:
@@ -100,7 +100,7 @@ def follow_entry(
 
 
 def _term(term: LinkFunction, rows: list[str], collector: SourceCollector) -> str:
-    """A term of what is followed; structs that only it has are added to ``rows``."""
+    """Return the source of one term of a link; structs used only there are appended to ``rows``."""
 
     def filled(row: type, numbers: Sequence[str]) -> str:
         name = f"Followed{len(rows)}"

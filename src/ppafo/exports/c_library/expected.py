@@ -1,4 +1,4 @@
-"""Numbers of Python that an exported library is compared with when its ``make check`` runs: ``expected.csv``."""
+"""Results of Python for comparison in ``make check`` of an exported library: ``expected.csv``."""
 
 import math
 from collections.abc import Iterable
@@ -7,13 +7,13 @@ from ppafo.running import simulate
 from ppafo.simulation.scenario import Scenario
 
 MOST_ROWS = 1000
-"""Samples of a run in the table at most: of a longer one, every second, third, ... and the last."""
+"""Maximum number of samples in the table; of a longer run every second, third, ... sample and the last."""
 
 
 def expected_csv(scenario: Scenario, channels: Iterable[str], metrics: Iterable[str] = ()) -> bytes:
     """Return samples of a run as CSV in SI units with 17 digits, then its metrics as ``# name = value``.
 
-    The channels and metrics that a recording has not are left out, as are metrics of a run that failed.
+    Channels and metrics missing in the recording are left out, as are all metrics of a failed run.
     """
     result = simulate(scenario)
     recording = result.recording

@@ -1,4 +1,4 @@
-"""Exported part of a program: lane loops, metrics and outputs, with their names in C."""
+"""Exported part of a program: lane loops, metrics and outputs, with their C names."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -14,31 +14,31 @@ from ppafo.model.controlled import CONTROLLED
 from ppafo.signals.meter import WALK
 
 COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_delay", "needs_parts")
-"""Numbers of the steps of a run: steps from one sample to the next, in all, to a sample of the controller; delays.
+"""Step counts of a run: steps per sample, in total, and per controller sample; delays in steps.
 
-The last one is 1 where the error decides about the parts of a step, else 0.
+The last number is 1 for error control of the parts of a step, else 0.
 """
 Further = Callable[[SourceCollector, Boundary], str]
-"""Writes a further composed function, once it has gathered what that calls."""
+"""Function that returns the source of a further composed function, after collecting the functions it calls."""
 
 WHOLE, IN_PARTS = "advance", "advance_in_parts"
-"""Names of the lane loops in C: of whole steps or of the one there is, and of steps in parts where there are both."""
+"""C names of the lane loops: with whole steps (or the only loop), and with steps in parts if there are both."""
 TOGETHER = "_together"
-"""Stands behind the name of a lane loop of several runs at once."""
+"""Suffix to the name of a lane loop for several runs at once."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExportedProgram:
-    """A program with meters for all its metrics, and traces of all its outputs."""
+    """Program with meters for all its metrics, and traces of all its outputs."""
 
     program: Program
     metrics: tuple[MetricKind, ...]
 
     @property
     def loops(self) -> dict[str, Program]:
-        """Programs of its lane loops, by their names in C.
+        """Programs of the lane loops by C name.
 
-        There are two where the settings decide whether the error decides about the parts of a step.
+        There are two loops if the settings decide on error control of the parts of a step.
         """
         if not self.program.chooses_parts:
             return {WHOLE: self.program}
@@ -46,12 +46,12 @@ class ExportedProgram:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Channels that it gives at each sample, in order."""
+        """Output channels at each sample, in order."""
         return self.program.traced
 
 
 def exported(program: Program) -> ExportedProgram:
-    """The program as it is exported; a metric that needs all samples of a channel is left out."""
+    """Return the program as exported; metrics that need all samples of a channel are left out."""
     missing = missing_channels(program) | {
         kind.reference for name, kind in CONTROLLED.items() if name != program.wanted
     }
@@ -65,6 +65,6 @@ def exported(program: Program) -> ExportedProgram:
 
 
 def places_of(groups: Mapping[str, type]) -> dict[str, str]:
-    """Names in C of the places of all numbers of some groups of rows, by path."""
+    """Return the C names of the array indices of all numbers in groups of rows, by path."""
     paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
     return {path: f"AT_{re.sub(r'[^A-Za-z0-9]+', '_', path).strip('_').upper()}" for path in paths}

@@ -15,7 +15,7 @@ from ppafo.signals import CHANNELS
 from ppafo.version import __version__
 
 _FOLDER = "ppafo.exports.c_library"
-"""The package whose templates these are."""
+"""Package that contains the templates."""
 
 OUTPUTS = {name: (channel.unit, channel.summary) for name, channel in CHANNELS.items()} | {
     "strides": ("-", "heel strikes so far"),
@@ -25,10 +25,10 @@ OUTPUTS = {name: (channel.unit, channel.summary) for name, channel in CHANNELS.i
 }
 """Unit and meaning of the outputs at each sample: channels of a recording, and totals of a walk."""
 SAME_METRIC = 1.0e-12
-"""Difference of a metric in C from Python's, as a share of it: sums are rounded in another order."""
+"""Accepted relative difference between a metric in C and in Python; sums are rounded in another order."""
 UNITS = {"1": "-", "Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
 _FILES = {"Makefile": "Makefile", "CMakeLists.txt": "CMakeLists.txt", "check.c": "check.c"}
-"""Templates of files that every library has, and what they are called in it."""
+"""Templates of the files in every library, with their names in the library."""
 _IS_WHOLE = """
 /* True for a number that is a whole one but for rounding. */
 static bool is_whole(double count)
@@ -60,7 +60,7 @@ def library_files(library: Library) -> dict[str, bytes]:
 
 
 def run_words(library: Library) -> dict[str, str]:
-    """Marks of every template in which a run of a library is made of its settings."""
+    """Template variables for the arrays of a run, common to all templates that build a run from settings."""
     program = library.program
     return {
         "never": repr(NEVER_FAILED),
@@ -73,7 +73,7 @@ def run_words(library: Library) -> dict[str, str]:
 
 
 def _words(library: Library, name: str) -> dict[str, str]:
-    """Marks of the templates of a library, and the text in the place of each; words of its own go before these."""
+    """Template variables of an exported library; its own entries override the defaults."""
     settings, program, api = library.settings, library.program, library.api
     outputs = ("time", *program.outputs)
     # The last argument of the loop of a run in C, where it has both kinds of steps.
@@ -130,12 +130,12 @@ def _words(library: Library, name: str) -> dict[str, str]:
 
 
 def _returning(conditions: Iterable[tuple[str, str]]) -> str:
-    """Lines in C that return a name under its condition."""
+    """C lines that return a name if its condition is true."""
     return "\n".join(f'    if ({condition}) {{\n        return "{name}";\n    }}' for condition, name in conditions)
 
 
 def _members(items: Iterable[tuple[str, str, str]]) -> str:
-    """Members of a struct, each with its unit and meaning."""
+    """C declarations of struct members, each with unit and meaning as a comment."""
     lines = []
     for name, unit, said in items:
         comment = in_comment(f"{UNITS.get(unit, unit) or '-'}: {said}")
@@ -144,7 +144,7 @@ def _members(items: Iterable[tuple[str, str, str]]) -> str:
 
 
 def _said(quantity: Quantity) -> str:
-    """Meaning and range of a parameter."""
+    """Meaning and range of a parameter as text."""
     low, high = (limit if abs(limit) < math.inf else None for limit in (quantity.minimum, quantity.maximum))
     beyond = "from" if quantity.minimum_allowed else "above"
     above = "" if low is None else f"{beyond} {low:g}"

@@ -1,4 +1,4 @@
-"""Record of an exported library: settings and how they relate, program, names in C."""
+"""Data of an exported library: settings with their relations, program, and names in C."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -13,18 +13,18 @@ _OWN_TARGETS = {"all", "check", "clean", "test"}
 _OF_BOARDS = {"board", "board_simulated", "start_cortex"}
 _OF_CMAKE = {"help", "install", "package", "m"}
 _WITH_ANOTHER_END = {"prepare", "prepared", "is", "begin", "ppafo_whole", "at_result", "at_step_aside_result"}
-"""Names that become another function or type with ``_run``, ``_size`` or ``_TOO_MANY_PARTS`` behind them."""
+"""Names that would collide with another function or type after adding ``_run``, ``_size`` or ``_TOO_MANY_PARTS``."""
 _OF_WINDOWS = {"con", "aux", "nul", "prn"}
 _HEADERS_1 = {"assert", "complex", "ctype", "errno", "fenv", "float", "inttypes", "iso646", "limits", "locale", "math"}
 _HEADERS_2 = {"setjmp", "signal", "stdarg", "stdbool", "stddef", "stdint", "stdio", "stdlib", "string", "tgmath"}
 _OF_C = _HEADERS_1 | _HEADERS_2 | {"time", "wchar", "wctype"}
 _TAKEN = _OWN_FILES | _OWN_TARGETS | _OF_BOARDS | _OF_CMAKE | _OF_WINDOWS | _OF_C | _WITH_ANOTHER_END
-"""Names that a library cannot have: of its other files and types, of targets in make files, of headers of C."""
+"""Reserved names of a library: its other files and types, targets in make files, and C headers."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExportParameter:
-    """Something that can be chosen before a run: its name in C and in ppafo, what it is, and what the scenario has."""
+    """Setting of an exported library: name in C, path in ppafo, declaration, and value in the scenario."""
 
     name: str
     path: str
@@ -34,9 +34,9 @@ class ExportParameter:
 
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """A setting that must be ``below``, ``at most``, ``at least`` or ``above`` another, but for a ``tolerance``.
+    """Required relation between two settings: ``below``, ``at most``, ``at least`` or ``above``, with ``tolerance``.
 
-    The tolerance is in the unit of both, or a share of the other where it ``is_share``.
+    The tolerance is in the unit of both settings, or a fraction of the other if ``is_share``.
     """
 
     name: str
@@ -47,18 +47,18 @@ class Relation:
 
 
 Rule = tuple[str, str, tuple[str, ...]]
-"""A rule of settings: the setting that is named, the condition as text in C, the settings that it holds in order."""
+"""Rule of settings: setting to report, condition as C text, and settings on which the condition depends, in order."""
 
 
 Switch = tuple[Sequence[str], bool]
-"""Settings of which any is above 0, where True, or none: the other case is another program."""
+"""Settings, and True if any is above 0, False if none is; the opposite case needs another program."""
 
 
 @dataclass(frozen=True, slots=True)
 class LibraryApi:
     """API variant of an exported library: header, example, README and source templates; ``words`` fill them.
 
-    The settings ``as_step`` are ``step`` whatever they are.
+    Each setting in ``as_step`` always equals the setting ``step``.
     """
 
     header: str
@@ -71,18 +71,19 @@ class LibraryApi:
 
 
 LOOP = LibraryApi("interface.h", "main.c", "README.md", "loop.c")
-"""The closed loop, which goes from sample to sample."""
+"""API of the closed loop, which advances from sample to sample."""
 
 
 @dataclass(frozen=True, slots=True)
 class Library:
-    """Library to be written: program, parameters, outputs, metrics and texts.
+    """Library to be written: program, settings, outputs, metrics and texts.
 
-    ``further`` adds the function that makes the numbers of a run from the settings. ``switches`` choose the program,
-    ``other_program`` has further conditions in C under which another would be needed, with the setting that is named;
-    ``rules`` are between its times, as in a file. ``following`` adds the function that lets settings follow others,
-    None where none does, and ``defaults`` names the settings whose default does so, which has no range; ``links`` say
-    what follows what. ``words`` fill the page. ``api`` is how it is called.
+    ``further`` adds the function that computes the numbers of a run from the settings. ``switches`` are settings that
+    select the program. ``other_program`` has further C conditions under which another program would be needed, each
+    with the setting to report. ``rules`` are conditions between times, as in a file. ``following`` adds the function by
+    which settings follow others; None if none does. ``defaults`` names the settings whose default follows others; these
+    have no range. ``links`` maps followers to their sources. ``words`` are template variables of the README. ``api`` is
+    the interface of the library.
     """
 
     title: str
@@ -109,7 +110,7 @@ class Library:
 
 
 def c_identifier(name: str) -> str:
-    """Return a name as C can have it."""
+    """Return a name converted to a C identifier."""
     # A name in C begins with a letter here: those that begin with an underscore belong to compilers.
     identifier = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_").lower()
     return identifier if identifier[:1].isalpha() else f"run_{identifier}"

@@ -1,4 +1,4 @@
-"""The plant of a scenario or a walk alone: its inputs come from outside at each step."""
+"""Export of the plant of a scenario or walk without its controller: inputs come from outside at each step."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ from ppafo.walking.preparation import FaultSettings
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """Input of a plant at each step: name, unit, meaning, initial value and limits, None for none."""
+    """Input of a plant at each step: name, unit, meaning, initial value, minimum and maximum (None for no limit)."""
 
     name: str
     unit: str
@@ -42,15 +42,16 @@ SAFE_STATE = Input("safe_state", "-", _STOPS, 0.0, 0.0, 3.0)
 
 
 Assignment = tuple[str, str]
-"""Field in C and the expression that it becomes: ``{angle}`` is the input of that name, ``{settings}`` the pointer."""
+"""C field and the expression assigned to it: ``{angle}`` is the input of this name, ``{settings}`` the pointer."""
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
     """External drive of a plant: its command, its other inputs, and the motion of its joint within a step.
 
-    ``motion`` says the latter in words. ``settings`` of a run become what the first inputs are, ``parameters`` of the
-    engine what they are in each step, from ``time`` on for a ``length`` of it [s].
+    ``motion`` describes the motion in words. ``settings`` assigns the first inputs to settings of the run.
+    ``parameters`` assigns the inputs to engine parameters at each step, which starts at ``time`` [s] and takes
+    ``length`` [s].
     """
 
     motion: str
@@ -62,11 +63,10 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class PlantAlone:
-    """A plant that is driven from outside: its library, its drive, and the step [s] of the inputs.
+    """Plant driven from outside: its library, its drive, and the input interval ``step`` [s].
 
-    ``clock`` is the path of the setting that is this step: the engine step, or where the plant has parts that go by
-    the samples of a controller, the time between these. ``hidden`` are the paths of the settings without effect,
-    because inputs replace them.
+    ``clock`` is the path of the setting for this interval: the engine step, or the controller period if parts of the
+    plant act at controller samples. ``hidden`` are the paths of settings without effect, since inputs replace them.
     """
 
     library: Library
@@ -77,23 +77,23 @@ class PlantAlone:
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """Inputs at each step, the command first."""
+        """Inputs at each step, starting with the command."""
         return (self.drive.command, *self.drive.inputs)
 
 
 STEPS, SAMPLES = "run.step", "controller.period"
-"""Settings that may be the step of the inputs."""
+"""Settings that may be the interval of the inputs."""
 _WITHOUT_EFFECT = ("run.duration", "run.output_interval", "controller.command", "controller.safe_state")
-"""Times of a run mean nothing to a plant that is stepped from outside."""
+"""Settings without effect on a plant that is stepped from outside."""
 _REPLACED = ("sensors.", "motion.external_torque", "motion.ankle_torque")
 _PATH = "motion.profile."
-"""Beginnings of the paths of what inputs replace: of any plant, and of one whose ankle they lead."""
+"""Prefixes of the paths replaced by inputs: in any plant, and in a plant with an ankle driven by inputs."""
 
 
 def plant_of(scenario: Scenario) -> PlantAlone:
-    """Return the plant; a free joint takes a torque, a locked one angle and rate, by which it is led.
+    """Return the plant of a scenario; inputs are a torque for a free joint, angle and rate for a locked joint.
 
-    A joint on a path of the scenario's own takes the command alone, and so does the device on a leg that walks.
+    A joint on a path defined by the scenario and a device on a walking leg take only the command.
     """
     plant = _commanded(scenario.motion, scenario)
     # An ankle that is locked is on a ramp that inputs can turn: one that is level.
@@ -125,7 +125,7 @@ def plant_of(scenario: Scenario) -> PlantAlone:
 
 @singledispatch
 def _drive_of(motion: Motion, _settings: Mapping[str, ExportParameter]) -> Drive:
-    """External drive of a plant with this motion, within the ranges of its settings by path: here a walk."""
+    """Return the external drive of a plant with this motion, within the ranges of its settings: here a walk."""
     walks = Drive(motion="The leg walks on by its gait.", command=WALKING_COMMAND)
     if not (isinstance(motion, WalkMotion) and motion.shut_off):
         return walks
@@ -134,12 +134,12 @@ def _drive_of(motion: Motion, _settings: Mapping[str, ExportParameter]) -> Drive
 
 
 _FIRST_RAMP = 0.0078125
-"""Length [s] of the ramp that an angle begins with. Short: a fast ankle stays in the range of a level."""
+"""Duration [s] of the initial ramp of an angle; short, so that a fast ankle stays in the range of a level."""
 
 
 @_drive_of.register
 def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParameter]) -> Drive:
-    """Return the drive of a joint: one that is locked is led by angle and rate, one on a path goes along that."""
+    """Return the drive of a prescribed joint: inputs angle and rate if locked, no input if on a path."""
     if motion.locked_angle is None:
         return Drive(motion="The ankle goes along the path that the scenario has.")
     stop_1, stop_2 = settings["actuator.angle_min"].value, settings["actuator.angle_max"].value
@@ -173,7 +173,7 @@ def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParamete
 
 @_drive_of.register
 def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -> Drive:
-    """Return the drive of a free joint: T_ex on a vane alone, or T_2 on the ankle of a leg, which T_ex opposes."""
+    """Return the drive of a free joint: T_ex on a vane without leg, or T_2, opposed to T_ex, on the ankle of a leg."""
     name, summary, load = "external_torque", "T_ex, above 0 against plantarflexion", ""
     start = motion.external_torque
     if motion.leg is not None:
@@ -190,17 +190,17 @@ def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -
 
 
 def plant_library(scenario: Scenario) -> dict[str, bytes]:
-    """Return the files of the plant in C by name: ``NAME_step(run, command, ...)`` goes on by one step."""
+    """Return the C files of the plant by name; ``NAME_step(run, command, ...)`` advances by one step."""
     library = with_api(plant_of(scenario)).library
     return {**library_files(library), "expected.csv": expected_csv(half_open(scenario), library.program.outputs)}
 
 
 EXAMPLE = 0.5
-"""Command of the example, which does something."""
+"""Command [-] of the example, nonzero to have an effect."""
 
 
 def half_open(scenario: Scenario) -> Scenario:
-    """Return the run of the example by Python: the plant for a tenth of a second or longer under a constant command."""
+    """Return the example as a scenario for Python: the plant under a constant command for 0.1 s or longer."""
     plant = _commanded(scenario.motion, scenario)
     command = replace(plant.controller, settings={**plant.controller.settings, "command": EXAMPLE})
     duration = max(0.1, declared_numbers(plant)["run.duration"].minimum)
@@ -208,7 +208,7 @@ def half_open(scenario: Scenario) -> Scenario:
 
 
 def with_api(alone: PlantAlone) -> PlantAlone:
-    """Return a plant whose library is called with its inputs."""
+    """Return the plant with a library API that takes its inputs at each step."""
     names = [variable.name for variable in alone.inputs]
     by_name = {name: name for name in names}
     # An example whose command does something.
@@ -250,12 +250,12 @@ def with_api(alone: PlantAlone) -> PlantAlone:
 
 
 def _as_clock(alone: PlantAlone) -> tuple[str, ...]:
-    """Names of the other times that are this step: commands come once in each, and nothing lies between."""
+    """Names of the other time settings that must equal the input interval: controller period and output interval."""
     return tuple(c_identifier(path) for path in (SAMPLES, "run.output_interval") if path != alone.clock)
 
 
 def follow_lines(alone: PlantAlone, settings: str, inputs: Mapping[str, str]) -> str:
-    """Return lines of C that give ``settings``, a pointer, what ``inputs`` decide, by name as they are called in C."""
+    """Return C lines that assign the ``inputs``, C expressions by name, to the struct at pointer ``settings``."""
     return "\n".join(
         f"    {settings}->{field} = {expression.format(settings=settings, **inputs)};"
         for field, expression in (
@@ -267,7 +267,7 @@ def follow_lines(alone: PlantAlone, settings: str, inputs: Mapping[str, str]) ->
 
 @singledispatch
 def _commanded(_motion: Motion, scenario: Scenario) -> Scenario:
-    """Return the scenario under a command at every step of its engine."""
+    """Return the scenario with an external command at every engine step."""
     # The engine's own step: commands come once in each, and nothing lies between.
     step = step_counts(
         scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period

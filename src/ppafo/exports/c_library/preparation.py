@@ -1,8 +1,8 @@
-"""Preparation of a run from its settings: plain functions in the form of those of the step.
+"""Preparation of a run from its settings: plain functions in the same form as the functions of a step.
 
-``parts`` is what the settings do not decide (``Preparation``), ``settings`` has a number for each of them, in SI units,
-and ``lane`` takes the groups of the run. Python runs these functions as they stand; a library has them in C, one after
-another in one function (``engine.generator``), where what asks ``parts`` alone is decided.
+All functions take ``parts``, the data independent of the settings (``Preparation``), ``lane``, the groups of the run to
+be filled, and ``settings``, one number each in SI units. Python runs these functions directly. A library contains them
+in C, concatenated into one function (``engine.generator``), with all conditions on ``parts`` evaluated beforehand.
 """
 
 from collections import namedtuple
@@ -39,13 +39,13 @@ from ppafo.simulation.plan import StepCounts, relative_tolerance, state_with_vol
 from ppafo.simulation.scenario import Leg, Scenario, vane_motion
 
 OF_VANE = ("torque_constant", "displacement_per_radian")
-"""Numbers of the vane, without meaning for an actuator of another shape."""
+"""Parameters of the vane without meaning for an actuator of another shape."""
 OF_FOOT = ("foot_mass", "foot_mass_centre", "foot_inertia", "shank_length")
 """Settings of a foot on a prescribed shank, in the order of ``foot_load``."""
 
 
 class PreparedLane(Lane):
-    """Numbers of one run by group, and numbers that only its preparation needs."""
+    """Numbers of one run by group, and intermediate numbers of its preparation."""
 
     counts_of_steps: StepCounts
     tolerance: float  # error that a step may have, over the default [-]
@@ -60,7 +60,7 @@ class PreparedLane(Lane):
 
 @dataclass(frozen=True, slots=True)
 class Preparation:
-    """Scenario and program of a library, with all that its settings do not decide."""
+    """Scenario and program of a library: all data that does not depend on the settings."""
 
     scenario: Scenario
     program: Program
@@ -72,38 +72,38 @@ class Preparation:
 
     @property
     def leg(self) -> Leg | None:
-        """Leg on a prescribed shank that the vane carries; None in a walk too."""
+        """Leg on a prescribed shank, attached to the vane; None for other motions and in a walk."""
         return None if self.program.walks else vane_motion(self.scenario).leg
 
     @property
     def shank_numbers(self) -> dict[str, float]:
-        """Numbers of a shank that a gait leads, by path."""
+        """Numbers of a shank prescribed by a gait, by path."""
         assert self.leg is not None, "a shank is of a leg"
         return dict(zip(leaf_paths(ShankSeries, "shank"), numbers(self.leg.curves), strict=True))
 
     @property
     def bare(self) -> str:
-        """Name of the plant before a walking leg is put on."""
+        """Variable name of the plant before a walking leg is added."""
         return "bare" if self.program.walks else "plant"
 
     @property
     def vane(self) -> str:
-        """Name of the plant before its actuator has its shape."""
+        """Variable name of the plant before the shape of its actuator is set."""
         return self.bare if self.program.actuator.shape is None else f"vane_{self.bare}"
 
     @property
     def unread(self) -> tuple[str, ...]:
-        """Numbers of the vane that the device is made with and an actuator of another shape has not."""
+        """Vane parameters without meaning for an actuator of another shape; empty for a vane."""
         return () if self.program.actuator.shape is None else OF_VANE
 
     @property
     def level(self) -> str:
-        """Name of the setting of the angle at which a joint stays."""
+        """Name of the setting for the angle of a locked joint."""
         return c_identifier(path_of_locked_angle(self.scenario) or LOCKED_ANGLE)
 
     @property
     def line_settings(self) -> list[str]:
-        """Names of droop, largest flow and volume, supply line by supply line; and what is no setting."""
+        """Names of droop, largest flow and volume of each supply line, then ``relieving``, which is no setting."""
         of_line = ("droop", "largest_flow", "volume")
         found = [c_identifier(f"{SUPPLY_LINE}.{line}.{name}") for line in SUPPLY_LINES for name in of_line]
         return [*found, "relieving"]
@@ -115,32 +115,32 @@ class Preparation:
 
     @property
     def tables(self) -> list[Any]:
-        """Table of the actuator that the set names a file for, where there is one."""
+        """Table of a measured actuator as a list; empty for other actuators."""
         return [] if self.device.actuator.table is None else [self.device.actuator.table]
 
     def names(self, section: str, own: Iterable[str] | None = None) -> list[str]:
-        """Names in C of settings of a section: of ``own``, else of all that effects see of a device."""
+        """Return the C names of settings of a section: the names in ``own``, else all numbers visible to effects."""
         found = named(members(section, self.device.actuator.kind)) if own is None else own
         return [c_identifier(f"{section}.{name}") for name in found]
 
     def row(self, name: str, fields: Iterable[str]) -> Any:
-        """NamedTuple class of settings, by the names of its fields."""
+        """Return a NamedTuple class of settings with the given field names."""
         make: Any = namedtuple
         made = make(name, list(fields), module=__name__)
         made.__doc__ = ""  # not the list of its fields, which stands in the library below it
         return made
 
     def section(self, name: str, *further: str) -> Any:
-        """NamedTuple class of what effects see of a section of the device, with ``further`` fields."""
+        """Return a NamedTuple class of a device section as visible to effects, with ``further`` fields."""
         fields = named(members(name, self.device.actuator.kind))
         return self.row(name.title().replace("_", ""), [*fields, *further])
 
     def effect_settings(self, effect: Effect) -> Any:
-        """NamedTuple class of the settings of an effect."""
+        """Return a NamedTuple class of the settings of an effect."""
         return self.row(f"{effect.name.title().replace('_', '')}Settings", named(effect.quantities))
 
     def orifice(self, section: str) -> Any:
-        """NamedTuple class of an orifice in the form that it has."""
+        """Return a NamedTuple class of an orifice in its given form."""
         if self.is_sonic(section):
             return self.row("SonicOrifice", ("sonic_conductance", "critical_ratio"))
         return self.row("Orifice", ("area", "discharge_coefficient"))
@@ -150,17 +150,17 @@ class Preparation:
         return isinstance(self.device.valve.orifice if section == "valve" else self.device.actuator.leak, SonicOrifice)
 
     def constant(self, row: Any) -> Any:
-        """NamedTuple of numbers that no setting changes, all of them floats."""
+        """Return a NamedTuple of numbers that no setting changes, all as floats."""
         return rebuilt(type(row), numbers(row))
 
 
 def named(quantities: Iterable[Quantity]) -> list[str]:
-    """Names of declared numbers."""
+    """Return the names of declared numbers."""
     return [quantity.name for quantity in quantities]
 
 
 def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set the plant without a walking leg, and the parameters of effects."""
+    """Set the plant parameters without a walking leg, and the parameters of effects."""
     lane.gas = parts.section("gas", "specific_gas_constant")(
         *(getattr(settings, name) for name in parts.names("gas")),
         specific_gas_constant(UNIVERSAL_GAS_CONSTANT, settings.gas_molar_mass),
@@ -227,7 +227,7 @@ def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 
 def put_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Put a foot on a prescribed shank on the plant; of a gait only where it begins is a setting."""
+    """Add a foot on a prescribed shank to the plant; of a gait only the start is a setting."""
     if parts.leg is not None:
         lane.load = foot_load(
             lane.plant.inertia,
@@ -263,7 +263,7 @@ def count_steps(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 
 def set_timing(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set the valve, delays in steps, and the grid in time."""
+    """Set valve parameters, delays in steps, and the time grid."""
     lane["valve_settings"] = parts.row("ValveSettings", parts.valve_settings)(
         *(getattr(settings, name) for name in parts.names("valve", parts.valve_settings))
     )
@@ -285,7 +285,7 @@ def set_timing(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 
 def choose_parts(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Decide for a locked joint with rigid chambers whether the error decides about the parts of a step."""
+    """Decide, for a locked joint with rigid chambers, if error control divides the steps into parts."""
     if not parts.program.chooses_parts:
         lane.needs_parts = True
     else:
@@ -336,7 +336,7 @@ def set_laws(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 
 def set_gas(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set noise of the sensors, uptake of heat by the gas, and supply lines."""
+    """Set sensor noise, heat transfer to the gas, and supply lines."""
     flaws = parts.names("sensors", SensorParameters._fields)
     lane.sensors = rebuilt(SensorParameters, (getattr(settings, name) for name in flaws))
     if parts.program.is_thermal:
@@ -355,7 +355,7 @@ def set_gas(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 
 def fill_chambers(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set angle, rate and gas at the start."""
+    """Set the initial angle, angular velocity and gas."""
     path = parts.program.angle
     if path is not None:
         angle, angular_velocity, _ = path.value(lane.path, 0.0)
@@ -377,7 +377,7 @@ def fill_chambers(parts: Preparation, lane: PreparedLane, settings: Any) -> None
 
 
 def start(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set all other states at the start."""
+    """Set all other initial states."""
     program = parts.program
     lane.result = LaneResult(0.0, NEVER_FAILED, 0.0)
     lane.pace = StepControl(lane.step)
@@ -400,7 +400,7 @@ def start(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 
 def counted(parts: Preparation, lane: PreparedLane, settings: Any) -> tuple[float, ...]:
-    """Numbers of the steps of the run, in the order of ``COUNTS``."""
+    """Return the step counts of the run, in the order of ``COUNTS``."""
     return (
         lane.counts_of_steps.record_every,
         lane.counts_of_steps.step_count,
@@ -415,4 +415,4 @@ VANE_PREPARATION = (
     *(set_plant, put_leg_on, count_steps, set_timing, choose_parts),
     *(set_laws, set_gas, fill_chambers, start, counted),
 )
-"""Functions that prepare the run of a scenario, in this order; the last one gives the numbers of its steps."""
+"""Functions that prepare the run of a scenario, in order of calling; the last one returns the step counts."""

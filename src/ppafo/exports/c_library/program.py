@@ -1,7 +1,7 @@
-"""The composed module of an exported scenario: its loop for one run, its metrics, and its preparation from settings.
+"""Composed module of an exported scenario: loop of a single run, metrics, and preparation from settings.
 
-Preparation and metrics take settings by their names as text, and numbers that may be columns of
-``model.columns``. For one run a name is a field, no number is a column, and a function over runs is called as it is.
+Preparation and metrics read settings by name, and numbers that may be columns of ``model.columns``. For a single run a
+name becomes a field, every number is a scalar, and a function over runs is called directly.
 """
 
 import ast
@@ -29,25 +29,25 @@ from ppafo.translation.value_types import FLOAT, INT, Array, Row, RowReference, 
 
 
 def for_one_run(function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:
-    """The definition of a function for one run."""
+    """Return the definition of a function specialised for a single run."""
     tree = _ForOneRun(function.__globals__).visit(tree)
     return ast.fix_missing_locations(tree)
 
 
 class _ForOneRun(ast.NodeTransformer):
-    """Rewrites one definition; ``scope`` has the names that it sees."""
+    """Rewriter of one definition for a single run; ``scope`` contains the visible names."""
 
     def __init__(self, scope: dict[str, Any]) -> None:
         self.scope = scope
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
-        """``settings["delay"]`` is a field."""
+        """Replace ``settings["delay"]`` by a field access."""
         self.generic_visit(node)
         name = self.value_of(node.slice)
         return ast.copy_location(ast.Attribute(node.value, name, node.ctx), node) if isinstance(name, str) else node
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
-        """A function over runs is called for this one."""
+        """Replace a call over runs by a direct call."""
         self.generic_visit(node)
         # For one run no number is a column, so the function itself is what is meant.
         if self.value_of(node.func) is not over_runs:
@@ -64,7 +64,7 @@ class _ForOneRun(ast.NodeTransformer):
 
 
 def _collector() -> SourceCollector:
-    """A collector that also takes functions which Python applies to columns: they are called for one run."""
+    """Return a collector that also accepts functions applied to columns in Python, specialised for one run."""
     return SourceCollector(INLINE, for_one_run, links=dict(FOR_ONE_RUN))
 
 
@@ -72,7 +72,7 @@ LOOP_TYPES: tuple[Type, ...] = (
     *map(Array, LOOP_ARRAYS.values()),
     *(FLOAT if kind == "float64" else INT for kind in LOOP_NUMBERS.values()),
 )
-"""Types of the arguments of a run's loop beside its states and parameters."""
+"""Types of the arguments of a run's loop, except states and parameters."""
 _STEPS = {WHOLE: "AT_STEP", IN_PARTS: "AT_PARTED"}
 _ENDINGS = {WHOLE: "", IN_PARTS: "_in_parts"}
 
@@ -85,10 +85,10 @@ def c_text_of_run(
     further: Sequence[Further],
     around: str,
 ) -> str:
-    """All functions of an exported program in C for people: of a single run, without lanes, between structs.
+    """Return all functions of an exported program as readable C: for a single run, without lanes, with structs.
 
-    ``name`` begins the names of the structs of settings and metrics, which the file ``around`` it declares; ``further``
-    may add functions that take ``settings``.
+    ``name`` is the prefix of the structs of settings and metrics, which the enclosing file declares. ``further`` may
+    add functions that take ``settings``.
     """
     from ppafo.translation.c99 import ReadableUnit, c_source, documents_of, is_free
     from ppafo.translation.walk import walk_module
@@ -147,7 +147,7 @@ _DOCUMENTS = {
 
 @cache
 def _names_around() -> frozenset[str]:
-    """Names of functions in the files around a library, of which some take its source in, and of its own entries."""
+    """Names of functions in the files of a library, some of which include its source, and of its own entries."""
     folders = [folder.joinpath("templates") for folder in files("ppafo.exports").iterdir()]
     texts = [
         [file.read_text(encoding="utf-8") for file in folder.iterdir() if file.name.endswith(".c")]
@@ -170,9 +170,9 @@ _FUNCTION = re.compile(r"^(?:static )?[\w ]+\b\*?(\w+)\(", re.MULTILINE)
 def c_text(
     exported: ExportedProgram, title: str, settings: Sequence[str], further: Further | None, together: int
 ) -> str:
-    """All functions of an exported program in C; ``further`` may add one that takes ``settings``, which are named.
+    """Return all functions of an exported program in C; ``further`` may add one that takes the named ``settings``.
 
-    Each lane loop stands there for one run and, with ``TOGETHER`` after its name, for so many runs at once.
+    Each lane loop is written twice: for one run, and with the suffix ``TOGETHER`` for ``together`` runs at once.
     """
     from ppafo.translation.c99 import c_source, documents_of
     from ppafo.translation.walk import walk_module
@@ -212,7 +212,7 @@ def c_text(
 
 
 def outline_of(exported: ExportedProgram, settings: Sequence[str], further: Further | None, together: int) -> str:
-    """All that ``c_text`` makes the same functions from but its title: the same outline, the same code."""
+    """Return the complete input of ``c_text`` except the title: equal outlines give equal code."""
     composed = _composed_text(exported, _collector(), further, together)
     places = [places_of(exported.program.state_rows()), places_of(exported.program.parameter_rows())]
     names = [*places, [kind.name for kind in exported.metrics], list(settings)]
@@ -232,7 +232,7 @@ def _composed_text(
 
 
 def _stepping(program: Program, prefix: str) -> list[str]:
-    """Names of the places of what a step hands on, and of what lies aside while lanes wait."""
+    """Names of the indices of values passed from step to step, and of values saved while lanes wait."""
     handed = [name.removeprefix("AT_") for name in places_of(program.step_rows()).values()]
     states = [name.removeprefix("AT_") for name in places_of(program.state_rows()).values()]
     kept = [
@@ -243,7 +243,7 @@ def _stepping(program: Program, prefix: str) -> list[str]:
 
 
 def _steps_of(exported: ExportedProgram, collector: SourceCollector) -> dict[str, StepText]:
-    """The steps of its lane loops, by their names in C; functions that both have alike are there once."""
+    """Return the steps of the lane loops by C name; functions common to both are written once."""
     return {name: StepText(program, collector, _ENDINGS[name]) for name, program in exported.loops.items()}
 
 
@@ -261,7 +261,7 @@ def _read_expression(read: Callable[[Readings], Any], add: Callable[[Any], str])
 
 
 def metrics_entry(exported: ExportedProgram, collector: SourceCollector, boundary: Boundary) -> str:
-    """The metrics of a run, from its last states."""
+    """Return the source of the entry ``metrics``: metrics of a run from its final states."""
     program, groups, add = exported.program, exported.program.state_rows(), collector.add
     names = [kind.name for kind in program.meters]
     meters = ", ".join(

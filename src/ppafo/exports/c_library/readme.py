@@ -1,4 +1,4 @@
-"""Paragraphs of an exported library's README about one scenario or walk."""
+"""README paragraphs of an exported library on its scenario or walk."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -33,7 +33,7 @@ _TRAPS_OF_WALK = """\
 
 
 def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
-    """Texts about this scenario on the page of the library; ``links`` has the parameters that follow others."""
+    """Return README texts on this scenario; ``links`` has the parameters that follow others."""
     fixed = [
         f"the valve, `{scenario.device.valve.kind}`, and the controller, `{scenario.controller.kind}`",
         f"the reference, `{scenario.reference.kind}`, and the motion, {vane_motion(scenario).form}",
@@ -51,7 +51,7 @@ def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
 
 
 def words_of_walk(walk: Scenario, links: Graph, failing: "Mapping[str, FaultSettings]") -> dict[str, str]:
-    """Texts about this walk on the library's page, with linked parameters (``links``) and ``failing`` sensors."""
+    """Return README texts on this walk; ``links`` has parameters that follow others, ``failing`` faulty sensors."""
     from ppafo.walking.motion import walk_of
     from ppafo.walking.planning import has_ideal_sensors
 
@@ -78,7 +78,7 @@ def words_of_walk(walk: Scenario, links: Graph, failing: "Mapping[str, FaultSett
 
 
 def _followers(links: Graph) -> str:
-    """The line on what follows what."""
+    """Return the README line on parameters that follow others."""
     said = []
     for path, follows in links.items():
         sources = dict.fromkeys(f"`{c_identifier(source)}`" for link in follows for source in link.sources)
@@ -87,7 +87,7 @@ def _followers(links: Graph) -> str:
 
 
 def _fixed_of_device(scenario: Scenario) -> list[str]:
-    """Lines on what no setting of a device changes."""
+    """Return README lines on device properties that no setting changes."""
     device = scenario.device
     forms = {"valve": device.valve.orifice, "leak": device.actuator.leak}
     lines = "with lines behind the regulators" if scenario.supply_lines is not None else "constant supply pressures"
@@ -107,7 +107,7 @@ def _fixed_of_device(scenario: Scenario) -> list[str]:
 
 
 def _at_zero(device: Device, flaws: Sequence[float]) -> str:
-    """Parameters that select functions and are 0."""
+    """Return the README text on parameters that select functions and are 0."""
     zero = [f"`valve_{name}`" for name in choosing(device) if not device.valve.settings[name] > 0.0]
     flawless = [] if any(flaws) else ["what makes a sensor of `sensors_` less than ideal"]
     here = ", ".join([*zero, *flawless]) or "none"

@@ -1,4 +1,4 @@
-"""Settings of an exported scenario: every number by its path, in SI units, and those that contradict each other."""
+"""Settings of an exported scenario: every number by path, in SI units, and required relations between them."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -21,11 +21,11 @@ SAID = {
     "run.output_interval": "time from one sample to the next",
     "controller.period": "time between two decisions of the controller",
 }
-"""Meanings of some settings outside a file."""
+"""Descriptions of settings that differ from those in a file."""
 
 
 def settings_of(scenario: Scenario) -> tuple[ExportParameter, ...]:
-    """Every number of a scenario in SI units, under the path that overrides know it by."""
+    """Return every number of a scenario in SI units, by the path used in overrides."""
     # The file's step, from which the engine makes one that divides a sample.
     texts = time_texts(scenario)
     duration, period = scenario.run.duration, scenario.controller.period
@@ -48,7 +48,7 @@ def settings_of(scenario: Scenario) -> tuple[ExportParameter, ...]:
 def export_parameters(
     scenario: Scenario, declared: Mapping[str, Quantity], times: Mapping[str, float]
 ) -> tuple[ExportParameter, ...]:
-    """Declared numbers of a scenario by path with their values in SI: the ``times`` [s], else those of the scenario."""
+    """Return declared numbers by path with their SI values: from ``times`` [s], else from the scenario."""
     return tuple(
         ExportParameter(
             c_identifier(path),
@@ -61,7 +61,7 @@ def export_parameters(
 
 
 def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
-    """Settings that contradict each other, as they would in a file."""
+    """Return the required relations between settings, as checked in a file."""
     rules: list[tuple[str, str, str, float]] = [
         *((path, relation, other, 0.0) for path, relation, other, _ in consistency(scenario.device)),
         ("run.step", "at most", "run.duration", 0.0),
@@ -86,7 +86,7 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
 
 
 def declared_settings(scenario: Scenario) -> dict[str, Quantity]:
-    """Declarations by path, without the form of an orifice that is not used, effects that are off, second names."""
+    """Return declarations by path, without the unused form of an orifice, inactive effects and alternative paths."""
     device = scenario.device
     unused = {"controller.rate"}
     unused |= {f"{section}.{name}" for section in ("valve", "actuator.leak") for name in other_form(device, section)}

@@ -1,7 +1,7 @@
-"""Preparation of a walk from its settings: plain functions that call the planning.
+"""Preparation of a walk from its settings: plain functions that call the planning of walks.
 
-What a gait comes to (series, events, how its heel rolls) and a task sequence in time are numbers written out. Rows that
-the planning reads as mappings are structs in C: Python runs the functions of ``preparation`` alone.
+Data derived from a gait (series, events, heel rocker) and from a task sequence are written as constants. Rows that the
+planning reads as mappings are structs in C; therefore Python runs only the functions of ``preparation``.
 """
 
 from typing import Any
@@ -72,11 +72,11 @@ _RELATIONS = (
     ("controller.filled_pressure", "below", "supply.pressure"),
     ("controller.filled_pressure", "below", "supply.dorsiflexion_pressure"),
 )
-"""Contradictions of a walk file between two numbers; those with a third, or with the gait, are left to the caller."""
+"""Relations between two numbers of a walk file; relations with a third number or the gait are left to the caller."""
 
 
 def check_can_leave(configuration: Scenario) -> None:
-    """Raise ScenarioError for a walk that has no exported form."""
+    """Raise ScenarioError if a walk cannot be exported."""
     if walk_of(configuration).person:
         raise ScenarioError(
             f"{configuration.name}: wearer.person is drawn in Python, so a walk with one cannot be exported: leave it "
@@ -90,7 +90,7 @@ def check_can_leave(configuration: Scenario) -> None:
 
 
 def settings_of_walk(configuration: Scenario) -> tuple[ExportParameter, ...]:
-    """Every number of a walk in SI units, under the path that overrides know it by."""
+    """Return every number of a walk in SI units, by the path used in overrides."""
     run, control = configuration.run, _control(configuration)
     of_run = {"run.duration": run.duration, "run.step": run.step, "run.output_interval": record_interval(run.duration)}
     times = of_run | {"controller.period": configuration.controller.period}
@@ -107,7 +107,7 @@ def settings_of_walk(configuration: Scenario) -> tuple[ExportParameter, ...]:
 
 
 def _control(configuration: Scenario) -> dict[str, Quantity]:
-    """Settings of controller and timing by path, in the order of the controller's parameters."""
+    """Return the settings of controller and timing by path, in the order of the controller's parameters."""
     control = law_of(configuration)
     law = walking_controllers().get(configuration.controller.kind, control)
     own = {quantity.name for quantity in law.quantities}
@@ -118,7 +118,7 @@ def _control(configuration: Scenario) -> dict[str, Quantity]:
 
 
 def links_of_walk(configuration: Scenario) -> Graph:
-    """Settings of a walk that follow others as long as nobody changes them."""
+    """Return the links by which settings of a walk follow others unless changed."""
     known = {setting.path: setting.value for setting in settings_of_walk(configuration)}
     recorded = {"run.output_interval": (LinkedDefault((LinkFunction(("run.duration",), record_interval),)),)}
     # A plant alone has no settings of the controller that its walk had.
@@ -127,7 +127,7 @@ def links_of_walk(configuration: Scenario) -> Graph:
 
 
 def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
-    """Settings that contradict each other, as they would in a file."""
+    """Return the required relations between settings, as checked in a file."""
     rules = [(path, relation, other) for path, relation, other, _ in consistency(configuration.device)]
     if configuration.supply_lines is not None:
         rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure"))
@@ -141,7 +141,7 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
 
 
 def put_walking_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set leg, gait, and the plant with both; the rocker of the heel is fitted to the gait before."""
+    """Set leg, gait, and the plant with both; the heel rocker has been fitted to the gait beforehand."""
     gait = walk_of(parts.scenario).gait
     lane["wearer"] = parts.row("Wearer", named(WEARER))(
         *(getattr(settings, name) for name in parts.names("wearer", named(WEARER)))
@@ -157,7 +157,7 @@ def put_walking_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) ->
 
 
 def set_walk_sensors(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set the sensors with their faults, and the faults of the plant, whose numbers are constants."""
+    """Set the sensors with their faults, and the faults of the plant as constants."""
     for sensor, fault in walk_of(parts.scenario).faults.items():
         numbers = {quantity.name: f"faults.{sensor}.{quantity.name}" for quantity in fault_numbers(sensor, fault.kind)}
         if not fault.kind:
@@ -196,7 +196,7 @@ def set_walk_sensors(parts: Preparation, lane: PreparedLane, settings: Any) -> N
 
 
 def count_walk_steps(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set number and length of the steps: the smallest volume limits them, and gas that is stiffer where it warms."""
+    """Set number and length of the steps, as limited by the smallest volume and by the stiffness of gas that warms."""
     lane["room"] = lane.plant.atmospheric_pressure
     lane["volume"] = smallest_chamber(
         parts.program.actuator.chambers(lane.plant, LOWEST_ANGLE, lane["room"], lane["room"]),
@@ -219,7 +219,7 @@ def count_walk_steps(parts: Preparation, lane: PreparedLane, settings: Any) -> N
 
 
 def set_walking_law(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set the parameters of the controller; nothing follows the reference."""
+    """Set the controller parameters; a walk has no reference."""
     lane.controller = rebuilt(
         law_of(parts.scenario).parameters,
         (getattr(settings, c_identifier(path)) for path in _control(parts.scenario)),
@@ -228,7 +228,7 @@ def set_walking_law(parts: Preparation, lane: PreparedLane, settings: Any) -> No
 
 
 def start_walk(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set leg and gas at the start: at a heel strike, or standing where there is a task sequence."""
+    """Set the initial leg and gas states: at a heel strike, or standing if there is a task sequence."""
     planned = task_sequence_of_walk(parts.scenario)
     if planned is None:
         lane.walk = walk_from_strike(gait_at(lane.gait, lane.gait_timing, lane.leg, 0.0))
@@ -254,4 +254,4 @@ WALK_PREPARATION = (
     *(set_plant, put_walking_leg_on, set_walk_sensors, count_walk_steps, set_timing),
     *(set_walking_law, set_gas, start_walk, start, counted),
 )
-"""Functions that prepare the run of a walk, in this order; the last one gives the numbers of its steps."""
+"""Functions that prepare the run of a walk, in order of calling; the last one returns the step counts."""

@@ -1,5 +1,5 @@
-"""A scenario or a walk as a functional mock-up unit: sources inside, no Python at run time.
+"""Functional mock-up unit (FMU) of a scenario or walk: with sources, without Python at run time.
 
-The unit holds the closed loop, or the plant alone: valve, gas and supply under a command, on a vane that is
-unconstrained or moved. It is for co-simulation.
+The unit contains the closed loop, or the plant alone: valve, gas and supply under a command, with a free or prescribed
+vane. It is for co-simulation.
 """

@@ -1,4 +1,4 @@
-"""modelDescription.xml of FMI 2 and 3: the variables of a unit, their units, and what it can do."""
+"""modelDescription.xml of FMI 2 and 3: variables, units and capabilities of an FMU."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -31,7 +31,7 @@ _DISPLAY_UNITS = {
 
 
 def description_of_fmi2(interface: Interface, identifier: str, token: str) -> bytes:
-    """modelDescription.xml of FMI 2.0; ``identifier`` names the library, ``token`` identifies its sources."""
+    """Return modelDescription.xml of FMI 2.0; ``identifier`` names the library, ``token`` identifies its sources."""
     variables = variables_of(interface)
     root = Xml.Element("fmiModelDescription", _head("2.0", interface, guid=token))
     kind = Xml.SubElement(
@@ -63,7 +63,7 @@ def description_of_fmi2(interface: Interface, identifier: str, token: str) -> by
 
 
 def description_of_fmi3(interface: Interface, identifier: str, token: str) -> bytes:
-    """modelDescription.xml of FMI 3.0; ``identifier`` names the library, ``token`` identifies its sources."""
+    """Return modelDescription.xml of FMI 3.0; ``identifier`` names the library, ``token`` identifies its sources."""
     variables = variables_of(interface)
     root = Xml.Element("fmiModelDescription", _head("3.0", interface, instantiationToken=token))
     has_clock = str(interface.clock is not None).lower()
@@ -101,7 +101,7 @@ def description_of_fmi3(interface: Interface, identifier: str, token: str) -> by
 
 
 def build_description_of_fmi3(identifier: str, flags: str) -> bytes:
-    """Return buildDescription.xml of FMI 3.0: how the sources are built, with the ``flags`` of a compiler."""
+    """Return buildDescription.xml of FMI 3.0: sources to compile, with the compiler ``flags``."""
     root = Xml.Element("fmiBuildDescription", fmiVersion="3.0")
     built = Xml.SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
     sources = Xml.SubElement(built, "SourceFileSet", language="C99", compilerOptions=flags)
@@ -123,7 +123,7 @@ def _head(version: str, interface: Interface, **further: str) -> dict[str, str]:
 
 
 def _attributes(variable: FmuVariable) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the attributes of a variable, and those of the number that it is."""
+    """Return the XML attributes of a variable, and of its numeric type."""
     initial = {"parameter": {"initial": "exact"}, "input": {}}.get(variable.causality, {"initial": "calculated"})
     of_variable = {
         "name": variable.name,
@@ -143,13 +143,13 @@ def _attributes(variable: FmuVariable) -> tuple[dict[str, str], dict[str, str]]:
 
 
 def _shown(unit: str) -> str:
-    """Return a unit of ppafo without the kind of a pressure, which FMI does not have; empty for a plain number."""
+    """Return a ppafo unit without the kind of a pressure, which FMI does not have; empty for a plain number."""
     bare = unit.removesuffix("_a").removesuffix("_d")
     return "" if bare in ("", "-", "1") else bare
 
 
 def _add_units_and_experiment(root: Xml.Element, interface: Interface, variables: Iterable[FmuVariable]) -> None:
-    """Add what stands between the kind of a unit and its variables, in FMI 2 and 3 alike."""
+    """Add units, log categories and default experiment, which are the same in FMI 2 and 3."""
     table = Xml.SubElement(root, "UnitDefinitions")
     for name in sorted({_shown(variable.unit) for variable in variables} - {""}):
         exponents = {_BASE_UNITS[base]: str(power) for base, power in dimension(name).items()}

@@ -1,4 +1,4 @@
-"""Interface of a unit: the closed loop without inputs, or the plant alone, driven by the tool."""
+"""Interface of an FMU: the closed loop without inputs, or the plant alone, driven by the importing tool."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,14 +29,14 @@ _PLANT_TUNING = "They are taken at the next communication step."
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """Interface of a unit: its library, whose settings, outputs and metrics are its variables, and its inputs.
+    """Interface of an FMU: its library, whose settings, outputs and metrics are variables, and its inputs.
 
-    ``templates`` are the files of C that move it on, and ``words`` what is filled in there by name. ``hidden`` are the
-    paths of settings that are no variables. ``time`` tells people how the unit goes on, ``tuning`` when it takes a
-    changed parameter; both are HTML. ``step`` [s] is the usual communication step; where ``is_step_fixed``, others must
-    be multiples of it. ``duration`` [s] is the length of the default experiment. ``clock`` says when the clock of the
-    controller ticks, None for a unit without one. ``run`` is a run of Python that it is compared with; a plant's is
-    under the command ``EXAMPLE``.
+    ``templates`` are the C files that advance the unit, and ``words`` their template variables. ``hidden`` are the
+    paths of settings that are no variables. ``time`` describes the time stepping and ``tuning`` when a changed
+    parameter takes effect, both as HTML. ``step`` [s] is the usual communication step; if ``is_step_fixed``, others
+    must be multiples of it. ``duration`` [s] is the length of the default experiment. ``clock`` describes the ticks of
+    the controller clock, None for a unit without one. ``run`` is the Python run for comparison, under the command
+    ``EXAMPLE`` for a plant.
     """
 
     library: Library
@@ -54,7 +54,7 @@ class Interface:
 
 
 def closed_loop(scenario: Scenario) -> Interface:
-    """Return the whole scenario or walk, its controller within: no inputs."""
+    """Return the interface of a complete scenario or walk with its controller, without inputs."""
     library = library_of(scenario)
     times = {setting.path: setting.value for setting in library.settings}
     return Interface(
@@ -74,9 +74,9 @@ def closed_loop(scenario: Scenario) -> Interface:
 
 
 def plant_alone(scenario: Scenario) -> Interface:
-    """Return the plant; a free joint takes a torque, a locked one angle and rate, others the command alone.
+    """Return the interface of the plant; inputs are a torque for a free joint, angle and rate for a locked one.
 
-    ``export c`` writes the same plant.
+    The command is always an input, in all other cases the only one. ``export c`` writes the same plant.
     """
     alone = with_api(plant_of(scenario))
     library = alone.library

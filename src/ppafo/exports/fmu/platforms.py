@@ -1,4 +1,4 @@
-"""Kinds of computers that a unit has a library for, and the compiler that builds it."""
+"""Platforms for which a unit contains a compiled library, and their compilers."""
 
 import importlib.util
 import platform
@@ -13,18 +13,18 @@ from ppafo.storage.files import temporary_folder
 from ppafo.translation.compiling import asked, complaint
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
-"""Flags of the compiler with which a unit has the bits of the package."""
+"""Compiler flags for results bit-identical to the package."""
 HIDDEN = ("-shared", "-fPIC", "-fvisibility=hidden")
-"""Flags of a library that shows the functions of FMI alone."""
+"""Compiler flags of a shared library that exports only the functions of FMI."""
 _ANOTHER = "install gcc, clang or 'pip install ppafo[native]' anew"
-"""Remedy where a compiler does not answer."""
+"""Remedy in messages if a compiler cannot be run."""
 
 
 @dataclass(frozen=True, slots=True)
 class Platform:
-    """A kind of computer: its folder in a unit of FMI 2 (None: there is none) and of FMI 3, and how it is built for.
+    """Platform: its folder in a unit of FMI 2 (None: unsupported) and of FMI 3, compiler target and file suffix.
 
-    ``tried`` says what the binary of this platform was run on by the authors.
+    ``tried`` names the systems on which the authors ran the binary of this platform.
     """
 
     folder_2: str | None
@@ -39,11 +39,11 @@ PLATFORMS = {
     "win64": Platform("win64", "x86_64-windows", "x86_64-windows-gnu", ".dll", "run under Wine"),
     "linux-aarch64": Platform(None, "aarch64-linux", "aarch64-linux-gnu.2.17", ".so", "run under qemu"),
 }
-"""Platforms by the names under which they are requested."""
+"""Platforms by name."""
 
 
 def host_platform() -> str | None:
-    """Return the platform of this computer, None where a unit has none for it."""
+    """Return the platform of this computer; None if units do not support it."""
     machine = {"x86_64": "64", "amd64": "64", "aarch64": "-aarch64", "arm64": "-aarch64"}.get(
         platform.machine().lower()
     )
@@ -53,9 +53,9 @@ def host_platform() -> str | None:
 
 
 def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
-    """Return the library of a unit for a platform, of C ``sources`` by name, ``main`` the one that is compiled.
+    """Return the compiled library of a unit for a platform; ``main`` is the compiled file of the C ``sources``.
 
-    ProgramError where no compiler is there for it, or it refuses.
+    Raises ProgramError if the platform has no compiler or the compilation fails.
     """
     # No -march: a unit runs on processors that nobody here has seen.
     command = [*compiler_for(name), *FLAGS, *HIDDEN]
@@ -72,7 +72,7 @@ def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
 
 
 def compiler_for(name: str) -> Sequence[str]:
-    """Return the words of a compiler for a platform. ProgramError where there is none."""
+    """Return the command of a compiler for a platform; ProgramError if there is none."""
     if importlib.util.find_spec("ziglang") is not None:
         return [
             sys.executable,

@@ -1,4 +1,4 @@
-"""A unit is loaded once on this computer and compared with Python before it is handed out."""
+"""Trial of a unit on this computer: it is loaded and compared with Python before delivery."""
 
 import ctypes
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ _CO_SIMULATION = 1
 
 @final
 class _Fmi2:
-    """Instance of FMI 2, whose calls return the status, 0 for good."""
+    """Instance of FMI 2; its calls return the status, 0 for success."""
 
     def __init__(self, library: ctypes.CDLL, token: str) -> None:
         self.library = library
@@ -30,7 +30,7 @@ class _Fmi2:
         self.own = c_void_p(library.fmi2Instantiate(*words, c_void_p(None), c_int(0), c_int(0)))
 
     def begin(self, numbers: Any, values: Any) -> int:
-        """Set inputs and come to the first sample."""
+        """Set the inputs and initialise up to the first sample; return the status."""
         experiment = (c_int(0), c_double(0.0), c_double(0.0), c_int(0), c_double(0.0))
         return int(
             self.library.fmi2SetupExperiment(self.own, *experiment)
@@ -40,11 +40,11 @@ class _Fmi2:
         )
 
     def advance(self, time: float, length: float) -> int:
-        """Do one communication step from a time, both in [s]."""
+        """Perform one communication step of ``length`` [s] from ``time`` [s]; return the status."""
         return int(self.library.fmi2DoStep(self.own, c_double(time), c_double(length), c_int(1)))
 
     def read(self, numbers: Any, values: Any) -> int:
-        """Read outputs into ``values``."""
+        """Read outputs into ``values``; return the status."""
         return int(self.library.fmi2GetReal(self.own, numbers, c_size_t(len(numbers)), values))
 
     def close(self) -> None:
@@ -54,7 +54,7 @@ class _Fmi2:
 
 @final
 class _Fmi3:
-    """Instance of FMI 3, without event mode, with the same calls."""
+    """Instance of FMI 3, without event mode, with the methods of ``_Fmi2``."""
 
     def __init__(self, library: ctypes.CDLL, token: str) -> None:
         self.library = library
@@ -65,7 +65,7 @@ class _Fmi3:
         self.own = c_void_p(library.fmi3InstantiateCoSimulation(*words, *flags, *nothing))
 
     def begin(self, numbers: Any, values: Any) -> int:
-        """Set inputs and come to the first sample."""
+        """Set the inputs and initialise up to the first sample; return the status."""
         count = c_size_t(len(numbers))
         experiment = (c_bool(False), c_double(0.0), c_double(0.0), c_bool(False), c_double(0.0))
         return int(
@@ -75,12 +75,12 @@ class _Fmi3:
         )
 
     def advance(self, time: float, length: float) -> int:
-        """Do one communication step from a time, both in [s]."""
+        """Perform one communication step of ``length`` [s] from ``time`` [s]; return the status."""
         flags, last = [ctypes.byref(c_bool()) for _ in range(3)], ctypes.byref(c_double())
         return int(self.library.fmi3DoStep(self.own, c_double(time), c_double(length), c_bool(True), *flags, last))
 
     def read(self, numbers: Any, values: Any) -> int:
-        """Read outputs into ``values``."""
+        """Read outputs into ``values``; return the status."""
         count = c_size_t(len(numbers))
         return int(self.library.fmi3GetFloat64(self.own, numbers, count, values, count))
 
@@ -90,9 +90,9 @@ class _Fmi3:
 
 
 def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> None:
-    """Load the library of a unit for this computer and compare its outputs with the run of Python, to the bit.
+    """Load the library of a unit on this computer and compare its outputs with the Python run, to the bit.
 
-    ProgramError where it cannot be loaded, a call fails, or an output is another number.
+    Raises ProgramError if it cannot be loaded, a call fails, or an output differs.
     """
     head, *lines = expected_csv(interface.run, interface.library.program.outputs).decode().splitlines()
     rows = [[float(text) for text in line.split(",")] for line in lines]

@@ -1,4 +1,4 @@
-"""A unit as a file: description, page, sources, and the libraries of the platforms that it is for."""
+"""FMU file: description, documentation page, sources, and compiled libraries of its platforms."""
 
 import hashlib
 import html
@@ -20,7 +20,7 @@ from ppafo.version import __version__
 from ppafo.wording import nearest_name
 
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)
-"""The earliest date of a zip file: a unit does not depend on the day on which it was made."""
+"""Earliest date of a zip entry, so that a unit does not depend on its date of creation."""
 _HEADERS = {
     2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
     3: ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
@@ -31,10 +31,10 @@ _CALLS = {2: ("fmi2.c", "fmi2_steps.c"), 3: ("fmi3.c",)}
 
 
 def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) -> dict[str, bytes]:
-    """Return the bytes of a unit by the name of its file; ``fmi`` is the version, 2 or 3.
+    """Return the content of a unit by file name; ``fmi`` is the version, 2 or 3.
 
-    ScenarioError for a platform that is none, ProgramError for what cannot be translated or built,
-    and for a unit of this computer that gives other numbers than Python.
+    Raises ScenarioError for an unknown platform, ProgramError for code that cannot be translated or compiled, and for a
+    unit of this computer whose results differ from Python.
     """
     # Before anything is built: a misspelt platform should not cost a compilation.
     for name in platforms:
@@ -87,7 +87,7 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
 
 
 def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
-    """Return the sources by name, with a mark where the token will be."""
+    """Return the sources by name, with a placeholder for the token."""
     library = interface.library
     name = library.name
     written = library_files(library)

@@ -1,4 +1,4 @@
-"""Variables of a unit, and what of it may change under way."""
+"""Variables of an FMU, and their variability during a run."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -14,11 +14,11 @@ Variability = Literal["discrete", "continuous"]
 """Variability of an output in terms of FMI: discrete between samples, or continuous."""
 
 FIXED_SECTIONS = ("run", "initial", "gas", "actuator", "foot_plate", "wearer", "motion", "motion.profile")
-"""Settings that the start of a run is made of: they cannot change under way."""
+"""Sections of settings used only at the start of a run, which cannot change during the run."""
 FIXED_NAMES = ("period", "delay", "seed")
-"""Names of further settings that cannot change under way: they count steps or begin the noise."""
+"""Names of further settings that cannot change during a run: they determine step counts or seed the noise."""
 TUNABLE_OF_WEARER = ("residual_share", "ankle_stiffness", "ankle_rest_angle", "ankle_damping")
-"""Settings of the wearer that may change: the weight of a leg stays."""
+"""Settings of the wearer that may change during a run, unlike the weight of a leg."""
 STEPPED = (
     "command",
     *(kind.reference for kind in CONTROLLED.values()),
@@ -27,16 +27,17 @@ STEPPED = (
     "controller_phase",
     "safe_state",
 )
-"""Outputs that jump from sample to sample."""
+"""Outputs that change only at samples."""
 _LARGEST_LIMIT = 1.0e308
-"""Size of a limit from which on it stands for none: XML would show the largest floats as limits."""
+"""Magnitude above which a limit counts as no limit, since XML would contain the largest floats."""
 
 
 @dataclass(frozen=True, slots=True)
 class FmuVariable:
-    """Variable of a unit: name, number, unit and meaning; ``causality`` and ``variability`` in terms of FMI.
+    """Variable of an FMU: name, number, unit and meaning; ``causality`` and ``variability`` in terms of FMI.
 
-    A ``start`` of None is calculated, limits of None are none; all three are in ``unit``.
+    ``start`` is None for a calculated variable, ``minimum`` and ``maximum`` None for no limit; all three are in
+    ``unit``.
     """
 
     name: str
@@ -51,7 +52,7 @@ class FmuVariable:
 
 
 def tuning_of(interface: Interface, setting: ExportParameter) -> Tuning:
-    """Return whether a setting is a variable of a unit, and if so whether it may change under way."""
+    """Return the access to a setting: hidden if no variable, tunable if changeable during the run, else fixed."""
     if setting.path in interface.hidden:
         return "hidden"
     section, _, name = setting.path.rpartition(".")
@@ -61,14 +62,14 @@ def tuning_of(interface: Interface, setting: ExportParameter) -> Tuning:
 
 
 def variability_of(output: str) -> Variability:
-    """Return whether an output jumps from sample to sample or goes on in between."""
+    """Return ``discrete`` for an output that changes only at samples, ``continuous`` for any other."""
     return "discrete" if output in STEPPED else "continuous"
 
 
 def variables_of(interface: Interface) -> tuple[FmuVariable, ...]:
-    """Return all variables, in the order of their numbers: settings, outputs, metrics, inputs.
+    """Return all variables in the order of their numbers: settings, outputs, metrics, inputs.
 
-    The numbers are also those of the C, which counts what is no variable of the unit too.
+    The C code uses the same numbers; these also count hidden settings.
     """
     library, program = interface.library, interface.library.program
     variables = []

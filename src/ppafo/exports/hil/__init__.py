@@ -1,1 +1,1 @@
-"""Hardware in the loop: a scenario's plant in real time at a wire, with the controller on the other side."""
+"""Hardware in the loop: the plant of a scenario in real time on a link to an external controller."""

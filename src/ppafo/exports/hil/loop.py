@@ -1,8 +1,8 @@
-"""The plant's side of the wire: its time, what it accepts from a controller, when it vents, and the course of a run.
+"""Plant side of a hardware-in-the-loop link: timing, accepted answers, venting, and the sequence of a run.
 
-The plant sends a sample, listens until the next one is due, and goes on from that sample under the command that
-answered it. So a controller that answers in time decides as in a simulation. Time goes on as it goes by, or in lock
-step with the answers.
+The plant sends a sample, listens until the next one is due, and continues under the command that answered the sample,
+applied from its sample on. A controller that answers in time thus acts as in a simulation. The time is real time, or
+advances in lock step with the answers.
 """
 
 import gc
@@ -23,15 +23,15 @@ from ppafo.model.valves.kind import VENT
 from ppafo.simulation.sampled import SampledRun
 
 _AT_ONCE = 64
-"""Packets that are taken without a look at the clock: a sender without end must not hold up the plant."""
+"""Maximum number of packets processed without checking the clock, so that a flood of packets cannot block the plant."""
 Take = Callable[[bytes], bool]
-"""Takes what came in, and says whether what is waited for is there."""
+"""Function that processes received bytes and returns True if the awaited packet has arrived."""
 
 
 def _listen_for(seconds: float, clock: Callable[[], float], port: wire.Port, take: Take) -> None:
-    """Hand over what comes in for some seconds of a clock, or until ``take`` has what it waits for.
+    """Pass received data to ``take`` for some seconds of a clock, or until ``take`` returns True.
 
-    What has come in while the computer slept through the end is handed over too.
+    Data received while the computer was suspended past the end is passed too.
     """
     end = clock() + seconds
     while (left := end - clock()) > 0.0:
@@ -42,7 +42,7 @@ def _listen_for(seconds: float, clock: Callable[[], float], port: wire.Port, tak
 
 
 def _drain(port: wire.Port, take: Take) -> None:
-    """Hand over what has come in, or as much as a plant can wait for."""
+    """Pass data already received to ``take``, up to a limited number of packets."""
     for _ in range(_AT_ONCE):
         data = port.receive(0.0)
         if not data:
@@ -52,9 +52,9 @@ def _drain(port: wire.Port, take: Take) -> None:
 
 @final
 class RealTime:
-    """Time as it goes by. Where the computer sleeps through a whole period, the plant's time stands still for so long.
+    """Real time; plant time is paused while the computer is suspended for more than a period.
 
-    ``clock`` tells seconds.
+    ``clock`` returns the time [s].
     """
 
     is_real = True
@@ -66,15 +66,15 @@ class RealTime:
         self._start = clock()
 
     def begin(self) -> None:
-        """Let time begin now."""
+        """Set the time to zero now."""
         self._start = self.clock()
 
     def now(self) -> float:
-        """Time [s] since the beginning, less the time in which it stood still."""
+        """Time [s] since the start, without pauses."""
         return self.clock() - self._start
 
     def late(self, due: float) -> float:
-        """Delay [s] behind a time [s] that was waited for."""
+        """Return the delay [s] with respect to a due time [s]; a delay above one period pauses the time."""
         missed = max(0.0, self.now() - due)
         # Less than a period late is jitter, which the next sample makes up; more would be made up by a burst of
         # samples.
@@ -84,11 +84,11 @@ class RealTime:
         return missed
 
     def listen(self, until: float, port: wire.Port, take: Take) -> None:
-        """Hand over what comes in until a time [s], or until what is waited for is there."""
+        """Pass received data to ``take`` until the time ``until`` [s], or until ``take`` returns True."""
         _listen_for(until - self.now(), self.clock, port, take)
 
     def rest(self, until: float, port: wire.Port, take: Take) -> None:
-        """Hand over what comes in until a time [s]."""
+        """Pass received data to ``take`` until the time ``until`` [s]."""
         while (left := until - self.now()) > 0.0:
             data = port.receive(left)
             if data:
@@ -97,7 +97,7 @@ class RealTime:
 
 @final
 class LockStep:
-    """Time that stands still until the answer is there, or ``patience`` [s] of a clock have gone by."""
+    """Simulated time that waits for each answer, at most for ``patience`` [s] of a clock."""
 
     is_real = False
 
@@ -108,25 +108,25 @@ class LockStep:
         self._now = 0.0
 
     def begin(self) -> None:
-        """Let time begin."""
+        """Set the time to zero."""
         self._now = 0.0
 
     def now(self) -> float:
-        """Time [s] of the present sample."""
+        """Time [s] of the current sample."""
         return self._now
 
     def late(self, due: float) -> float:
-        """Go on to a time [s]; none is ever missed."""
+        """Advance to a due time [s]; the delay is always 0."""
         self._now = due
         return 0.0
 
     def listen(self, until: float, port: wire.Port, take: Take) -> None:
-        """Hand over what comes in until what is waited for is there."""
+        """Pass received data to ``take`` until it returns True, at most for ``patience`` [s]."""
         del until
         _listen_for(self._patience, self.clock, port, take)
 
     def rest(self, until: float, port: wire.Port, take: Take) -> None:
-        """Hand over what has come in."""
+        """Pass data already received to ``take``."""
         del until
         _drain(port, take)
 
@@ -137,7 +137,7 @@ LoopPacing = RealTime | LockStep
 
 @contextmanager
 def stop_by_interrupt() -> Iterator[Callable[[], bool]]:
-    """Let a signal to end, such as Ctrl-C, ask for an end; a second one interrupts whatever is being done."""
+    """Turn the first termination signal, such as Ctrl-C, into a stop request; a second one raises KeyboardInterrupt."""
     asked = threading.Event()
 
     def ask(_signal: int, _frame: object) -> None:
@@ -162,7 +162,7 @@ def stop_by_interrupt() -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def without_collections() -> Iterator[None]:
-    """Keep Python from looking for garbage, which takes milliseconds."""
+    """Disable Python's garbage collection, which takes milliseconds, within a ``with`` block."""
     was_on = gc.isenabled()
     # Now, so that nothing is left to collect for long.
     gc.collect()
@@ -175,11 +175,11 @@ def without_collections() -> Iterator[None]:
 
 
 SILENCE = 0.020
-"""Seconds without an answer after which the plant is vented, for good."""
+"""Time [s] without an answer after which the plant is vented permanently."""
 AFTER_STOP = 0.5
-"""Seconds that a run goes on, vented, after it was stopped; not in real time."""
+"""Time [s] for which a stopped run continues, vented and not in real time."""
 LAST_PACKETS = 3
-"""Packets that announce the end: any of them may be lost."""
+"""Number of packets that announce the end, since any of them may be lost."""
 # Between two calls of the controller [s]; and a number of periods that is whole but for rounding.
 _CALL_INTERVAL = 0.01
 _WHOLE = 1.0e-9
@@ -190,14 +190,14 @@ SILENT, NOT_SOUND, STOPPED, BROKEN = (
     "stopped",
     "the port broke",
 )
-"""Why a plant is vented."""
+"""Reasons for venting the plant."""
 
 
 class LogRow(NamedTuple):
-    """A sample in the log: when it was due [s], how late it was sent [s], after how long it was answered [s].
+    """Sample in the log: due time [s], delay of sending [s], response time of the answer [s], command [-].
 
-    None stands for a sample that was not sent, or not answered; ``controller_time`` [us] is the time stamp of the
-    newest answer, None before the first.
+    ``sent_late`` is None for a sample that was not sent, ``answered_after`` None for one that was not answered.
+    ``controller_time`` [us] is the time stamp of the newest answer, None before the first.
     """
 
     sequence: int
@@ -211,7 +211,7 @@ class LogRow(NamedTuple):
 
 @final
 class AnswerFilter:
-    """Accepts answers of a controller. Everything that is not the answer to a waiting sample is counted."""
+    """Filter of a controller's answers: accepts answers to waiting samples, and counts all other packets."""
 
     def __init__(self, run: int, period: float) -> None:
         self.run = run
@@ -225,7 +225,7 @@ class AnswerFilter:
         self.ignored: Counter[str] = Counter()
 
     def take(self, packet: wire.Packet) -> None:
-        """Look at a good packet that came in."""
+        """Process a valid packet."""
         if not isinstance(packet, wire.Answer):
             self.ignored["no answer"] += 1
         elif packet.run != self.run:
@@ -246,15 +246,15 @@ class AnswerFilter:
 
     @property
     def is_answered(self) -> bool:
-        """True once the last sample that was sent has its answer."""
+        """True if the last sent sample has been answered."""
         return self.answered == self.sent
 
     def vent(self, why: str) -> None:
-        """Vent, for good; the first reason is kept."""
+        """Vent permanently; only the first reason is stored."""
         self.vented = self.vented or why
 
     def decide(self) -> float:
-        """The command that acts from the last sample on [-]."""
+        """Return the command [-] that acts from the last sample on."""
         if self.sent - self.answered >= self.patience:
             self.vent(SILENT)
         return VENT if self.vented else self.command
@@ -262,11 +262,11 @@ class AnswerFilter:
 
 @dataclass(frozen=True, slots=True)
 class LinkTraffic:
-    """The traffic of a run: the log, packets accepted and counted, and the end.
+    """Traffic of a run: the log, counts of accepted and discarded packets, and the end of the run.
 
-    ``refused`` are bytes that were no good packet, ``ignored`` good packets that were no answer to a sample that
-    waited. ``stood_still`` are the times [s] through which the computer slept. ``vented`` says why the plant was
-    vented, at ``vented_at`` [s]; it is empty, and None, where it was not.
+    ``refused`` counts invalid bytes and packets by cause, ``ignored`` valid packets that answered no waiting sample.
+    ``stood_still`` are the times [s] for which the computer was suspended. ``vented`` is the reason for venting the
+    plant, empty if it was not vented, and ``vented_at`` [s] its time, or None.
     """
 
     rows: tuple[LogRow, ...]
@@ -284,7 +284,7 @@ class LinkTraffic:
 
 @final
 class Bench:
-    """A plant at the wire, whose samples are ``period`` [s] apart; ``run`` is the number of the run, of 16 bits."""
+    """Plant on a link with samples every ``period`` [s]; ``run`` is the 16-bit number of the run."""
 
     def __init__(self, plant: SampledRun, period: float, port: wire.Port, pace: LoopPacing, run: int) -> None:
         self.plant = plant
@@ -300,9 +300,9 @@ class Bench:
         self._show(0)
 
     def run(self, patience: float, is_stopped: Callable[[], bool]) -> LinkTraffic:
-        """Call the controller, at most for ``patience`` [s], and run the plant to its end or until it is stopped.
+        """Call the controller for at most ``patience`` [s], then run the plant to its end or until stopped.
 
-        ScenarioError where nobody answers.
+        Raises ScenarioError if no controller answers.
         """
         self.judge.sent = 0
         self._show(wire.BEGIN)
@@ -366,7 +366,7 @@ class Bench:
         )
 
     def _go_on(self, command: float, sent_late: float | None, answered_after: float | None) -> None:
-        """Log the present sample, and take the plant to the next one under a command [-]."""
+        """Log the current sample, and advance the plant to the next one under a command [-]."""
         sequence = self.plant.taken
         self.rows.append(
             LogRow(
@@ -382,7 +382,7 @@ class Bench:
         self.plant.go_on(command)
 
     def _take(self, data: bytes) -> bool:
-        """Take what came in; true where the sample that was sent is answered."""
+        """Process received data; return True if the last sent sample has been answered."""
         for packet in self.reader.take(data):
             before = self.judge.answered
             self.judge.take(packet)
@@ -393,11 +393,11 @@ class Bench:
 
     @property
     def _is_going_on(self) -> bool:
-        """False at the end of the run, and where the plant has become unphysical."""
+        """False at the end of the run, and after the plant has diverged."""
         return self.plant.taken < self.plant.samples and not self._has_diverged
 
     def _show(self, flags: int) -> None:
-        """Make the plant's present state the sample that is shown."""
+        """Store the current state of the plant as the sample to send."""
         plant, seen = self.plant, self.plant.measurement()
         # No packet can carry NaN: the last good sample stays shown.
         self._has_diverged = not all(map(math.isfinite, seen))
@@ -419,7 +419,7 @@ class Bench:
         )
 
     def _say_over(self) -> None:
-        """Tell the controller that the run is over."""
+        """Tell the controller that the run has ended."""
         packet = wire.sample_bytes(self._shown._replace(flags=self._shown.flags & ~wire.BEGIN | wire.OVER))
         for _ in range(LAST_PACKETS):
             self.port.send(packet)

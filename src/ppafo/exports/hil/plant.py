@@ -1,4 +1,4 @@
-"""The plant at the wire: the compiled module with one run, whose command comes from outside."""
+"""Plant on the link: the compiled module with a single run and an external command."""
 
 from dataclasses import dataclass, replace
 
@@ -18,7 +18,7 @@ CHANNELS_SENT = 5
 
 @dataclass(frozen=True, slots=True)
 class CompiledPlant:
-    """A scenario without its controller: how it is run, and what compiled it."""
+    """Scenario without its controller: run, compiled module, compiler, and sample period [s]."""
 
     scenario: Scenario
     run: Run
@@ -28,7 +28,7 @@ class CompiledPlant:
 
 
 def plant_of(scenario: Scenario, rate: int = wire.RATE) -> CompiledPlant:
-    """The plant of a scenario with ``rate`` commands a second; a proportional valve gets a vent valve."""
+    """Return the plant of a scenario at ``rate`` commands per second; a proportional valve gets a vent valve."""
     if not wire.LOWEST_RATE <= rate <= wire.HIGHEST_RATE:
         limits = f"{wire.LOWEST_RATE} to {wire.HIGHEST_RATE} samples per second"
         raise ScenarioError(f"{argument_text('rate')} {rate}: must be {limits}")
@@ -56,7 +56,7 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> CompiledPlant:
 
 
 def check_baud(baud: int, rate: int) -> None:
-    """Refuse a serial line that cannot carry the samples."""
+    """Raise ScenarioError if a serial line is too slow for the samples."""
     bits = wire.sample_length(CHANNELS_SENT) * wire.BITS_OF_A_BYTE
     if baud < bits * rate:
         raise ScenarioError(

@@ -1,4 +1,4 @@
-"""A recording from a bench by the protocol: its samples, put in order, as channels over time."""
+"""Recording from a bench over the protocol: its samples, in order, as channels over time."""
 
 import contextlib
 import time
@@ -20,7 +20,7 @@ from ppafo.wording import reason
 
 MOST_SAMPLES = 5_000_000
 ASIDE = ".recording"
-"""Stands before the ending of a file that is being recorded."""
+"""Suffix to the stem of the temporary file during recording."""
 # Longest wait for bytes, and time between two writings of what came [s].
 _LISTENING = 0.1
 _BETWEEN_KEEPING = 0.5
@@ -29,9 +29,10 @@ _HALF = wire.WRAP // 2
 
 @dataclass(frozen=True, slots=True)
 class CollectedRecording:
-    """A recording of a bench, and what was counted beside it.
+    """Recording of a bench, with counts of lost and discarded packets.
 
-    ``lost`` are samples whose numbers never came. ``ended`` says what ended it, ``is_stopped`` whether a person did.
+    ``lost`` is the number of samples that never arrived. ``ended`` is the cause of the end, and ``is_stopped`` is True
+    if the user stopped the recording.
     """
 
     recording: Recording
@@ -43,7 +44,7 @@ class CollectedRecording:
     is_stopped: bool
 
     def text(self) -> str:
-        """Return what was recorded, lost and dropped, in words."""
+        """Return the numbers of recorded, lost and discarded samples as text."""
         recording, others = self.recording, [*self.ignored.items(), ("of somebody else", self.strangers)]
         samples = f"{len(recording)} samples over {recording.duration:.6g} s"
         return "\n".join(
@@ -56,7 +57,7 @@ class CollectedRecording:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return samples, channels, losses and how it ended as plain data, in SI units."""
+        """Return samples, channels, losses and the cause of the end as plain data, in SI units."""
         recording = self.recording
         return {
             "samples": len(recording),
@@ -73,10 +74,10 @@ class CollectedRecording:
 
 @final
 class Collector:
-    """Samples of one run of a bench, by number; the first one says which run, and which channels.
+    """Samples of one bench run by number; the first sample determines the run and its channels.
 
-    A sample that does not go on from the others, in number, time, run or channels, waits until the next one shows
-    which of them is the stray: what a wire or an earlier run left over may come first, and says nothing of the bench.
+    A sample inconsistent with the others in number, time, run or channels waits until the next sample decides which of
+    the two is the stray. The first packets may be left over from the line or an earlier run and must not decide.
     """
 
     def __init__(self) -> None:
@@ -88,7 +89,7 @@ class Collector:
         self._begin()
 
     def _begin(self) -> None:
-        """Begin without a sample."""
+        """Reset to no samples."""
         self._newest: wire.WireSample | None = None
         self._elapsed = 0
         self._kind: RecordingKind = "measured"
@@ -102,7 +103,7 @@ class Collector:
         return len(self._numbers)
 
     def take(self, packet: wire.Packet) -> bool:
-        """Look at a good packet; true where it is a new sample."""
+        """Process a valid packet; return True if it is a new sample."""
         if not isinstance(packet, wire.WireSample):
             self.ignored["no sample"] += 1
             return False
@@ -132,7 +133,7 @@ class Collector:
         return self._keep(packet)
 
     def _keep(self, packet: wire.WireSample) -> bool:
-        """Add a sample of the run, unless its number came before."""
+        """Add a sample of the run, unless its number is already present."""
         if self._newest is None:
             self._newest = packet
             self._number, self._names = packet.sequence, list(packet.counts)
@@ -164,13 +165,13 @@ class Collector:
 
     @property
     def duration(self) -> float:
-        """Time of the bench from its first sample to the newest [s]."""
+        """Bench time [s] from the first to the newest sample."""
         return max(0, self._elapsed) / wire.MICROSECONDS
 
     def recording(self, label: str) -> tuple[Recording, int]:
-        """The samples in order as a recording, and how many between the first and the last never came.
+        """Return the sorted samples as a recording, and the number of missing samples between the first and the last.
 
-        A sample whose time does not go on from the one before is left out and counted.
+        A sample whose time does not exceed the time of the previous one is left out and counted.
         """
         self._drop_stray()
         kept: list[int] = []
@@ -192,9 +193,9 @@ class Collector:
         return Recording(label, time_axis, channels, self._kind), lost
 
     def fresh_lines(self) -> str:
-        """Samples since the last call as lines of a CSV file, with its heading first; for a temporary file.
+        """Return the samples received since the last call as CSV lines, at first with a header; for a temporary file.
 
-        A sample that was overtaken by lines of an earlier call is not among them.
+        Samples that arrive after later ones have been written are omitted.
         """
         lines = []
         if self._newest is not None and self._last_kept is None:
@@ -220,11 +221,11 @@ class Collector:
 _DOUBLED = "doubled"
 _OF_OTHERS = ("of another run", "with other channels")
 _FURTHEST = 10_000
-"""Samples that may be lost in a row before the next one waits for another that goes on from it: ten seconds."""
+"""Maximum number of successive lost samples (10 s at 1 kHz) before the next sample needs confirmation by another."""
 
 
 def _why_not(before: wire.WireSample, packet: wire.WireSample) -> str:
-    """Return why a sample does not go on from another one, or comes a little before it; empty where it does."""
+    """Return the reason why a sample does not continue another one, nor shortly precedes it; empty if it does."""
     if packet.run != before.run:
         return _OF_OTHERS[0]
     # Columns of a file are fixed by its first sample.
@@ -239,7 +240,7 @@ def _why_not(before: wire.WireSample, packet: wire.WireSample) -> str:
 
 
 def _difference(later: int, earlier: int) -> int:
-    """Difference of two 32-bit counters, of which the later one may have wrapped around."""
+    """Difference of two 32-bit counters, with the later one possibly wrapped around."""
     return (later - earlier + _HALF) % wire.WRAP - _HALF
 
 
@@ -252,10 +253,10 @@ def record(
     clock: Callable[[], float] = time.perf_counter,
     keep: Callable[[str], None] = lambda _lines: None,
 ) -> CollectedRecording:
-    """Record what a bench sends: for a time of the bench [s], until it says that it is over, or until it is silent.
+    """Record samples of a bench for ``duration`` [s] of its time, or until it ends the recording or falls silent.
 
-    ``patience`` [s] is how long silence lasts. Once a second ``keep`` gets what came as lines of a CSV file, so that
-    little is lost with this process. DataError where no sample came.
+    ``patience`` [s] is the silence after which recording ends. ``keep`` receives new samples as CSV lines about once a
+    second, so that little is lost if this process is killed. Raises DataError if no sample arrived.
     """
     reader, collector = wire.Reader(port.is_stream), Collector()
     heard = kept = clock()
@@ -291,10 +292,10 @@ def record(
 
 @contextlib.contextmanager
 def kept_aside(target: Path) -> Iterator[Callable[[str], None]]:
-    """A file beside the one to be written that takes lines as they come, and goes away where all is written.
+    """Create a temporary file beside the target that receives lines during recording, and is removed after success.
 
-    Where writing fails or is interrupted it stays, and the error says so. One that is there was left by a process that
-    was killed: DataError says what may be done with it.
+    If writing fails or is interrupted, the file remains and the error names it. A file left by a killed process raises
+    DataError with advice.
     """
     aside = target.with_name(f"{target.stem}{ASIDE}{target.suffix}")
     try:

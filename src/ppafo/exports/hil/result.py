@@ -31,14 +31,14 @@ LOG_COLUMNS = (
 _PER_THOUSAND = 1.0e3
 _BINS = 60
 _SHORTEST_SHOWN, _LONGEST_SHOWN = 1.0e-2, 1.0e1
-"""Ends of the axis of times [ms]; longer ones make it longer."""
+"""Limits of the time axis [ms]; longer times extend the axis."""
 
 
 @dataclass(frozen=True, slots=True)
 class HostComputer:
-    """Computer of the plant: system, cores, Python, and load (mean number of running processes, 1 min).
+    """Computer of the plant: system, cores, Python, and load before and after the run.
 
-    The load is None where the system does not tell it.
+    The load is the mean number of running processes over 1 min; None if the system does not provide it.
     """
 
     system: str
@@ -51,7 +51,7 @@ class HostComputer:
 @final
 @dataclass(frozen=True, slots=True)
 class HardwareRun:
-    """A run at the wire: the result, what went over the wire and when, and the machine."""
+    """Hardware-in-the-loop run: the plant, its result, the traffic on the link, and the host computer."""
 
     plant: CompiledPlant
     result: Result
@@ -60,21 +60,21 @@ class HardwareRun:
 
     @property
     def sent_late(self) -> list[float]:
-        """Delays of the samples that were sent [s]; a stopped run is vented without sending any."""
+        """Delays [s] of the sent samples; the samples after a stop are not sent."""
         return [row.sent_late for row in self.exchange.rows if row.sent_late is not None]
 
     @property
     def answered_after(self) -> list[float]:
-        """Response times of the samples that were answered [s]."""
+        """Response times [s] of the answered samples."""
         return [row.answered_after for row in self.exchange.rows if row.answered_after is not None]
 
     @property
     def is_good(self) -> bool:
-        """True where the run went to its end, and nothing vented the plant."""
+        """True if the run is complete and the plant was not vented."""
         return self.result.status.is_completed and not self.exchange.vented
 
     def document(self) -> dict[str, Any]:
-        """The content of ``link.json``, in SI units."""
+        """Content of ``link.json``, in SI units."""
         exchange, late, after = self.exchange, self.sent_late, self.answered_after
         return {
             "rate": round(1.0 / self.plant.period),
@@ -99,7 +99,7 @@ class HardwareRun:
         }
 
     def text(self) -> str:
-        """The run in words."""
+        """Summary of the run as text."""
         exchange, machine, late, after = self.exchange, self.machine, self.sent_late, self.answered_after
         others = [*exchange.ignored.items(), ("of somebody else", exchange.strangers)]
         silence = longest_silence(exchange.rows) * self.plant.period
@@ -131,7 +131,7 @@ class HardwareRun:
         return "\n".join([*lines, *([f"port       {exchange.failure}"] if exchange.failure else [])])
 
     def files(self) -> dict[str, bytes]:
-        """The files beside a result's own, by name."""
+        """Additional files of the result by name."""
         # The log as a table; an empty cell is something that was not there.
         buffer = io.StringIO()
         writer = csv.writer(buffer, lineterminator="\n")
@@ -154,7 +154,7 @@ class HardwareRun:
         return found
 
     def plot_signals(self) -> "Figure":
-        """Figure of the signals of the run; the reason of venting stands below."""
+        """Figure of the signals of the run, with the reason of venting below."""
         exchange, status = self.exchange, self.result.status
         vented = (
             ""
@@ -166,7 +166,7 @@ class HardwareRun:
             return recording_figure(self.result.recording, f"{self.plant.scenario.name}, at the wire", remark)
 
     def plot(self) -> "Figure":
-        """Histograms of how late samples were sent, and after how long they were answered."""
+        """Histograms of sending delays and response times."""
         period, load = self.plant.period * _PER_THOUSAND, self.machine.load_after
         sent_late, answered_after = self.sent_late, self.answered_after
         beside = "" if load is None else f"; load {load:.2f} on {self.machine.cores} cores"
@@ -186,7 +186,7 @@ class HardwareRun:
 
 
 def spread(values: Sequence[float]) -> dict[str, float] | None:
-    """Median, 99th percentile and largest of some times [s]; None where there are none."""
+    """Return median, 99th percentile and maximum of times [s]; None for no times."""
     if not values:
         return None
     return {
@@ -197,7 +197,7 @@ def spread(values: Sequence[float]) -> dict[str, float] | None:
 
 
 def described_spread(values: Sequence[float]) -> str:
-    """Median, 99th percentile and largest of some times, in words."""
+    """Return median, 99th percentile and maximum of times [s] as text."""
     numbers = spread(values)
     if numbers is None:
         return "none"
@@ -206,7 +206,7 @@ def described_spread(values: Sequence[float]) -> str:
 
 
 def longest_silence(rows: Sequence[LogRow]) -> int:
-    """Most samples one after the other that were sent and not answered."""
+    """Return the largest number of consecutive samples that were sent and not answered."""
     longest = current = 0
     for row in rows:
         current = current + 1 if row.answered_after is None and row.sent_late is not None else 0
@@ -215,7 +215,7 @@ def longest_silence(rows: Sequence[LogRow]) -> int:
 
 
 def _histogram(axes: "Axes", values: Sequence[float], title: str) -> None:
-    """Times in ms on a logarithmic axis; those below 0.01 ms are in its first bin."""
+    """Draw a histogram of times, in ms on a logarithmic axis; times below 0.01 ms are in the first bin."""
     axes.set_title(title)
     axes.set_xlabel("Time (ms)")
     axes.set_xscale("log")

@@ -1,6 +1,6 @@
 """Run of a compiled plant against the controller at a port.
 
-The plant runs in this process: why not in one of its own, docs/decisions/0022-processor-and-hardware-in-the-loop.md.
+The plant runs in this process; docs/decisions/0022-processor-and-hardware-in-the-loop.md explains the reasons.
 """
 
 import os
@@ -17,9 +17,9 @@ from ppafo.simulation.sampled import SampledRun
 from ppafo.simulation.simulate import result_of
 
 PATIENCE = 10.0
-"""Time [s] for which the controller is called before the run is given up."""
+"""Time [s] for which the controller is called before the run is abandoned."""
 _LARGEST_RUN = 2**16 - 1
-"""Largest number of a run: packets carry it in 16 bits."""
+"""Largest run number, as packets contain it in 16 bits."""
 
 
 def run_plant(
@@ -30,10 +30,10 @@ def run_plant(
     is_stopped: Callable[[], bool] = lambda: False,
     run: int | None = None,
 ) -> HardwareRun:
-    """Run a plant against the controller at a port, until its end or until ``is_stopped`` says so.
+    """Run a plant against the controller at a port, until its end or until ``is_stopped`` returns True.
 
-    ``pace`` makes the pace of a sample period [s]; ``patience`` [s] is how long the controller is called; ``run`` is
-    the number of the run, 0 to 65535, drawn where none is given. ScenarioError where nobody answers.
+    ``pace`` creates the time stepping for a sample period [s]. ``patience`` [s] limits the call of the controller.
+    ``run`` is the number of the run, 0 to 65535, by default random. Raises ScenarioError if no controller answers.
     """
     # Not from a seed: packets of an earlier run that are still under way must have another number.
     number = random.SystemRandom().randint(0, _LARGEST_RUN) if run is None else run
@@ -54,7 +54,7 @@ def run_plant(
 
 
 def load_now() -> float | None:
-    """Processes that run on this computer, on average over the last minute [-]; None where the system tells it not."""
+    """Mean number of running processes over the last minute [-]; None if the system does not provide it."""
     try:
         return os.getloadavg()[0]
     except (AttributeError, OSError):

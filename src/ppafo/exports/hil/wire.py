@@ -1,8 +1,8 @@
-"""The wire between a plant and a controller: packets, their search in bytes of any origin, and ports.
+"""Link between plant and controller: packets, their detection in received bytes, and ports.
 
-The page ``docs/wire-protocol.md`` has the protocol as a table. Whatever comes in is checked here: a packet
-is good to its last bit, or it is counted and dropped. A port is a UDP socket or a serial device, opened from a text
-such as ``udp:127.0.0.1:5000``.
+The page ``docs/wire-protocol.md`` describes the protocol as a table. All received data is checked here: a packet is
+either completely valid, or counted and discarded. A port is a UDP socket or a serial device, opened from a text such as
+``udp:127.0.0.1:5000``.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ except ImportError:  # a system without terminals
     TerminalError = OSError  # type: ignore[misc, assignment]
 
 RATE = 1000
-"""Samples per second unless another rate is asked for [Hz]."""
+"""Default sample rate [Hz]."""
 LOWEST_RATE, HIGHEST_RATE = 50, 2000
 MARK = b"\xa5\x5a"
 VERSION = 1
@@ -37,12 +37,12 @@ SAMPLE, ANSWER = 1, 2
 BEGIN, VENTED, OVER, COMPUTED = 1, 2, 4, 8
 """Flags of a sample."""
 UNSOUND = 1
-"""Flag of an answer: both chambers are to be vented, for good."""
+"""Flag of an answer that requests permanent venting of both chambers."""
 FULL_COMMAND = 1_000_000
-"""Counts of a command of 1."""
+"""Counts of the full command 1."""
 MICROSECONDS = 1_000_000
 WRAP = 2**32
-"""Value at which a time stamp goes back to 0."""
+"""Value at which a counter or time stamp wraps around to 0."""
 
 _HEADER = struct.Struct("<2sBBBBHII")
 _WORD = struct.Struct("<i")
@@ -70,14 +70,14 @@ CHANNELS = {
     "direction": 1.0,
     "repetition": 1.0,
 }
-"""SI values of a count of each channel, in the order of the bits of a mask."""
+"""SI value of one count of each channel, in the order of the mask bits."""
 _NAMES = tuple(CHANNELS)
 LONGEST = _SHORTEST + _WORD.size * len(CHANNELS)
-"""Bytes of the longest packet."""
+"""Length [bytes] of the longest packet."""
 
 
 class WireSample(NamedTuple):
-    """A sample of a plant or a bench: flags, run, sequence number, time stamp [us], counts by channel."""
+    """Sample of a plant or a bench: flags, run, sequence number, time stamp [us], counts by channel."""
 
     flags: int
     run: int
@@ -87,7 +87,7 @@ class WireSample(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """An answer of a controller: flags, run and sequence of the sample, its own time stamp [us], counts of command."""
+    """Answer of a controller: flags, run and sequence of the sample, controller time stamp [us], command in counts."""
 
     flags: int
     run: int
@@ -100,23 +100,23 @@ Packet = WireSample | Answer
 
 
 def count_of(name: str, value: float) -> int:
-    """Counts of a channel for a value in SI units, rounded; as far as they go where it is beyond them."""
+    """Return a value in SI units as rounded counts of a channel, clipped to the largest count."""
     counts = value / CHANNELS[name]
     return int(max(-_LARGEST_COUNT, min(_LARGEST_COUNT, math.floor(counts + 0.5))))
 
 
 def value_of(name: str, counts: int) -> float:
-    """SI value of counts of a channel; the nearest float to the decimal fraction that they are."""
+    """Return the SI value of counts of a channel, as the float nearest to the decimal fraction."""
     return counts / counts_per_unit(name)
 
 
 def counts_per_unit(name: str) -> int:
-    """Counts of a channel for 1 in its SI unit; a quotient by it is rounded once, a product with the scale twice."""
+    """Counts of a channel per SI unit; dividing by this integer rounds once, multiplying by the scale twice."""
     return round(1.0 / CHANNELS[name])
 
 
 def sample_bytes(sample: WireSample) -> bytes:
-    """Return the packet that carries a sample to the processor."""
+    """Return the packet of a sample for the controller."""
     # In order of bits, whatever the order of the mapping: the receiver has only the mask.
     mask = sum(1 << _NAMES.index(name) for name in sample.counts)
     values = [sample.counts[name] for name in _NAMES if name in sample.counts]
@@ -124,7 +124,7 @@ def sample_bytes(sample: WireSample) -> bytes:
 
 
 def answer_bytes(answer: Answer) -> bytes:
-    """Return the packet that carries the processor's answer."""
+    """Return the packet of a controller's answer."""
     return _packet(ANSWER, answer[:4], _WORD.pack(answer.command))
 
 
@@ -137,19 +137,19 @@ def _packet(kind: int, head: tuple[int, int, int, int], payload: bytes) -> bytes
 
 
 def sample_length(channels: int) -> int:
-    """Number of bytes of a packet that carries a sample with these channels."""
+    """Return the length [bytes] of a sample packet with a number of channels."""
     return _SHORTEST + _WORD.size * channels
 
 
 REFUSALS = ("stray bytes", "version", "kind", "length", "checksum", "content")
-"""Why bytes are dropped: outside any packet, or of a packet that is wrong in this."""
+"""Causes of discarded bytes: outside any packet, or a packet with a fault in the named part."""
 
 
 @final
 class Reader:
-    """Finds packets in bytes; ``refused`` counts what was dropped, by ``REFUSALS``.
+    """Parser of packets in received bytes; ``refused`` counts discarded data by ``REFUSALS``.
 
-    Bytes of a stream go on from one call to the next, datagrams do not.
+    A stream may split packets between calls; datagrams are complete.
     """
 
     def __init__(self, is_stream: bool) -> None:
@@ -158,7 +158,7 @@ class Reader:
         self._waiting = b""
 
     def take(self, data: bytes) -> list[Packet]:
-        """The good packets in what came in, and in what was waiting for it."""
+        """Return the valid packets in new data, combined with an earlier incomplete packet."""
         if not self.is_stream:
             return self._datagram(data)
         packets: list[Packet] = []
@@ -206,7 +206,7 @@ class Reader:
 
 
 def _wrong_head(data: bytes) -> str | None:
-    """Fault in the bytes after a mark, as far as they have arrived; None if there is none."""
+    """Return the fault in the bytes after a mark, as far as received; None if there is none."""
     if len(data) > 2 and data[2] != VERSION:
         return "version"
     if len(data) > 3 and data[3] not in (SAMPLE, ANSWER):
@@ -219,7 +219,7 @@ def _wrong_head(data: bytes) -> str | None:
 
 
 def _read(data: bytes) -> Packet | str:
-    """The packet that some bytes are, which have the length that they say; or what is wrong with them."""
+    """Return the packet of bytes of complete length, or the name of its fault."""
     if zlib.crc32(data[:-_CHECKSUM]) != int.from_bytes(data[-_CHECKSUM:], "little"):
         return "checksum"
     _, _, kind, _, flags, run, sequence, time = _HEADER.unpack_from(data)
@@ -240,7 +240,7 @@ def _read(data: bytes) -> Packet | str:
 
 
 def described_refusals(refused: Mapping[str, int], others: Iterable[tuple[str, int]] = ()) -> str:
-    """Discarded bytes and messages by cause, in words; ``nothing`` if there were none."""
+    """Discarded bytes and messages by cause, as text; ``nothing`` if there were none."""
     counted = [*((why, refused.get(why, 0)) for why in REFUSALS), *others]
     return ", ".join(f"{count} {why}" for why, count in counted if count) or "nothing"
 
@@ -248,38 +248,38 @@ def described_refusals(refused: Mapping[str, int], others: Iterable[tuple[str, i
 FORMS = "udp:HOST:PORT or serial:DEVICE"
 DEFAULT_BAUD = 921_600
 BITS_OF_A_BYTE = 10
-"""On a serial line: a start bit, eight bits, a stop bit."""
+"""Bits per byte on a serial line: start bit, eight data bits, stop bit."""
 _LARGEST_RECEIVED = 4096
 _HIGHEST_PORT = 65_535
 _STRANGERS_AT_ONCE = 64
-"""Packets of strangers that are looked at in one call: a flood of them must not hold the plant."""
+"""Maximum number of packets from other senders processed in one call, so that a flood cannot block the plant."""
 _WRITE_TIMEOUT = 2.0e-4
-"""Seconds that a serial line has to take a packet; with 0, pyserial tries for ever where nobody reads."""
+"""Write timeout [s] of a serial line; with 0, pyserial would retry forever if nobody reads."""
 
 
 class Port(Protocol):
-    """Something that takes and gives bytes; a failure under way is kept in ``failure``, and then nothing comes."""
+    """Link for sending and receiving bytes; after a fault, stored in ``failure``, nothing is received."""
 
     is_stream: bool
-    """True where bytes follow each other, false where they come packet by packet."""
+    """True for a byte stream, False for separate datagrams."""
     failure: str
     """Fault during the run; empty without one."""
     strangers: int
-    """Packets of somebody else, which were dropped."""
+    """Number of discarded packets from other senders."""
 
     def send(self, data: bytes) -> None:
-        """Send a packet, or drop it where that would take time."""
+        """Send a packet without blocking, or drop it."""
 
     def receive(self, timeout: float) -> bytes:
-        """Bytes received within a time [s]; empty on a timeout."""
+        """Return bytes received within a time [s]; empty on a timeout."""
 
     def close(self) -> None:
-        """Give the port back."""
+        """Release the port."""
 
 
 @final
 class _UdpPort:
-    """A UDP socket that talks to one other: the one that it was given, or the first that sends it a good packet."""
+    """UDP socket with a single peer: the given one, or the first sender of a valid packet."""
 
     is_stream = False
 
@@ -292,7 +292,7 @@ class _UdpPort:
         self._socket.setblocking(False)
 
     def send(self, data: bytes) -> None:
-        """Send a packet to the other side, once it is known."""
+        """Send a packet to the peer, if known."""
         if self._other is None:
             return
         # A full buffer or an answer that nobody listens is a lost packet, which is what UDP may do.
@@ -300,7 +300,7 @@ class _UdpPort:
             self._socket.sendto(data, self._other)
 
     def receive(self, timeout: float) -> bytes:
-        """The first packet of the other side within a time [s]; a datagram without a byte is none."""
+        """Return the first packet of the peer within a time [s]; empty datagrams are skipped."""
         until = time.perf_counter() + timeout
         for _ in range(_STRANGERS_AT_ONCE):
             ready, _, _ = select.select([self._socket], [], [], max(0.0, until - time.perf_counter()))
@@ -322,13 +322,13 @@ class _UdpPort:
         return b""
 
     def close(self) -> None:
-        """Give the socket back."""
+        """Close the socket."""
         self._socket.close()
 
 
 @final
 class _SerialPort:
-    """A port to a processor on a serial line, by pyserial."""
+    """Serial port, by pyserial."""
 
     is_stream = True
     strangers = 0
@@ -338,13 +338,13 @@ class _SerialPort:
         self._device = device
 
     def send(self, data: bytes) -> None:
-        """Send a packet; it is lost where the line takes no more."""
+        """Send a packet; it is lost if the line does not accept it in time."""
         if not self.failure:
             with self._watched():
                 self._device.write(data)
 
     def receive(self, timeout: float) -> bytes:
-        """Bytes received, as soon as there are any, within a time [s]."""
+        """Return the bytes received, as soon as there are any, within a time [s]."""
         if self.failure:
             time.sleep(timeout)
             return b""
@@ -356,7 +356,7 @@ class _SerialPort:
 
     @contextlib.contextmanager
     def _watched(self) -> Iterator[None]:
-        """Keep a failure of the device, and let go of what takes too long."""
+        """Store a fault of the device, and ignore timeouts."""
         import serial
 
         try:
@@ -367,15 +367,15 @@ class _SerialPort:
             self.failure = f"the serial port broke: {one_line(error)}"
 
     def close(self) -> None:
-        """Give the device back."""
+        """Close the device."""
         with contextlib.suppress(OSError):
             self._device.close()
 
 
 def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Port:
-    """Open a port of a text; one that ``listens`` waits at a UDP address for the first sender of a good packet.
+    """Open a port from a text; with ``listens``, a UDP port waits for the first sender of a valid packet.
 
-    ScenarioError, in one line, for a text that is none, and for a port that is not there.
+    Raises ScenarioError for an invalid text, and for a port that cannot be opened.
     """
     kind, _, address = text.partition(":")
     if kind == "udp":
@@ -402,7 +402,7 @@ def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Por
 
 
 def _is_terminal(address: str) -> bool:
-    """Tell whether a path is a serial port, or may be one as far as this user can see."""
+    """Return True if a path is a serial port, or this user cannot determine it."""
     if os.name != "posix" or not os.access(address, os.R_OK | os.W_OK):
         return True
     if not Path(address).is_char_device():

@@ -23,13 +23,17 @@ class Convention:
 
 @dataclass(frozen=True, slots=True)
 class GaitForm:
-    """File format of gait recordings: name, short summary, and suffixes in lower case, with the dot.
+    """File format of gait recordings.
 
-    ``read`` returns time [s], columns and units of a file, with an empty ``form``, or raises DataError. ``convention``
-    returns the meaning of the columns for a foot and a body mass [kg], used without a gait map of the user.
-    ``recognises`` detects the format by the content of a file, for suffixes that several formats share. ``arrange``
-    changes a table before its columns are interpreted. ``is_whole`` is True if a file contains all curves of a foot, so
-    that no file of another format can be combined with it.
+    - ``name``, ``summary``: name, and summary in a phrase
+    - ``suffixes``: file suffixes in lower case, with the dot
+    - ``read``: function that returns time [s], columns and units of a file, with an empty ``form``, or raises DataError
+    - ``convention``: function that returns the meaning of the columns for a foot and a body mass [kg], used without a
+      gait map of the user
+    - ``recognises``: function that detects the format by the content of a file, for suffixes that several formats share
+    - ``arrange``: function that changes a table before its columns are interpreted
+    - ``is_whole``: True if a file contains all curves of a foot, so that no file of another format can be combined with
+      it
     """
 
     name: str

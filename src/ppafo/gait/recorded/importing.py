@@ -283,7 +283,7 @@ def _gait(
 _COARSE_RATE = 50.0
 """Sampling rate [Hz] below which the error of an event exceeds a hundredth of a stride."""
 _NOISY_FORCE = 0.02
-"""Standard deviation of the force in swing [body weights] above which it is remarked; events are at 0.05 and 0.03."""
+"""Standard deviation of the force in swing [body weights] for a remark; events are at 0.05 and 0.03."""
 _WITHIN_SWING = 0.1
 """Fraction of the swing at both ends in which the foot may still touch the plate."""
 

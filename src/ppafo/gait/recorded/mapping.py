@@ -32,7 +32,7 @@ _Flexion = Literal["plantarflexion", "dorsiflexion"]
 
 
 class ShankMap(StrictTable):
-    """Shank angle: a sum of columns, or two markers and the axes of the laboratory."""
+    """Shank angle: a sum of columns, or computed from two markers and the laboratory axes."""
 
     terms: _Terms | None = None
     unit: _Unit = None
@@ -52,9 +52,9 @@ class ShankMap(StrictTable):
 
 
 class AngleMap(StrictTable):
-    """Ankle angle: a sum of columns, or two markers of the foot, whose line turns against the shank.
+    """Ankle angle: a sum of columns, or the angle between the line of two foot markers and the shank.
 
-    With markers the zero is the foot that stands flat, and ``neutral`` is taken off as it is from columns.
+    With markers, the zero is the flat foot; ``neutral`` is subtracted in both cases.
     """
 
     terms: _Terms | None = None
@@ -90,7 +90,7 @@ class MomentMap(StrictTable):
 
 
 class ForceMap(StrictTable):
-    """Vertical ground reaction on this foot, in N or, as a plain number '-', in body weights."""
+    """Vertical ground reaction on this foot, in N, or in body weights with the unit '-'."""
 
     terms: _Terms
     unit: _Unit = None
@@ -106,7 +106,7 @@ class PressureMap(StrictTable):
 
 
 class KneeMap(StrictTable):
-    """Knee in the sagittal plane: its position in m or its acceleration in m/s^2, or hip and thigh instead."""
+    """Knee in the sagittal plane: position in m or acceleration in m/s^2, or hip position and lean of the thigh."""
 
     forward: _Terms
     up: _Terms
@@ -209,12 +209,18 @@ def json_schema() -> dict[str, Any]:
 class ImportSettings:
     """Settings of the import of a gait.
 
-    ``body_mass`` [kg] may be None if a file states it. ``columns`` is the gait map, ``walking_speed`` is in [m/s], and
-    ``low_pass`` [Hz] is the cut-off frequency. ``least_strides`` is the least number of strides; default 2, and 1
-    overground or for a single cycle. ``stature`` [m] gives the length of the thigh if no map does. ``start`` and
-    ``end`` [s] limit the files, and gaps up to ``longest_gap`` [s] are filled. ``ankle_neutral`` [rad] is the reading
-    with the foot perpendicular to the shank; it overrides map and convention. ``form`` names the file format; it is
-    detected if empty.
+    - ``body_mass``: body mass [kg], None if a file states it
+    - ``side``: side of the foot
+    - ``columns``: gait map, None for the default of the file format
+    - ``walking_speed``: walking speed [m/s]
+    - ``low_pass``: cut-off frequency [Hz], None for no filter
+    - ``least_strides``: least number of strides; default 2, and 1 overground or for a single cycle
+    - ``name``, ``title``: name and title of the gait
+    - ``stature``: stature [m], gives the length of the thigh if no map does
+    - ``start``, ``end``: limits of the used part of the files [s]
+    - ``longest_gap``: longest gap that is filled [s]
+    - ``ankle_neutral``: reading [rad] with the foot perpendicular to the shank; it overrides map and convention
+    - ``form``: name of the file format, detected if empty
     """
 
     body_mass: float | None = None

@@ -70,7 +70,7 @@ def read_table(
 ) -> MotionTable:
     """Return the table in a file of any format, from ``start`` to ``end`` [s]; ``form`` names the format.
 
-    Missing rows are interpolated up to a gap of ``longest_gap`` [s], which is remarked.
+    Gaps of up to ``longest_gap`` [s] are interpolated, with a remark on each gap.
     """
     chosen = form_of(path, form)
     return cut_table(replace(chosen.read(path), form=form or chosen.name), longest_gap, start, end)

@@ -50,7 +50,7 @@ class GasAt:
 
     @property
     def choked_flow_constant(self) -> float:
-        """C1 [s/m] of equation (6)."""
+        """Choked-flow constant C1 [s/m] of equation (6)."""
         return choked_flow_constant(self.heat_capacity_ratio, self.specific_gas_constant, self.temperature)
 
     @property

@@ -126,14 +126,14 @@ def free_decay(
     confidence: float = 0.95,
     tolerances: Tolerances = DEFAULTS,
 ) -> BenchResult:
-    """Return viscous damping [N m s/rad] and dynamic friction [N m], or both divided by inertia [1/s, rad/s^2]; (1).
+    """Return viscous damping [N m s/rad] and dynamic friction [N m], or both divided by inertia [1/s, rad/s^2].
 
-    Angle and, if recorded, angular velocity are fitted. Several recordings are several impulses to the same device,
-    with common parameters and separate initial states. The vane turns freely from ``start`` to ``end`` [s]; without
-    ``start`` the decay starts at the largest speed. ``inertia_deviation`` is the standard deviation of ``inertia`` [kg
-    m^2]; without an inertia only ratios to it are estimated. ``rise`` is the ratio of friction at rest to dynamic
-    friction, minus 1 [-], by which seals may grip near standstill. Raises IdentificationError, with file, sample and
-    remedy, for recordings from which neither can be estimated.
+    The model is equation (1). Angle and, if recorded, angular velocity are fitted. Several recordings are several
+    impulses to the same device, with common parameters and separate initial states. The vane turns freely from
+    ``start`` to ``end`` [s]; without ``start`` the decay starts at the largest speed. ``inertia_deviation`` is the
+    standard deviation of ``inertia`` [kg m^2]; without an inertia only ratios to it are estimated. ``rise`` is the
+    ratio of friction at rest to dynamic friction, minus 1 [-], by which seals may grip near standstill. Raises
+    IdentificationError, with file, sample and remedy, for recordings from which neither can be estimated.
     """
     check_sources(sources, PROCEDURE, (ANGLE,), MINIMUM_SAMPLES)
     sources, said = without_wrong_samples(sources, PROCEDURE, (ANGLE, VELOCITY), start, end)

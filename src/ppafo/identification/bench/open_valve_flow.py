@@ -56,12 +56,12 @@ def open_valve_flow(
     confidence: float = 0.95,
     tolerances: Tolerances = DEFAULTS,
 ) -> BenchResult:
-    """Return Cd [-] or Cd A [m^2], or C [m^3/(s Pa)] and b [-], or c [kg/(s Pa^2)], of the open valve; (6), (7).
+    """Return the estimated Cd [-] or Cd A [m^2], C [m^3/(s Pa)] and b [-], or c [kg/(s Pa^2)] of the open valve.
 
-    With an ``area`` [m^2] the orifice law gives Cd, without one the product Cd A. The law ``both`` gives Cd, Cd A or,
-    with a ``critical_ratio`` [-], C, together with c of a parallel laminar gap. ``path`` is the path of the valve in a
-    set (``valves.main``). Raises IdentificationError, with file, sample and remedy, for recordings from which the flow
-    law cannot be estimated.
+    The laws are equations (6) and (7), ISO 6358, and a laminar gap. With an ``area`` [m^2] the orifice law gives Cd,
+    without one the product Cd A. The law ``both`` gives Cd, Cd A or, with a ``critical_ratio`` [-], C, together with c
+    of a parallel laminar gap. ``path`` is the path of the valve in a set (``valves.main``). Raises IdentificationError,
+    with file, sample and remedy, for recordings from which the flow law cannot be estimated.
     """
     upstream, downstream, flow, labels, remarks = open_readings(sources, gas, tolerances)
     # Beside a laminar gap the critical ratio decides whether the opening is an orifice.

@@ -63,12 +63,12 @@ _SIGMAS = 4.0
 def static_torque(
     sources: tuple[RecordingSource, ...], confidence: float = 0.95, tolerances: Tolerances = DEFAULTS
 ) -> BenchResult:
-    """Return torque constant [m^3], friction without pressure [N m], its growth [m^3], zero of the scale [N m]; (2).
+    """Return torque constant [m^3], friction without pressure [N m], its growth [m^3] and zero of the scale [N m].
 
-    The friction is static, or kinetic if the actuator slid. For a force the units are m^2 and N. Readings with
-    direction 0 belong to no branch and are left out. So is a flat start of the rising branch, where a scale that only
-    pulls shows nothing until friction is overcome. Raises IdentificationError, with file, sample and remedy, for
-    recordings that cannot separate the unknowns.
+    The model is equation (2). The friction is static, or kinetic if the actuator slid. For a force the units are m^2
+    and N. Readings with direction 0 belong to no branch and are left out. So is a flat start of the rising branch,
+    where a scale that only pulls shows nothing until friction is overcome. Raises IdentificationError, with file,
+    sample and remedy, for recordings that cannot separate the unknowns.
     """
     readings = readings_of(sources)
     names = readings.names

@@ -78,7 +78,7 @@ def valve_map(
     confidence: float = 0.95,
     tolerances: Tolerances = DEFAULTS,
 ) -> BenchResult:
-    """Return dead band [-], gain [m^2], saturation and hysteresis [-] from command and flow; equations (6), (7).
+    """Return dead band [-], gain [m^2], saturation [-] and hysteresis [-] from command and flow; equations (6), (7).
 
     ``path`` is the path of the valve in a set (``valves.main``). Raises IdentificationError, with file, sample and
     remedy, for recordings from which the map cannot be estimated.

@@ -230,7 +230,7 @@ def _known(fitted: Fit, number: FitNumber, row: int, error: float, estimates: Se
 
 
 def _wandering(fitted: Fit, numbers: tuple[FitNumber, ...]) -> str:
-    """Return a sentence on a channel whose residual drifts by more than the limit of its zero error, else "".
+    """Return a sentence on a channel whose residual drifts beyond the limit of its zero error; empty if none does.
 
     The zero of a sensor stays within its limit, so that a larger drift must come from the model.
     """
@@ -257,7 +257,7 @@ _AT_BOUND = 1.0e-6
 
 
 def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: int, conflict: str) -> Estimate:
-    """Return one estimate with its verdict and sentence."""
+    """Return the estimate of one parameter with its verdict and explanation."""
     value, low, high = (float(column[row]) for column in (fitted.values, fitted.low, fitted.high))
     name, free = number.free.name, number.free
     bound = next((end for end in (free.low, free.high) if abs(value - end) <= _AT_BOUND * abs(end or 1.0)), None)

@@ -1,47 +1,46 @@
-"""A scenario or a walk as a WebAssembly module, for a page that simulates; this is how such a module is called.
+"""WebAssembly modules of scenarios and walks, for pages that simulate: interface and description.
 
-``module_of(scenario)`` gives the ``wasm`` bytes and a ``description``, plain data for JSON with what a person and a
-page must know of each setting, channel and metric. A module imports nothing. It needs 128-bit vectors, which
-every browser in use has; without them ``WebAssembly.validate`` says false. All numbers are 64-bit floats in SI units,
-pressures absolute; all arguments and results are 32-bit integers, and pointers are bytes from the start of ``memory``.
+``module_of(scenario)`` returns the ``wasm`` bytes and a ``description``, plain data for JSON on each setting, channel
+and metric. A module imports nothing. It needs 128-bit vectors, which every browser in use supports; without them
+``WebAssembly.validate`` returns false. All numbers are 64-bit floats in SI units, pressures absolute. All arguments
+and results are 32-bit integers; pointers are byte offsets from the start of ``memory``.
 
 Memory
-    ``reserve(bytes)`` gives the place of so many bytes, or 0 where there are no more; places are multiples of 16. The
-    memory may grow in ``reserve``, ``run`` and ``ensemble``: views (``Float64Array``) are made anew after each of
-    them. ``release(place)`` gives back everything that was reserved from that place on.
+    ``reserve(bytes)`` returns a 16-byte aligned pointer to a block of this size, or 0 if memory is exhausted. The
+    memory may grow in ``reserve``, ``run`` and ``ensemble``: create views (``Float64Array``) again after each of them.
+    ``release(pointer)`` frees this block and all blocks reserved after it.
 
 One run, with S settings, C channels (the first is ``time``) and M metrics as listed in the description
-    ``check(settings)`` is -1 where the S numbers at ``settings`` are good, the place of the first one that is out of
-    range or contradicts another, or S more than the place of one for which they need other functions than there are
-    here: what is ``kept`` was not, or samples come more often than steps.
-    ``samples(settings)`` is the number of samples N of the run, 0 where ``check`` is not -1.
+    ``check(settings)`` returns -1 if the S numbers at ``settings`` are valid. It returns the index of the first number
+    that is out of range or contradicts another. It returns S plus the index of a number that needs another program: a
+    ``kept`` setting has changed, or samples are more frequent than steps.
+    ``samples(settings)`` returns the number of samples N of the run, 0 if ``check`` does not return -1.
     ``run(settings, columns, metrics, good)`` returns a status. It writes C columns of N numbers, one after the other,
-    and M metrics, NaN where one has no value, and all of them where the run was not completed. ``good`` is the place of
-    one 32-bit integer: the number of samples from the first on that hold, N where the run was completed.
+    and M metrics. A metric without a value is NaN; all are NaN if the run was not completed. ``good`` points to a
+    32-bit integer: the number of valid samples from the first on, N if the run was completed.
 
 Many runs
     ``ensemble(settings, runs, metrics, statuses, channel, every, places, traces)`` takes ``runs`` times S settings,
-    writes ``runs`` times M metrics and ``runs`` 32-bit statuses, and returns 0, or 4 where memory does not suffice.
-    With ``channel`` -1 the last three are 0. Otherwise it also writes ``runs`` times ``places`` numbers: every
-    ``every``-th sample of a channel, from the first on. Channels count as in the description without ``time``, so
-    that 0 is the first after it; with ``channel`` -2 it writes all of them, for each run ``places`` numbers of one
-    after the other's. Beyond the last sample of a run, and in runs that were not completed, there is NaN, as
-    in the metrics of the latter. Runs are quickest eight at a time with the same ``run``, delay and
-    ``controller.period``.
+    writes ``runs`` times M metrics and ``runs`` 32-bit statuses, and returns 0, or 4 if memory is exhausted.
+    With ``channel`` -1 the last three arguments are 0. Otherwise it also writes ``runs`` times ``places`` numbers to
+    ``traces``: every ``every``-th sample of a channel, from the first on. Channel 0 is the first after ``time`` in the
+    description; with ``channel`` -2 all channels are written, for each run ``places`` numbers per channel. Samples
+    after the end of a run, and samples and metrics of runs that were not completed, are NaN. Groups of eight runs
+    with the same ``run``, delay and ``controller.period`` are fastest.
 
 Statuses: 0 completed, 1 diverged, 2 diverged in too many parts of a step, 3 refused by ``check``, 4 no memory.
 
-What a module gives has the bits of ``ppafo.simulate`` for the same settings, in every sample of every channel; metrics
-differ by rounding, as an ensemble's do. Each instance has a memory of its own: one for each worker. The bytes
-are a translation unit's in C, built by ziglang, or what was built of the same one before.
+Every sample of every channel is bit-identical to ``ppafo.simulate`` for the same settings. Metrics differ by rounding,
+as in an ensemble. Each instance has its own memory; create one for each worker. A module is compiled from a C
+translation unit by ziglang, or taken from an earlier compilation of the same text.
 
-What a page must know of a module: settings with range, unit and origin, channels, metrics; plain data for JSON.
+Description of a module as plain data for JSON: settings with range, unit and origin, channels and metrics.
 
 ::
 
     {"name": ..., "title": ..., "version": ..., "kind": "scenario" or "walk",
      "document": the scenario or walk as its file has it, without overrides,
-     "overrides": those of it,
+     "overrides": overrides of the scenario or walk,
      "settings": [{"key": "valve.area", "group": "valve", "name": "area", "unit": "m^2", "value": 1.26e-05,
                    "minimum": 0.0 or null, "is_minimum_allowed": true, "maximum": 0.01 or null, "is_whole": false,
                    "display": {"unit": "mm^2", "factor": 1e-06, "zero": 0.0}, "description": ..., "origin": "published",
@@ -52,14 +51,14 @@ What a page must know of a module: settings with range, unit and origin, channel
      "channels": [{"name": "time", "unit": "s", "display": {...}, "description": ...}, ...],
      "metrics": [{"name": ..., "unit": ..., "display": {...}, "description": ...}, ...],
      "relations": [{"key": ..., "relation": "below", "at most", "at least" or "above", "other": key,
-                    "tolerance": 0.0, "is_share": true where that is a share of the other}, ...]}
+                    "tolerance": 0.0, "is_share": true for a tolerance that is a fraction of the other}, ...]}
 
-``key=value unit`` is an override of the scenario as ``ppafo simulate --set`` takes it. A value in SI is ``zero`` plus
-``factor`` times the one that is shown. ``origin`` is the parameter set's (published, datasheet, derived,
-identified, fitted, assumed), ``task`` for a number of the scenario itself, ``default`` for one that is not given, or
-``changed`` for one that an override or a caller put there. What ``follows`` another setting is the same number as
-long as it is not changed itself; what is ``made`` of others is the sum of a gap and of what rules make of them.
-``kept`` says that a setting must stay 0, or above 0, as another program would be needed.
+``key=value unit`` is an override of the scenario, as in ``ppafo simulate --set``. A value in SI is ``zero`` plus
+``factor`` times the displayed value. ``origin`` is the origin stated by the parameter set (published, datasheet,
+derived, identified, fitted, assumed), ``task`` for a number of the scenario itself, ``default`` for a number that is
+not given, or ``changed`` for a number set by an override or a caller. A setting with ``follows`` equals the named
+setting until changed itself. A setting with ``made`` is the sum of a gap and of rules applied to other settings.
+``kept`` requires a setting to stay 0, or above 0; otherwise another program would be needed.
 """
 
 import contextlib
@@ -112,7 +111,7 @@ _DEFAULT = {**_TASK, "origin": "default"}
 
 
 def description_of(scenario: Scenario, library: Library) -> dict[str, Any]:
-    """The description of the module of a scenario or a walk, as the beginning of this file has it."""
+    """Return the description of the module of a scenario or walk, in the form given in the module docstring."""
     keys = {setting.name: setting.path for setting in library.settings}
     origins, kept = _origins(scenario, library), _kept(library)
     # Settings that have the number of another until they are changed by themselves.
@@ -170,7 +169,7 @@ def description_of(scenario: Scenario, library: Library) -> dict[str, Any]:
 
 
 def _kept(library: Library) -> dict[str, str]:
-    """Settings, by name in C, that must stay zero or above zero: a switch is fixed by its sole positive setting."""
+    """Settings, by C name, that must stay zero or above zero: the only positive setting of a switch is fixed."""
     values = {setting.name: setting.value for setting in library.settings}
     kept: dict[str, str] = {}
     for names, is_above in library.switches:
@@ -206,9 +205,10 @@ def _shown(name: str, unit: str, said: str, atmosphere: float) -> dict[str, Any]
 
 
 def display_of(unit: str, atmosphere: float, kilograms: str = "mass", is_absolute: bool = False) -> dict[str, Any]:
-    """Display unit of a quantity and its conversion: SI value = ``zero`` + ``factor`` * displayed value.
+    """Return the display unit of a quantity and its conversion: SI value = ``zero`` + ``factor`` * displayed value.
 
-    Gauge pressures count from ``atmosphere`` [Pa], but where ``is_absolute``; ``kilograms`` is what a mass is.
+    Pressures are gauge pressures relative to ``atmosphere`` [Pa], unless ``is_absolute``; ``kilograms`` is the kind of
+    quantity of a mass.
     """
     quantity = kilograms if unit == "kg" else quantity_of_unit(unit)
     if not quantity:
@@ -228,7 +228,7 @@ def display_of(unit: str, atmosphere: float, kilograms: str = "mass", is_absolut
 
 
 def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
-    """Origin of the value of each setting, by path."""
+    """Return the origin of each setting's value, by path."""
     origin, device = scenario.origin, scenario.device
     # None where the set cannot be read any more.
     parameter_set: ParameterSet | None = None
@@ -256,7 +256,7 @@ def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
 def _of_set(
     parameter_set: ParameterSet | None, device: Device, setting: ExportParameter, *, follows: bool
 ) -> dict[str, Any]:
-    """Origin of a number of the device: the set's where it has this very value, the default's where it ``follows``."""
+    """Return the origin of a device number: from the set if unchanged, ``default`` if it ``follows`` another."""
     if parameter_set is None:
         return _CHANGED
     path = setting.path
@@ -279,17 +279,17 @@ def _of_set(
 
 
 LANES = 8
-"""Runs that go on together: with more of them their numbers leave the registers of today's browsers."""
+"""Number of runs computed together; with more, their numbers would not fit the registers used by current browsers."""
 TARGET = ("--target=wasm32-freestanding", "-mcpu=generic+simd128+bulk_memory")
 # -O2 makes modules 14 % larger and no quicker.
 STRICT = ("-std=c99", "-Os", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
 _FREESTANDING = ("-nostdlib", "-fno-sanitize=undefined", "-fvisibility=hidden", "-Wno-pass-failed", "-I.")
 STACK = 262144
-"""Bytes for the numbers of a run under way."""
+"""Stack size [bytes] for a run."""
 _LINKED = ("-Wl,--no-entry", "-Wl,--strip-all", f"-Wl,-z,stack-size={STACK}")
 FLAGS = (*TARGET, *STRICT, *_FREESTANDING, *_LINKED)
 INDEX = "index.json"
-"""File of the prebuilt programs that says of which text each was made, and by which version of the compiler."""
+"""Index file of the prebuilt programs: digest of the C text of each, and version of the compiler."""
 _TITLE = "The functions that a run is made of, from ppafo."
 _COMMENT = re.compile(r"\s*/\*.*?\*/\s*", re.DOTALL)
 _INSIDE = re.compile(r"(?:PPAFO_INLINE\s[\w\s*]*?\b|^\} )(\w+)(?=[(;])", re.MULTILINE)
@@ -299,18 +299,18 @@ _HOW_TO_INSTALL = "pip install 'ppafo[workbench]'"
 
 
 _WRITERS = ("exports", "gait", "page", "parameters", "simulation", "translation", "walking")
-"""Folders of the package that have a part in the text of a module, beside those of a program."""
+"""Package folders that contribute to the C text of a module, in addition to the folders of a program."""
 WRITTEN_BY = (*COMPOSED, *_WRITERS)
 SHIPPED_KEYS = "shipped.json"
-"""File that says which program each shipped scenario and walk has, and for which files of the package that holds."""
+"""File with the program digest of each bundled scenario and walk, and the package files for which it is valid."""
 _OF_THE_COMPUTER = "ppafo.translation.native"
-"""Module whose values are of the compilers and the processor of this computer, and in no text."""
+"""Module whose values depend on the compilers and processor of this computer and enter no C text."""
 
 
 def program_of(library: Library, scenario: Scenario) -> bytes:
-    """The module of a scenario's library: the one that comes with the package where it is the same, else a new one.
+    """Return the WebAssembly of a scenario's library: the bundled one if identical, else compiled now.
 
-    Neither the text nor a module is made twice on a computer.
+    C text and module are cached on disk.
     """
     key = package_key(scenario, WRITTEN_BY)
     if key is None:
@@ -326,7 +326,7 @@ def program_of(library: Library, scenario: Scenario) -> bytes:
 
 
 def _shipped_digest(key: Key) -> str:
-    """The digest of a shipped scenario's text without composing it; empty for others, and after any change of code."""
+    """Return the stored digest of a bundled scenario's C text; empty for others, and after any change of code."""
     shipped = _shipped_keys()
     is_as_shipped = key.files == shipped["files"] and all(
         shipped["values"].get(module) == value for module, value in key.values.items() if module != _OF_THE_COMPUTER
@@ -335,19 +335,19 @@ def _shipped_digest(key: Key) -> str:
 
 
 def short_digest(described: str) -> str:
-    """A short name of a described scenario."""
+    """Return a short hash of a scenario description."""
     return hashlib.sha256(described.encode()).hexdigest()[:16]
 
 
 @cache
 def _shipped_keys() -> dict[str, Any]:
-    """Digests of shipped scenarios and walks, and the files and values of the package for which they hold."""
+    """Return the digests of bundled scenarios and walks, with the package files and values for which they are valid."""
     keys: dict[str, Any] = json.loads(files("ppafo.page.wasm").joinpath(SHIPPED_KEYS).read_text(encoding="utf-8"))
     return keys
 
 
 def _known_digest(library: Library) -> str:
-    """The digest of a library's text, whatever the values of its settings are."""
+    """Return the digest of a library's C text, which does not depend on the values of its settings."""
     from ppafo.exports.c_library.program import outline_of  # most digests are kept
 
     # What decides the translation unit: what its functions are made from, and what translates them.
@@ -364,7 +364,7 @@ def _known_digest(library: Library) -> str:
 
 
 def source_of(library: Library) -> str:
-    """The translation unit of a library. Values of settings are not in it: other numbers, same program."""
+    """Return the C translation unit of a library, which does not contain the values of settings."""
     from ppafo.exports.c_library.program import c_text
 
     names = [setting.name for setting in library.settings]
@@ -372,7 +372,7 @@ def source_of(library: Library) -> str:
 
 
 def _unit(library: Library, functions: str) -> str:
-    """The translation unit around functions."""
+    """Return the C translation unit that wraps the given functions."""
     program, names = library.program, [setting.name for setting in library.settings]
     assignments = [f"given[SETTING_{name.upper()}] = settings->{name};" for name in names]
     arrays = ", ".join(f"array_of({name}, {count}, 0, 0)" for name, count in _ARRAYS.items())
@@ -406,11 +406,11 @@ _ARRAYS = {
     "prepared->states": "STATES",
     "prepared->counts": "COUNTS",
 }
-"""Arrays of the function from settings to the numbers of a run, and the size of each."""
+"""Array arguments of the function ``prepare``, with the size of each."""
 
 
 def _chosen_loop(program: ExportedProgram, ending: str) -> str:
-    """Lines that call the lane loop that the clock asks for."""
+    """Return C lines that call the lane loop selected by the clock."""
     if not program.program.chooses_parts:
         return f"GO_ON({WHOLE}{ending});"
     in_parts, whole = (f"        GO_ON({name}{ending});\n" for name in (IN_PARTS, WHOLE))
@@ -418,10 +418,10 @@ def _chosen_loop(program: ExportedProgram, ending: str) -> str:
 
 
 def digest_of(text: str) -> str:
-    """A short name of everything that decides the bytes of a module but the compiler.
+    """Return the digest of a C text, for everything but the compiler that determines the bytes of a module.
 
-    Comments do not, nor lines, nor what functions and types inside are called: those have the place of their Python
-    in their names, and a program of the package stays good where that is moved.
+    Comments, line breaks and names of internal functions and types are ignored. These names contain the location of
+    their Python source, and a bundled program remains valid if the source is moved.
     """
     code = _COMMENT.sub("", "\n".join([*FLAGS, template(__name__, "math.h"), text]))
     places = {name: f"n{number}" for number, name in enumerate(dict.fromkeys(_INSIDE.findall(code)))}
@@ -430,7 +430,7 @@ def digest_of(text: str) -> str:
 
 
 def check_can_build() -> None:
-    """Raise ProgramError where ziglang is not there."""
+    """Raise ProgramError if ziglang is not installed."""
     if importlib.util.find_spec("ziglang") is None:
         raise ProgramError(
             "this scenario needs functions that no program of the package has, and ziglang to build them: "
@@ -439,7 +439,7 @@ def check_can_build() -> None:
 
 
 def build(text: str) -> bytes:
-    """A module of a translation unit. ProgramError where ziglang is not there, or refuses."""
+    """Compile a translation unit to WebAssembly; ProgramError if ziglang is missing or fails."""
     check_can_build()
     sources = {"module.c": text.encode(), "math.h": template(__name__, "math.h").encode()}
     with temporary_folder("ppafo", sources) as folder:
@@ -453,7 +453,7 @@ def build(text: str) -> bytes:
 
 
 def compiler_version() -> str:
-    """Version of the package ziglang; empty where it is not there."""
+    """Return the version of the package ziglang; empty if not installed."""
     from importlib.metadata import version
 
     return version("ziglang") if importlib.util.find_spec("ziglang") is not None else ""
@@ -464,7 +464,7 @@ _PROGRAMS = files("ppafo.page.wasm").joinpath("programs")
 
 @cache
 def prebuilt_programs() -> dict[str, str]:
-    """Names of the files of prebuilt programs by the digest of their text."""
+    """Return the file names of prebuilt programs by the digest of their C text."""
     programs: dict[str, str] = json.loads(_PROGRAMS.joinpath(INDEX).read_text(encoding="utf-8"))["programs"]
     return programs
 
@@ -472,18 +472,18 @@ def prebuilt_programs() -> dict[str, str]:
 @final
 @dataclass(frozen=True, slots=True)
 class WasmModule:
-    """The bytes of a module, and the description of what it simulates (plain data, by ``description_of``)."""
+    """Bytes of a WebAssembly module, and its description as plain data (``description_of``)."""
 
     wasm: bytes
     description: dict[str, Any]
 
 
 def module_of(scenario: Scenario) -> WasmModule:
-    """A scenario or a walk as a module.
+    """Return a scenario or walk as a WebAssembly module.
 
-    Its program comes with the package where a shipped scenario or walk has the same one, whatever its numbers are, and
-    is built otherwise. ProgramError where that needs the package ``ziglang``, which is not there, or where something in
-    it cannot be translated; ScenarioError for a walk that cannot be exported.
+    The bundled program is used if a bundled scenario or walk has the same one, with any numbers; otherwise it is
+    compiled. Raises ProgramError if this needs the package ``ziglang`` and it is missing, or if code cannot be
+    translated; ScenarioError for a walk that cannot be exported.
     """
     library = library_of(scenario)
     return WasmModule(program_of(library, scenario), description_of(scenario, library))

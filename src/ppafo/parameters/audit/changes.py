@@ -14,7 +14,7 @@ from ppafo.parameters.parameter_set import (
 )
 
 _SAME = 1e-12
-"""Relative difference that a change of unit leaves."""
+"""Relative difference caused by conversion to another unit."""
 
 
 @dataclass(frozen=True, slots=True)

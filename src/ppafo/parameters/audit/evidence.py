@@ -69,7 +69,7 @@ class AuditFinding:
 GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
 
 _SMALLEST, _LARGEST = 1e-20, 1e20
-"""SI magnitudes beyond which a number is a slip, and products of numbers leave the range of floating point."""
+"""Limits of SI magnitudes: numbers beyond are typing errors, and their products would overflow."""
 
 
 class ReportedRange(NamedTuple):
@@ -79,11 +79,11 @@ class ReportedRange(NamedTuple):
     high: float
 
     def times(self, other: "ReportedRange") -> "ReportedRange":
-        """Return the interval of the product."""
+        """Return the interval of the product of this number and another."""
         return ReportedRange(self.low * other.low, self.high * other.high)
 
     def over(self, other: "ReportedRange") -> "ReportedRange":
-        """Return the interval of the quotient."""
+        """Return the interval of this number divided by another."""
         return ReportedRange(self.low / other.high, self.high / other.low)
 
     def meets(self, other: "ReportedRange") -> bool:

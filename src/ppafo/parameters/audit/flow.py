@@ -53,7 +53,7 @@ _TUBES = {
     "1/4 inch": _INCH / 4.0,
     "3/8 inch": 3.0 * _INCH / 8.0,
 }
-"""Diameters [m] in which tube and ports come."""
+"""Standard inner diameters [m] of tubes and ports."""
 # Areas are reported to three digits.
 _SAME_BORE = 0.005
 
@@ -164,7 +164,7 @@ def _value(node: ast.expr, k: float) -> float:
 _C1 = "reported.choked_flow_constant"
 _EXPONENT = "reported.choked_flow_exponent"
 _ROUNDING = 1e-3
-"""Relative room beside the reported digits: other values of R, M and 273 or 273.15."""
+"""Relative tolerance beyond the reported digits, for other values of R, M and 273 or 273.15 K."""
 
 
 def check_choked_flow(evidence: Evidence) -> Iterator[AuditFinding]:
@@ -246,7 +246,7 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[AuditFinding]:
 # Do the reported flows follow from discharge coefficient and area? Equations (6) and (7).
 
 _MODEL = 0.02
-"""Relative room for the model itself: measured flow is rarely better."""
+"""Relative tolerance of the flow model, about the accuracy of a flow measurement."""
 
 
 @dataclass(frozen=True, slots=True)

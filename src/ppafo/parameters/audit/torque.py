@@ -157,7 +157,7 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def check_vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield the depth of each supply below the atmosphere as a vacuum: a warning if its unit is an absolute one."""
+    """Yield a note on each supply below the atmosphere with the depth of the vacuum; a warning for an absolute unit."""
     for path in _SUPPLIES[:2]:
         entry, pressure = evidence.parameter_set.numbers.get(path), evidence.number(path)
         if entry is None or pressure is None or not 0.0 < pressure < evidence.atmosphere():
@@ -237,18 +237,18 @@ def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Sever
 # Does the set give the torques that other publications report of the device, at rest and within one push-off?
 
 _ROOM = 0.1
-"""Relative room of a torque that is published with one or two digits."""
+"""Relative tolerance of a torque published with one or two digits."""
 _REACHED = 0.9
-"""Fraction of the torque whose time counts: the rest comes ever more slowly."""
+"""Fraction of the torque that defines the filling time; the final value is approached asymptotically."""
 _PUSH_OFF = 0.2
 """Time [s] of push-off: from 42 to 61 % of the built-in gait's stride of 1.04 s."""
 _TOE_OFF = math.radians(110.0)
-"""Angle [rad] that the vane has reached by then: 20 deg of plantarflexion."""
+"""Angle [rad] of the vane at toe-off: 20 deg of plantarflexion."""
 _PARTS = 200
 
 
 def check_published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield, for each published torque, a comparison with the torque at the supply, and in walking with the fill time.
+    """Yield a comparison of each published torque with the torque at supply pressure, and of the fill time in walking.
 
     Agreement gives a note, disagreement a warning. Yields nothing without published torques.
     """

@@ -44,7 +44,7 @@ def check_statements(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
-    """Return number and unit of each statement of a publication by id, and of each argument by ``ID.ARGUMENT``."""
+    """Return number and unit of each statement of a publication, keyed by id, or ``ID.ARGUMENT`` for an argument."""
     numbers = {}
     for claim in read_publication(name)[0].claims:
         if claim.published is not None:
@@ -223,7 +223,7 @@ _SUPPLY = "supply.pressure"
 
 
 def check_ideal_gas(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a note on the error of the ideal gas law at supply pressure, a warning where it exceeds 5 %."""
+    """Yield a note on the error of the ideal gas law at supply pressure, a warning if the error exceeds 5 %."""
     gas, pressure = evidence.gas(), evidence.number(_SUPPLY)
     virial = SECOND_VIRIAL.get(evidence.text("gas.species") or "")
     if gas is None or pressure is None or virial is None:

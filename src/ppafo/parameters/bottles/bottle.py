@@ -86,7 +86,7 @@ def load_fluid(name: str) -> Fluid:
 
 _SURFACES = ("bottle.content_heat_transfer", "bottle.room_heat_transfer")
 _WALL = 885.0
-"""Heat capacity of the paper's bottle over its mass [J/(kg K)]: 400 J/K and 452 g."""
+"""Heat capacity of the paper's bottle divided by its mass [J/(kg K)]: 400 J/K and 452 g."""
 
 
 @functools.cache
@@ -135,7 +135,7 @@ FILL_BY_PRESSURE = (
     ),
 )
 FILLS: Forms = {"bottle": tuple(tuple(quantity.name for quantity in form) for form in (FILL_BY_MASS, FILL_BY_PRESSURE))}
-"""Forms in which the filling of a bottle is given."""
+"""Alternative forms of the filling of a bottle: by mass, or by pressure and temperature."""
 REGULATOR = (
     Quantity("set_pressure", "Pa_a", "outlet pressure of the regulator without flow", minimum=1e5, maximum=2e7),
     Quantity("droop", "Pa s/kg", "drop of the outlet pressure per mass flow", minimum=0.0, maximum=1e9),
@@ -185,7 +185,7 @@ SECTIONS: dict[str, tuple[Quantity, ...]] = {
     "room": ROOM,
 }
 _MAY_LACK = "hose"
-"""Section that a file may leave out."""
+"""Optional section of a bottle file."""
 
 PATHS: dict[str, Quantity] = {
     f"{section}.{quantity.name}": quantity for section, members in SECTIONS.items() for quantity in members
@@ -197,7 +197,7 @@ NEEDED = tuple(
 )
 
 WARMING = (*(f"regulator.{quantity.name}" for quantity in BODY), *(f"hose.{quantity.name}" for quantity in HOSE))
-"""Values that warm the gas on its way; a file without them has the paper's bottle's."""
+"""Values for the warming of the gas in regulator and hose; by default those of the paper's bottle."""
 
 
 @functools.cache

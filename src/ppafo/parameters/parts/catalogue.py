@@ -46,7 +46,7 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
     "processors": (MASS, POWER),
     "batteries": (MASS, ENERGY),
 }
-"""Figures by group; a valve has its kind's."""
+"""Figures by group; a valve has in addition the figures of its kind."""
 
 NEEDED: dict[str, tuple[str, ...]] = {
     "valves": ("mass",),
@@ -56,9 +56,9 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "processors": ("mass", "power"),
     "batteries": ("mass", "energy"),
 }
-"""Figures without which a part is of no use to a study; a valve needs an orifice in one of its two forms besides.
+"""Figures of a part required by a study; a valve also needs an orifice in one of its two forms.
 
-The displacement of an actuator per radian is its torque constant where it is not given, as in a parameter set.
+By default the displacement of an actuator per radian is its torque constant, as in a parameter set.
 """
 
 
@@ -69,7 +69,7 @@ def figures_of(group: str, kind: str) -> tuple[Quantity, ...]:
 
 Origin = Literal["published", "datasheet", "quoted", "measured", "derived", "assumed"]
 DOUBTFUL: tuple[Origin, ...] = ("quoted", "assumed")
-"""Origins that a reader has to look at before buying: from memory of a document, or a guess."""
+"""Origins to verify before buying a part: quoted from memory of a document, or assumed."""
 
 
 class Figure(StrictTable):
@@ -203,7 +203,7 @@ def json_schema() -> dict[str, Any]:
 
 
 DEFAULT = "parts"
-"""Name of the catalogue that comes with the package."""
+"""Name of the bundled catalogue."""
 
 _FILE = TomlKind(
     "catalogue of parts", "parts", resources.files("ppafo.parameters.parts") / "catalogues", ParameterError

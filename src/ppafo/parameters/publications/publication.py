@@ -20,7 +20,7 @@ from ppafo.errors import ScenarioError
 from ppafo.wording import first_twice
 
 PAPER = "ppafo-2011"
-"""The publication that this package starts from."""
+"""Publication on which this package is based."""
 FILE = TomlKind("publication", "publication", resources.files("ppafo.parameters.publications") / "files", ScenarioError)
 _IDENTIFIER = r"^[a-z][a-z0-9_]*$"
 

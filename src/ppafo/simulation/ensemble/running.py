@@ -52,7 +52,7 @@ class MeteredRuns:
         self.traces = {name: np.full((request.times.size, runs), np.nan) for name in request.bands}
 
     def run_all(self, batches: Sequence[tuple[Members, Batch]], threads: int | None) -> None:
-        """Run batches one after the other; each comes with the indices of its runs in the ensemble."""
+        """Run batches one after the other, each with the indices of its runs in the ensemble."""
         tasks = [_meter_batch(batch, members, self.request) for members, batch in batches]
         # Several programs are compiled side by side before the first batch runs.
         load_programs((task.batch.program, Effort.FULL) for task in tasks)

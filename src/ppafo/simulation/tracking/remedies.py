@@ -28,13 +28,13 @@ SLOWER_ABOVE = frozenset((torque_loop.BOUNDARY,))
 _SAME_GAIN = 0.02
 """Relative difference up to which two gains count as the same [-]."""
 _SLOPES = ("derivative_gain", "damping")
-"""Gains on the slope of the error, which the rules for a device leave at 0."""
+"""Gains on the rate of the error, which are 0 by default for every device."""
 _STEP_OF_PAIR = 0.2
-"""Change of a pair during its dead time over the wanted change, which a smaller orifice aims at [-]."""
+"""Step of a pair during its dead time divided by the wanted change, aimed at with a smaller orifice [-]."""
 _TORQUE_OVER_FRICTION = 1.5
-"""Torque that a law should be able to request over the static friction that holds the joint [-]."""
+"""Torque that a controller should be able to request, divided by the static friction of the joint [-]."""
 _KEPT_OF_ORIFICE = (".critical_ratio", ".discharge_coefficient")
-"""Second number of an orifice, which a remedy hands on unchanged."""
+"""Second number of an orifice, which a remedy leaves unchanged."""
 
 
 @dataclass(frozen=True, slots=True)

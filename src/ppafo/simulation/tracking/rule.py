@@ -25,40 +25,40 @@ from ppafo.simulation.profiles import limits_of, profile_bounds, profile_values
 from ppafo.simulation.scenario import Scenario
 
 LARGEST_SHARE = 0.05
-"""Share of RMS error in the wanted change above which a law that opens the valve gradually does not follow [-]."""
+"""RMS error divided by the wanted change, above which a controller with gradual openings does not follow [-]."""
 LARGEST_SHARE_SWITCHED = 0.25
-"""The same for a law that only switches, which swings about its reference by design [-]."""
+"""RMS error divided by the wanted change, above which an on/off controller, which swings by design, does not follow."""
 LARGEST_MEAN_SWITCHED = 0.15
-"""Share of mean error in the wanted change above which such a law does not follow [-]."""
+"""Mean error divided by the wanted change, above which an on/off controller does not follow [-]."""
 LARGEST_SHARE_MOVING = 0.2
-"""The same where the reference never rests or the joint is moved: every loop follows late [-]."""
+"""RMS error divided by the wanted change, if the reference or the joint moves: every loop lags then [-]."""
 LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE = math.radians(2.0), 0.05
-"""Largest error of a joint angle behind a reference that moves [rad], or over the range of that [-] if this is more."""
+"""Largest angle error for a moving reference [rad], or divided by the reference's range [-] if that allows more."""
 LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE = math.radians(1.0), 0.03
-"""Largest range of the error of an angle beside a reference at rest, in the same two ways: an eye sees 1 deg swing."""
+"""Largest range of the angle error for a reference at rest, in the same two ways: a swing of 1 deg is visible."""
 LARGEST_SHARE_WALK = 0.5
-"""RMS error of a walk over the RMS of the torque its controller requests [-]."""
+"""RMS torque error of a walk divided by the RMS of the requested torque [-]."""
 LARGEST_PEAK = 1.5
-"""Peak of the value over the wanted change [-]."""
+"""Peak of the value divided by the wanted change [-]."""
 LARGEST_PEAK_WALK = 1.5
-"""Peak torque of a walk over the torque limit of its controller [-]."""
+"""Peak torque of a walk divided by the torque limit of its controller [-]."""
 MOST_PER_STRIDE, MOST_PER_SECOND = 12.0, 10.0
-"""Reversals of the command above which a loop oscillates."""
+"""Command reversals per stride and per second above which a loop oscillates."""
 PER_TURN = 2.0
-"""Reversals of the command more for each one of the reference: there and back."""
+"""Additional command reversals for each reversal of the reference: there and back."""
 _TIMES_OF_REFERENCE = 4000
-"""Times at which a reference is looked at to count its reversals."""
+"""Number of times at which a reference is evaluated to count its reversals."""
 SMALLEST_MOVE = 0.01
-"""Share of the wanted change below which the value does not move [-]."""
+"""Change of the value divided by the wanted change, below which the value does not move [-]."""
 SMALLEST_CHANGE = 0.05
-"""Smallest wanted change over the whole range of what is controlled [-]: smaller ones are judged as if so large."""
+"""Smallest wanted change divided by the range of the controlled quantity [-]; smaller ones are judged as this one."""
 SMALLEST_SIZE = 5.0e-4
-"""The same where the range is 0, in sizes of what is controlled (``ControlledQuantity.size``)."""
+"""Smallest wanted change if the range is 0, in typical sizes of the quantity (``ControlledQuantity.size``)."""
 
 REVERSALS = "command_reversals"
 """Metric that counts reversals of the command."""
 MOVED_JOINT = 0.01
-"""Travel of a joint in the settled part that disturbs the loop of a torque or a pressure [rad]."""
+"""Travel of a joint in the settled part above which it disturbs the loop of a torque or a pressure [rad]."""
 
 Failure = Literal["does not move", "oscillates", "overshoots", "does not follow"]
 """Kind of failure."""

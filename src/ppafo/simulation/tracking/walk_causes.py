@@ -14,11 +14,11 @@ from ppafo.simulation.tracking.load_causes import ONE_WAY
 from ppafo.simulation.tracking.remedies import dead_band, larger_gains, level_text, remedy, sized_valves
 
 _OFTEN = 0.1
-"""Share of the time with a request that is often [-]."""
+"""Fraction of the samples with a request that counts as often [-]."""
 _DORSIFLEXION = ("landing_peak_torque", "swing_peak_torque", "hold_stiffness", "hold_damping")
-"""Settings of a walk that ask for a torque in dorsiflexion."""
+"""Settings of a walking controller that request a torque in dorsiflexion."""
 _ANGLESCAUSES_OF_WALK = 400
-"""Samples of a walk at which the reach is compared with the request."""
+"""Number of samples of a walk at which the reach is compared with the request."""
 
 
 def _request_beyond_reach(case: Case) -> TrackingCause | None:
@@ -123,4 +123,4 @@ CAUSES_OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     gains_of_another_device,
     _speed_of_gait,
 )
-"""Causes of a walk, the surest first; the last one always applies."""
+"""Causes of a walk, most certain first; the last one always applies."""

@@ -54,10 +54,12 @@ _FASTEST = 1.0e3
 class BottleSupply:
     """Gas bottle that supplies a walk, in SI units.
 
-    ``mass`` [kg] and ``temperature`` [K] are the values of the gas at the start, ``coupling`` [s] is the interval
-    between two exchanges of data with the device. ``line`` holds the gas properties at the regulator's set pressure,
-    which is the supply pressure of the device. ``least_torque`` is the fraction [-] of the torque at the set pressure
-    below which the walk ends.
+    - ``bottle``: the bottle with its fluid and regulator
+    - ``line``: gas properties at the regulator's set pressure, which is the supply pressure of the device
+    - ``mass``: gas in the bottle at the start [kg]
+    - ``temperature``: temperature of all parts at the start [K]
+    - ``least_torque``: fraction of the torque at the set pressure below which the walk ends [-]
+    - ``coupling``: interval between two exchanges of data with the device [s]
     """
 
     bottle: Bottle

@@ -36,7 +36,7 @@ _CHANNELS = {
 def walk_figure(walks: Mapping[str, Any]) -> "Figure":
     """Return the figure of the mean stride of one or two walks of the same wearer, beside the healthy gait.
 
-    ``walks`` are ``WalkResult`` by name, whose own ``plot`` draws this figure.
+    ``walks`` are objects ``WalkResult`` by name; the method ``plot`` of a result draws this figure.
     """
     first = next(iter(walks.values()))
     gait = walk_of(first.scenario).gait

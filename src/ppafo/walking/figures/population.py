@@ -26,7 +26,7 @@ _OWN = {"linestyle": "", "marker": "o", "markersize": 6, "clip_on": False, "zord
 
 
 def population_figure(population: Population) -> "Figure":
-    """Return a figure of four histograms with quantiles and two scatter plots of an outcome against a trait."""
+    """Return the figure of a population: four histograms with quantiles, two scatter plots of outcome against trait."""
     histograms = [_histogram(population, name) for name in _OUTCOMES]
     return draw_panels(
         [*histograms, *(_pair(population, *pair) for pair in _PAIRS)],

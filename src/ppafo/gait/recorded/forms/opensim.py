@@ -117,9 +117,10 @@ _ALONG = np.radians(5.0)
 def _turned_forward(table: MotionTable) -> MotionTable:
     """Return an OpenSim table with ``pelvis_tx``, ``_tz`` and ``_tilt`` rotated such that the walk is along x.
 
-    The pelvis is turned about z by the tilt t, about x by the list l, then about y by the rotation. A walker who faces
-    by r (its mean) to the left of x goes along h = (cos r, 0, -sin r) and leans against it by what the upright of the
-    pelvis, (-sin t cos l, cos t cos l, sin l), has in that direction. A walk within 5 deg of x stays as it is.
+    The orientation of the pelvis is a rotation about z by the tilt t, about x by the list l, then about y by the
+    rotation. A walker with the mean rotation r to the left of x walks along h = (cos r, 0, -sin r). The new tilt
+    follows from the component along h of the pelvis axis (-sin t cos l, cos t cos l, sin l). A walk within 5 deg of x
+    is returned unchanged.
     """
     names = ("pelvis_tx", "pelvis_tz", "pelvis_rotation")
     if any(name not in table.columns for name in names):
