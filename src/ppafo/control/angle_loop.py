@@ -1,19 +1,20 @@
 """Gains of angle controllers, derived from the device: SIMC rules for a double integrator (Skogestad 2003).
 
-What a torque T moves answers with the angle by I angle'' = T, two integrators more than ``torque_loop`` has. In a
-cascade the inner loop makes the torque, with the rules of ``torque_loop`` as late by 2 theta in all, and the outer one
-asks for
+The angle of a joint responds to the torque T by I angle'' = T, two integrators more than in ``torque_loop``. In a
+cascade the inner loop controls the torque, with the rules of ``torque_loop`` and a total delay of 2 theta, and the
+outer loop requests
 
-    T = k_a (reference - angle) + d_a (their rates) + what the joint needs by itself
+    T = k_a (reference - angle) + d_a (their rates) + feed-forward torque of the joint
     k_a = I w^2,    d_a = 2 I w
 
 For 1/s^2 with a delay of D, and a time constant of D, the rules of S. Skogestad, Journal of Process Control 13 (2003)
-291, give w = 1/(4 D), so w = 1/(8 theta). A joint with much inertia is slower than that: full opening changes the
-torque by R [N m/s] only, so that a way of ``travel`` takes (I travel / R)^(1/3) [s], and w is at most its inverse.
-A joint whose static friction holds more than k_a ``travel`` has a stiffness for that, up to w = 1.7/(8 theta).
+291, give w = 1/(4 D), so w = 1/(8 theta). A joint with large inertia is slower: full opening changes the torque by
+R [N m/s] only, so that a movement over ``travel`` takes (I travel / R)^(1/3) [s], and w is at most the inverse of this
+time. If the static friction exceeds k_a ``travel``, the stiffness is raised accordingly, up to w = 1.7/(8 theta).
 
-A law that opens the valve by the error of the angle alone sees one integrator, at R/S for full opening, behind a mass
-on a gas spring S: beyond its frequency and damping nothing settles, whatever the gains. ``slow_loop`` is that loop.
+A law that opens the valve by the angle error alone acts on one integrator, with the rate R/S at full opening, followed
+by a mass on a gas spring S. Its bandwidth is limited by the natural frequency and damping of this mass, whatever the
+gains. ``slow_loop`` is the corresponding loop.
 """
 
 import math

@@ -1,17 +1,17 @@
 """Gains of torque controllers, derived from the device: SIMC rules for an integrator with dead time (Skogestad 2003).
 
-A chamber whose volume stays integrates the flow of the valve, so that the torque of a device follows a command u as
+A chamber of constant volume integrates the flow of the valve, so that the torque of a device responds to a command u by
 
     dT/dt = R u(t - theta)
 
 R is the rate at full opening: K q max(P_1 / V_1, P_2 / V_2), with K the torque per pressure, q = R_gas T times the
-conductance of the valve, supply pressures P and volumes V. theta is what comes late: valve, sampling, sensors. With the
-closed loop's time constant theta the rules of S. Skogestad, Journal of Process Control 13 (2003) 291, ask for
+conductance of the valve, supply pressures P and volumes V. theta is the total dead time: valve, sampling, sensors. With
+the closed loop's time constant theta the rules of S. Skogestad, Journal of Process Control 13 (2003) 291, give
 
     k_p = 1 / (2 R theta),    T_i = 8 theta,    k_d = 0
 
-The other laws have the same bandwidth in their own words. Where a pressure or an angle is controlled in the place of a
-torque, R is its rate, and its unit stands in the place of N m.
+The parameters of the other laws give the same bandwidth. Where a pressure or an angle is controlled in place of a
+torque, R is the rate of that quantity, and its unit replaces N m.
 """
 
 from typing import NamedTuple

@@ -1,8 +1,8 @@
 """Cascade control of an angle: an outer loop requests a joint torque, an inner loop opens the valve for this torque.
 
-The load on the joint is observed, as the part of the torque that did not accelerate it. Static friction makes an
-observer cycle: the torque that breaks it is therefore a state of its own, which creeps up while the joint rests away
-from its reference and is dropped once it moves. Within a tolerance nothing is learnt.
+The load on the joint is observed, as the part of the torque that did not accelerate the joint. Static friction makes an
+observer cycle: the breakaway torque is therefore a separate state, which increases while the joint rests away from its
+reference and is reset once the joint moves. Within a tolerance the states do not adapt.
 """
 
 import math

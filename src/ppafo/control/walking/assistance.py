@@ -1,10 +1,10 @@
 """Torque that a walking device requests in each phase of the gait, independent of the law that tracks the torque.
 
-Landing: a profile in dorsiflexion that lets the foot down, about a spring and damper that hold it. Mid-stance: vented.
-Push-off: a profile in plantarflexion. Swing: a profile in dorsiflexion about the same spring and damper.
+Landing: a profile in dorsiflexion that lowers the foot, plus a spring and damper that support it. Mid-stance: vented.
+Push-off: a profile in plantarflexion. Swing: a profile in dorsiflexion plus the same spring and damper.
 
-The profile has the four parameters that the exoskeleton literature uses, of J. Zhang et al., Science 356 (2017) 1280:
-zero, a smooth rise to the peak, a smooth fall, zero; cubic with level ends.
+The profile has the four parameters of the exoskeleton literature, J. Zhang et al., Science 356 (2017) 1280: zero, a
+smooth rise to the peak, a smooth fall, zero; cubic with zero slope at its ends.
 """
 
 from typing import Any, NamedTuple
@@ -141,7 +141,7 @@ EASING_TIME = 0.1
 """Time [s] after a landing on the toes in which the law removes a torque in plantarflexion; later the chambers vent."""
 
 EASED = 0.3
-"""Torque in plantarflexion [N m] above which the law removes it; it depends on the wearer, not on the actuator."""
+"""Torque in plantarflexion [N m] above which the law removes it; a limit of the wearer, not of the actuator."""
 
 LARGEST_PRESS = 0.7
 """Largest torque in plantarflexion [N m] requested in the swing: about the weight of a foot with its shoe."""

@@ -1,9 +1,8 @@
 """Controllers of walking by name.
 
-A torque law of ``control.catalog`` walks by its own name, with no line here; a line gives it a name of its own and says
-what it is in walking. A law with ideas of its own of the phases is a module of this folder with a ``ControllerKind``,
-listed here: its ``update`` watches the sensors with ``safety.monitor`` and passes its command through
-``safety.safe_command``.
+A torque law of ``control.catalog`` walks under its own name without an entry here; an entry gives the law another name
+and a summary for walking. A law with its own gait phases is a module of this folder with a ``ControllerKind``, listed
+here: its ``update`` checks the sensors with ``safety.monitor`` and passes its command through ``safety.safe_command``.
 """
 
 from typing import Annotated, NamedTuple

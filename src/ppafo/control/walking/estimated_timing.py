@@ -1,12 +1,13 @@
 """State estimation of the gait phase: a window of ankle angle, heel and toe force is fitted to a learnt stride.
 
-The stride is learnt at equal fractions of it ("knots") from the first good strides, by fractional timing. Then, knot
-after knot, the last readings are compared with the learnt stride at the fractions where the clock has taken them, and
-with the learnt stride shifted by some knots either way: the shift with the least sum of squares is the error of the
-clock, to a part of a knot by one Gauss-Newton step. The clock is moved by a part of it. Where even the best shift fits
-badly nothing is moved: the wearer does not walk then. Li et al. (2011) correlate a window in the same way.
+The stride is learnt at equally spaced fractions ("knots") from the first good strides, by fractional timing. Then, at
+each knot, the recent readings are compared with the learnt stride at the fractions given by the clock, and with the
+learnt stride shifted by some knots in both directions. The shift with the least sum of squares is the error of the
+clock, refined to a fraction of a knot by one Gauss-Newton step. The clock is corrected by a part of this error. If even
+the best shift fits badly, the wearer does not walk, and the clock is not corrected. Li et al. (2011) correlate a window
+in the same way.
 
-The learnt stride is kept as a ring: its first knot is the next to come, its last one the one just passed.
+The learnt stride is a ring buffer: its first knot is the next one, its last knot the one just passed.
 """
 
 from typing import Annotated, NamedTuple

@@ -1,8 +1,8 @@
 """Event-based control of a pair of solenoid valves: one valve configuration for each phase of the gait.
 
-Landing: the dorsiflexion side, which lets the foot down. Swing: the same side keeps it up, at an angle within a band.
-Mid-stance: both chambers vented, free motion. Push-off: the plantarflexion side, vented again before the toes leave
-the ground, so that its gas does not hold the foot down in the swing. The functional tasks of figure 1A of the paper.
+Landing: dorsiflexion, which lowers the foot. Swing: dorsiflexion keeps the lifted foot at an angle within a band.
+Mid-stance: both chambers vented, free motion. Push-off: plantarflexion, vented again before the toes leave the ground,
+so that its gas does not hold the foot down in the swing. The functional tasks of figure 1A of the paper.
 """
 
 from typing import Annotated, NamedTuple

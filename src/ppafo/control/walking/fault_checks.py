@@ -152,8 +152,8 @@ MOVES, TURNS = 40.0, 0.04
 """Deviations of a force [N] and an angle [rad] from their filtered readings that count as motion, beyond standing."""
 
 IN_TIME = 0.06
-"""Angle [rad] below ``highest_toe_off_angle``, 3.4 deg, up to which toes that are seen to leave the ground do so in
-time: between both nothing is known. A dropped foot that nobody pushes turns down in the air too, but more slowly."""
+"""Angle [rad], 3.4 deg, below ``highest_toe_off_angle`` up to which a detected toe-off is timely; between both the
+check is undecided. A dropped foot without push-off also turns down in the air, but more slowly."""
 
 GONE = 0.1
 """Residual force after a loss of the signal, as a fraction of ``largest_drop``."""
@@ -165,19 +165,21 @@ SQUEEZING_ANGLE = 2.09
 """Ankle angle [rad] above which a foot may compress a full chamber 2 to any pressure: 30 deg in plantarflexion."""
 
 TURNED_UP = 0.05
-"""Angle [rad] by which a foot has turned up when a strike is seen that is in doubt, 2.9 deg, less what fades of it.
+"""Angle [rad], 2.9 deg, by which a foot has turned up at a doubtful strike, after decay of the highest angle.
 
-Of 480 wearers with good sensors the most in two strides in a row is 2.4.
+The largest value in two consecutive strides of 480 wearers with good sensors is 2.4 deg.
 """
 
 FADES = 0.35
-"""Rate [rad/s] at which the highest angle of a swing fades, 20 deg/s: a foot that lands nearly flat turns up about as
-slowly in the air before, and several times as fast once it is flat."""
+"""Decay rate [rad/s] of the highest angle of a swing, 20 deg/s: a foot that lands nearly flat turns up at that rate
+in the air before, and several times as fast once it is flat."""
 
 TURNS_DOWN, IS_FLAT = 0.01, 0.026
-"""Angles [rad]: a foot that turns down by more lands now, one that turns up by more until the toes load is flat.
+"""Angles [rad]: a foot that turns down by more than the first is landing now; one that turns up by more than the second
+until the toes are loaded is flat.
 
-One that is still lifted as it strikes turns up first, and then down: by more than the second angle it lands now too.
+A foot that is still being lifted at the strike turns up first, and then down: if by more than the second angle, it is
+landing now too.
 """
 
 LATE_STRIDES = 1.5
@@ -199,18 +201,19 @@ FALL_TIME = 0.1
 """Time constant [s] of the filtered pressures that detect a falling reading."""
 
 FALLS = 0.03
-"""A reading falls that is below the slow one by more than this fraction: a venting chamber at 140 kPa by 0.3, and one
-behind a hose with a tenth of its conductance by 0.04, which is no fault of its sensor."""
+"""Fraction by which a falling reading is below its filtered value: 0.3 for a venting chamber at 140 kPa, and 0.04 for a
+hose with a tenth of its conductance, no fault of the sensor."""
 
 DWELLS, TURNS_BACK = 0.235, 0.35
-"""Fractions of the stride in which a force and an ankle angle may stay within a step of their converter: in a usual
-stride the first one is ``frozen_time``, and slow strides turn back slowly."""
+"""Largest fractions of the stride in which a force and an ankle angle may stay within one converter step: in a usual
+stride the first is ``frozen_time``; slow strides have slow reversals."""
 
 LANDS = 0.3
 """Fraction of the stride after heel strike in which the wearer steps; later the wearer may stand on the heel."""
 
 MOST = 0.75
-"""Fraction of a stride after which an angle has been the same for all of it, less where nothing else moved."""
+"""Fraction of a stride for which a constant angle counts as constant over all of it; some time counts less, as nothing
+else moved then."""
 
 HALF = 0.5
 """Smallest ratio of a good stride to the stride time; the inverse is the largest ratio."""

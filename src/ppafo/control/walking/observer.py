@@ -108,7 +108,7 @@ LINE_QUANTITIES = (
     ),
     _nominal("line_relieving", "", "1 where gas flows back through the regulators", 1.0),
 )
-"""Fields of ``nominal_lines``, in order."""
+"""Settings for the fields of ``nominal_lines``, in order."""
 
 
 LONG_AGO = 1.0e9

@@ -15,7 +15,7 @@ from ppafo.model.plant import PlantParameters
 
 
 class Range(NamedTuple):
-    """Stops of an actuator [rad], dead volumes of its lines and chambers [m^3]."""
+    """Stops of an actuator [rad], and dead volumes of its chambers with their lines [m^3]."""
 
     angle_min: Annotated[float, Number("rad", "lower stop")]
     angle_max: Annotated[float, Number("rad", "upper stop")]

@@ -36,7 +36,7 @@ class Bandwidths(NamedTuple):
 
 
 def prepare(settings: Bandwidths, _device: Any) -> SensorRates:
-    """Rates [1/s] of sensors with given bandwidths [Hz]."""
+    """Parameters of sensors with given bandwidths [Hz]: their rates [1/s]."""
     # A first order with a bandwidth f (-3 dB) follows at the rate 2 pi f.
     turn = 2.0 * math.pi
     return SensorRates(angle=turn * settings.angle_bandwidth, pressure=turn * settings.pressure_bandwidth)

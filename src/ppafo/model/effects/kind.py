@@ -153,7 +153,7 @@ def effect_problem(effect: Effect) -> str:
 
 
 def _problems(effect: Effect) -> Iterator[str]:
-    """Yield the faults in the declaration of an effect, each as a clause to follow its name."""
+    """Yield the faults in the declaration of an effect, each as a clause that follows the effect's name."""
     if not effect.name.isidentifier():
         yield "its name is the parameter by which laws take its parameters, and must be an identifier"
     if effect.always and (effect.switch or effect.is_of_device):

@@ -142,7 +142,7 @@ def spool_acceleration(opening: float, rate: float, target: float, frequency: fl
 
 
 def shift_of_spool(state: SpoolState, next_state: SpoolState) -> float:
-    """Change of the opening in a step over the larger opening [-]."""
+    """Change of the opening during a step divided by the larger of both openings [-]."""
     larger = max(abs(next_state.opening), abs(state.opening))
     return abs(next_state.opening - state.opening) / max(larger, TINY)
 
