@@ -40,7 +40,7 @@ _MAXIMUM_DIGITS, _ABOVE_ALL, _MAXIMUM_LEVELS = 40, 10**40, 60
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """Text form of a parameter: how a command shows and parses it, and the values that a Python call may give.
+    """Argument type: display and parsing on the command line, and accepted values of a Python call.
 
     ``metavar`` is the name in the help. ``read`` converts the text to the value. ``take`` converts a Python value, with
     a ValueError for an unsuitable one, and ``what`` describes the accepted values; without ``take`` the annotated type

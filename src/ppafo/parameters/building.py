@@ -183,7 +183,7 @@ def actuator_problem(actuator: Actuator) -> str:
 
 
 def beyond_pressures(device: Device) -> Problem:
-    """Return the problem of a supply outside the pressures at which a table was measured; elementwise."""
+    """Return the problem of a supply pressure outside the measured range of the actuator table; elementwise."""
     table, supply = device.actuator.table, device.supply
     if table is None:
         lowest, highest = -math.inf, math.inf

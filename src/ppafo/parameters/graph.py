@@ -160,7 +160,7 @@ def resolved(
 ) -> dict[str, Any]:
     """Return all given numbers, and all numbers that follow them by links consistent with ``present``.
 
-    The ``orifices``, named by section, change to their other form.
+    The given ``orifices`` (section names) change from area form to ISO 6358 form or back.
     """
     held = holding(graph, present)
     links = in_other_forms(held, orifices)
@@ -179,7 +179,7 @@ def paths_in(graph: Graph) -> set[str]:
 
 
 def in_other_forms(graph: Graph, orifices: Collection[str]) -> Graph:
-    """Return the links after some orifices, named by section, have changed to their other form."""
+    """Return the links with the given orifices (section names) converted from area form to ISO 6358 form or back."""
     if not orifices:
         return graph
 
@@ -194,7 +194,7 @@ def in_other_forms(graph: Graph, orifices: Collection[str]) -> Graph:
 
 
 def left(graph: Graph, replaced: Collection[str]) -> dict[str, tuple[LinkedDefault, ...]]:
-    """Return the links that remain after numbers are given: given numbers lose theirs, and ``when_set`` links win."""
+    """Return the links that remain after numbers are given: a given number has none, acting ``when_set`` links win."""
     changed = acting(graph, replaced)
     return {
         path: (changed[path],) if path in changed and changed[path].when_set else links

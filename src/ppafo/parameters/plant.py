@@ -20,7 +20,7 @@ class Restriction(NamedTuple):
 
 
 def area_restriction(orifice: Orifice, gas: Gas, linear_ratio: float) -> Restriction:
-    """Return an orifice in the paper's form for a gas; linear above ``linear_ratio`` [-]. Equations (6), (7)."""
+    """Return the paper's orifice for a gas, with linear flow above ratio ``linear_ratio`` [-]; equations (6), (7)."""
     conductance = area_conductance(
         orifice.area,
         orifice.discharge_coefficient,
@@ -32,13 +32,13 @@ def area_restriction(orifice: Orifice, gas: Gas, linear_ratio: float) -> Restric
 
 
 def sonic_restriction(orifice: SonicOrifice, gas: Gas, linear_ratio: float) -> Restriction:
-    """Return an orifice in the form of ISO 6358 for a gas; linear above ``linear_ratio`` [-]."""
+    """Return an ISO 6358 orifice for a gas, with linear flow above the pressure ratio ``linear_ratio`` [-]."""
     conductance = sonic_conductance_mass(orifice.sonic_conductance, gas.specific_gas_constant, gas.temperature)
     return Restriction(conductance, iso6358_curve(orifice.critical_ratio, linear_ratio))
 
 
 def restriction(orifice: Orifice | SonicOrifice, gas: Gas, linear_ratio: float) -> Restriction:
-    """Return an orifice in either form for a gas; linear above ``linear_ratio`` [-]."""
+    """Return an orifice in either form for a gas, with linear flow above the pressure ratio ``linear_ratio`` [-]."""
     if isinstance(orifice, SonicOrifice):
         return sonic_restriction(orifice, gas, linear_ratio)
     return area_restriction(orifice, gas, linear_ratio)

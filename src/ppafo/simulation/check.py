@@ -244,7 +244,7 @@ def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstima
     if temperature is not None:
         over.append(temperature / (LARGEST_OF_TEMPERATURE * device.gas.temperature))
     # The allowed error goes with the tolerance; with half of what is needed it is met.
-    less = max(0.5 * own / max(over), SMALLEST_TOLERANCE)
+    less = max(0.5 * own / max(over), SMALLEST_TOLERANCE) if max(over) > 0.0 else own
     return ErrorEstimate(
         angle=angle,
         pressure=pressure,

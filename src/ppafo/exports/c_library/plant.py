@@ -208,7 +208,7 @@ def half_open(scenario: Scenario) -> Scenario:
 
 
 def with_api(alone: PlantAlone) -> PlantAlone:
-    """Return a plant whose library has the API for its inputs."""
+    """Return the plant with a library API that takes its inputs at each step."""
     names = [variable.name for variable in alone.inputs]
     by_name = {name: name for name in names}
     # An example whose command does something.
@@ -250,7 +250,7 @@ def with_api(alone: PlantAlone) -> PlantAlone:
 
 
 def _as_clock(alone: PlantAlone) -> tuple[str, ...]:
-    """Names of the other times equal to the input interval: each command applies to exactly one of these."""
+    """Names of the other time settings that must equal the input interval: controller period and output interval."""
     return tuple(c_identifier(path) for path in (SAMPLES, "run.output_interval") if path != alone.clock)
 
 

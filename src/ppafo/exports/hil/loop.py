@@ -52,7 +52,7 @@ def _drain(port: wire.Port, take: Take) -> None:
 
 @final
 class RealTime:
-    """Real time. If the computer is suspended for more than a period, the plant time is paused for as long.
+    """Real time; plant time is paused while the computer is suspended for more than a period.
 
     ``clock`` returns the time [s].
     """
@@ -84,11 +84,11 @@ class RealTime:
         return missed
 
     def listen(self, until: float, port: wire.Port, take: Take) -> None:
-        """Pass received data to ``take`` until a time [s], or until ``take`` returns True."""
+        """Pass received data to ``take`` until the time ``until`` [s], or until ``take`` returns True."""
         _listen_for(until - self.now(), self.clock, port, take)
 
     def rest(self, until: float, port: wire.Port, take: Take) -> None:
-        """Pass received data to ``take`` until a time [s]."""
+        """Pass received data to ``take`` until the time ``until`` [s]."""
         while (left := until - self.now()) > 0.0:
             data = port.receive(left)
             if data:

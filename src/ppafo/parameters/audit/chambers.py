@@ -107,7 +107,7 @@ def check_volumes(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_path: str) -> Iterator[AuditFinding]:
-    """Yield an error if a chamber, ``travel`` [rad] before zero swept volume, has no volume left."""
+    """Yield an error if the volume of a chamber is not positive ``travel`` [rad] from its zero swept volume."""
     slope = evidence.number(_SLOPE) or math.inf
     dead_path, stop_path = _DEAD[chamber - 1], _STOPS[chamber - 1]
     dead = evidence.number(dead_path) or 0.0
@@ -186,7 +186,7 @@ _LEAST, _MOST = 0.6, 1.1
 
 
 def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield the gas of one filling at the middle of the range: a note if the measured gas agrees, else a warning.
+    """Yield the gas of one filling at mid-range: a note if the measured gas use agrees, otherwise a warning.
 
     Yields nothing if the set reports no gas use of a single filling.
     """

@@ -79,11 +79,11 @@ class ReportedRange(NamedTuple):
     high: float
 
     def times(self, other: "ReportedRange") -> "ReportedRange":
-        """Return the interval of the product."""
+        """Return the interval of the product of this number and another."""
         return ReportedRange(self.low * other.low, self.high * other.high)
 
     def over(self, other: "ReportedRange") -> "ReportedRange":
-        """Return the interval of the quotient."""
+        """Return the interval of this number divided by another."""
         return ReportedRange(self.low / other.high, self.high / other.low)
 
     def meets(self, other: "ReportedRange") -> bool:

@@ -157,7 +157,7 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def check_vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield the depth of each supply below the atmosphere as a vacuum: a warning if its unit is an absolute one."""
+    """Yield a note on each supply below the atmosphere with the depth of the vacuum; a warning for an absolute unit."""
     for path in _SUPPLIES[:2]:
         entry, pressure = evidence.parameter_set.numbers.get(path), evidence.number(path)
         if entry is None or pressure is None or not 0.0 < pressure < evidence.atmosphere():
@@ -248,7 +248,7 @@ _PARTS = 200
 
 
 def check_published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield, for each published torque, a comparison with the torque at the supply, and in walking with the fill time.
+    """Yield a comparison of each published torque with the torque at supply pressure, and of the fill time in walking.
 
     Agreement gives a note, disagreement a warning. Yields nothing without published torques.
     """

@@ -44,7 +44,7 @@ def check_statements(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
-    """Return number and unit of each statement of a publication by id, and of each argument by ``ID.ARGUMENT``."""
+    """Return number and unit of each statement of a publication, keyed by id, or ``ID.ARGUMENT`` for an argument."""
     numbers = {}
     for claim in read_publication(name)[0].claims:
         if claim.published is not None:
