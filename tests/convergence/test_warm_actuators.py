@@ -63,7 +63,8 @@ def gaps(scenario: Scenario, joint: Joint) -> tuple[float, float, float]:
     """Largest gap of the angle over its range, of both pressures over theirs, and of the gas drawn over all of it."""
     record, answer = simulate(scenario).recording, independent_run(scenario, joint=joint)
     actuator, supply = scenario.device.actuator, scenario.device.supply
-    pressed = max(float(np.abs(record[name] - getattr(answer, name)).max()) for name in ("pressure_1", "pressure_2"))
+    pressures = [name for name in ("pressure_1", "pressure_2") if name in record]
+    pressed = max(float(np.abs(record[name] - getattr(answer, name)).max()) for name in pressures)
     turned = float(np.abs(record["angle"] - answer.angle).max())
     drawn = float(np.abs(record["supplied_mass"] - answer.drawn).max())
     return (
@@ -170,11 +171,14 @@ def test_behind_regulators_warm_gas_is_kept_and_a_finer_tolerance_changes_little
     usual = simulate(load_scenario(file, given))
     finer = simulate(load_scenario(file, (*given, "run.tolerance=1e-5"))).recording
     supply = scenario.device.supply
-    for name in ("pressure_1", "pressure_2", "line_pressure_1", "line_pressure_2"):
+    has_two = not scenario.device.actuator.has_one_chamber
+    assert ("pressure_2" in usual.recording) == has_two
+    for name in ("pressure_1", *(["pressure_2"] if has_two else []), "line_pressure_1", "line_pressure_2"):
         gap = float(np.abs(usual.recording[name] - finer[name]).max())
         assert gap < 1.0e-3 * (supply.pressure - supply.atmospheric_pressure), name
     assert np.ptp(usual.recording["line_pressure_1"]) > 5.0e3
-    assert abs(usual.metrics["gas_imbalance"].value) < 1.0e-12 * usual.metrics["gas_supplied"].value
+    if has_two:
+        assert abs(usual.metrics["gas_imbalance"].value) < 1.0e-12 * usual.metrics["gas_supplied"].value
 
 
 def test_warm_walls_make_the_gas_of_a_soft_actuator_isothermal(tmp_path: Path) -> None:

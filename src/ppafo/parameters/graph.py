@@ -194,7 +194,7 @@ def in_other_forms(graph: Graph, orifices: Collection[str]) -> Graph:
 
 
 def left(graph: Graph, replaced: Collection[str]) -> dict[str, tuple[LinkedDefault, ...]]:
-    """Return the links that remain after numbers are given: a given number has none, ``when_set`` links win."""
+    """Return the links that remain after numbers are given: a given number has none, acting ``when_set`` links win."""
     changed = acting(graph, replaced)
     return {
         path: (changed[path],) if path in changed and changed[path].when_set else links

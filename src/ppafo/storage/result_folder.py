@@ -7,6 +7,7 @@ listed by a foreign mark, is ever removed.
 """
 
 import os
+import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
@@ -118,6 +119,8 @@ def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes]
 
     Files in ``kept``, such as one that grows from run to run, may have been changed if they have the given content.
     """
+    if re.match(r"[a-z][a-z0-9+]+:/", str(folder)):
+        raise DataError(f"{folder}: is an address; a {kind.noun} is written into a folder of this computer")
     is_folder = os.path.isdir(folder)  # noqa: PTH112  # Path.is_dir raises where no file can have the name
     # A link to nowhere is there too, and would be replaced by a folder.
     if not is_folder and os.path.lexists(folder):

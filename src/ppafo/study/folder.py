@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import re
 import shutil
 import stat
 import time
@@ -80,6 +81,6 @@ class StudyFolder:
 
 def study_folder(path: str | Path) -> StudyFolder:
     """Return the folder at a path; DataError for the address of another computer."""
-    if "://" in str(path):
+    if re.match(r"[a-z][a-z0-9+]+:/", str(path)):
         raise DataError(f"{path}: is an address; results of a study go into a folder of this computer")
     return StudyFolder(Path(path).absolute())

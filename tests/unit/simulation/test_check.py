@@ -220,3 +220,9 @@ def test_the_command_ends_with_1_where_the_run_does_not_determine_its_metrics(
     assert "Numerically sensitive: rms_error" in printed
     assert printed.splitlines()[-1].endswith("check.json)")
     assert json.loads((tmp_path / "check.json").read_text())["is_determined"] is False
+
+
+def test_a_run_in_which_nothing_changes_has_no_error() -> None:
+    still = simulate(load_scenario("torque-task-proportional", ["reference.kind=constant", "reference.level=0 N m"]))
+    error = still.error()
+    assert error.angle == error.pressure == error.over_promise == 0.0

@@ -43,3 +43,8 @@ def test_many_runs_of_a_single_chamber_find_what_one_finds(bladder: Scenario) ->
 def test_a_single_chamber_takes_no_reference_of_the_other() -> None:
     with pytest.raises(ScenarioError, match=r"has one chamber; take reference.of = 'pressure_1'"):
         ppafo.load_scenario("pressure-loop", [f"device.set={BLADDER}", "reference.of=pressure_2"])
+
+
+def test_its_recording_without_the_second_pressure_is_replayed(bladder: Scenario) -> None:
+    validated = ppafo.validate(str(BLADDER), [ppafo.simulate(bladder).recording], motion="locked")
+    assert validated.found.passes

@@ -203,3 +203,9 @@ def test_earlier_result_and_new_one_change_places_in_one_step(tmp_path: Path, mo
     write_reproduction(tmp_path / "out", again)
     assert contents(tmp_path / "out") == again
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.parametrize("address", ["s3://bucket/out", "https:/host/out"])
+def test_an_address_is_no_folder(address: str) -> None:
+    with pytest.raises(DataError, match=r": is an address; .* is written into a folder of this computer"):
+        check_owned_folder(Path(address), marked_folder("compare"))

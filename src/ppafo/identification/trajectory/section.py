@@ -138,6 +138,8 @@ def _experiment(entry: ExperimentSection, setting: SectionContext) -> FittedExpe
         is_prescribed = entry.locked is not None or ANGLE in (entry.inputs or ())
         channels = FITTED_CHANNELS[1:] if is_prescribed else FITTED_CHANNELS
         channels = channels if entry.volume is None else ("pressure_1",)
+        if scenario.device.actuator.has_one_chamber:
+            channels = tuple(name for name in channels if name != "pressure_2")
     step = quantity_in(entry, "step", "s", said, SHORTEST_STEP, LONGEST_STEP)
     scenario = scenario if step is None else replace(scenario, run=replace(scenario.run, step=step))
     # The scenario of a replay has the state of the samples already.

@@ -54,6 +54,9 @@ def start_of(
     Raises DataError, prefixed with ``file``, for a missing channel, with the remedy for this channel.
     """
     count, values = samples_at_rest(recording), dict(known)
+    if device.actuator.has_one_chamber and "pressure_2" not in recording:
+        # Nothing that is recorded depends on the dead volume behind the other port.
+        values.setdefault("pressure_2", device.supply.atmospheric_pressure)
     for name in (ANGLE, "pressure_1", "pressure_2", "angular_velocity"):
         if name not in values and name in recording:
             values[name] = value_at_rest(recording.time[:count], recording[name][:count])

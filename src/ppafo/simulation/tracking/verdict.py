@@ -12,6 +12,9 @@ from ppafo.simulation.tracking.load_causes import torque_beyond_reach
 from ppafo.simulation.tracking.remedies import Remedy, change_text
 from ppafo.simulation.tracking.rule import (
     LARGEST_SHARE,
+    LARGEST_SHARE_MOVING,
+    LARGEST_SHARE_SWITCHED,
+    LARGEST_SHARE_WALK,
     REVERSALS,
     Failure,
     failure_of_task,
@@ -155,11 +158,19 @@ def following_text(result: "RecordedResult") -> str:
     # On a ramp every loop is behind, and a walk whose law requests no torque has a peak alone.
     if judged is None or judged[0].failure is not None or controlled_in(result.recording) is None:
         return ""
-    settled = judged[0].settled
+    case = judged[0]
+    settled = case.settled
     if settled.ends_on_ramp:
         return ""
-    error, wanted = (change_text(controlled.name, each) for each in (settled.error, settled.wanted))
-    return f"the {controlled.words} follows its reference: RMS {error} of {wanted} wanted{_time_text(settled.start)}"
+    if not case.scenario.follows_reference:
+        share = LARGEST_SHARE_WALK
+    elif case.only_switches:
+        share = LARGEST_SHARE_SWITCHED
+    else:
+        share = LARGEST_SHARE if settled.rests else LARGEST_SHARE_MOVING
+    error, allowed = (change_text(controlled.name, each) for each in (settled.error, share * settled.wanted))
+    since = _time_text(settled.start)
+    return f"the {controlled.words} follows its reference: RMS error {error}{since}, {allowed} allowed"
 
 
 def _time_text(since: float) -> str:
