@@ -1,1 +1,1 @@
-"""A controller on a small processor: laws in fixed point, their firmware, and the processor in the loop."""
+"""Controller on a small processor: fixed-point laws, their firmware, and the processor in the loop."""

@@ -1,4 +1,4 @@
-"""Processors that firmware is written for. To add one here: a description, and the files of its board."""
+"""Processors with firmware support. To add one here: a description, and the files of its board."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -16,14 +16,14 @@ from ppafo.wording import nearest_name
 _CYCLES = re.compile(rb"MCLK:\s+(\d+)")
 """Form of mspdebug's cycle counter."""
 _ASKED = "asked.txt"
-"""File of the questions for some samples."""
+"""File of the queries for some samples."""
 _SAID_OUTPUTS = "simio info counter\nmd simulated_outputs 4"
-"""Query of mspdebug after each sample: cycle count, and the four bytes of the outputs."""
+"""Query to mspdebug after each sample: cycle count, and the four output bytes."""
 
 
 @final
 class _MspdebugSimulator:
-    """mspdebug's simulator of an MSP430 with an image in it."""
+    """Simulator of an MSP430 by mspdebug, with an image loaded."""
 
     def __init__(self, target: Target, image: Image) -> None:
         self._cycles = 0
@@ -37,7 +37,7 @@ class _MspdebugSimulator:
         self._answer()
 
     def begin(self) -> None:
-        """Reset the processor, and let it come to where it waits for a sample."""
+        """Reset the processor and run it until it waits for a sample."""
         self._say(f"reset\nrun\n{_SAID_OUTPUTS}")
         self._answer()
 
@@ -59,7 +59,7 @@ class _MspdebugSimulator:
         return decisions
 
     def stack(self) -> int:
-        """Deepest use of the stack [bytes]: what it has overwritten of RAM that was filled before."""
+        """Deepest use of the stack [bytes]: the overwritten part of RAM that was filled before."""
         self._say(f"md {self._start} {self._free}\n{_SAID_OUTPUTS}")
         shown = self._console.until(b"simulated_outputs 4\n")
         self._console.until(b"\n")
@@ -70,7 +70,7 @@ class _MspdebugSimulator:
         self._console.say(f"{text}\n".encode())
 
     def _answer(self) -> bytes:
-        """The four bytes of the outputs, at the end of what was asked; the cycles are noted."""
+        """Return the four output bytes at the end of the response, and record the cycle count."""
         said = self._console.until(b"simulated_outputs 4\n")
         self._cycles = int(_CYCLES.findall(said)[-1])
         return bytes.fromhex(self._console.until(b"\n").split(b":")[1].split(b"|")[0].decode())
@@ -89,7 +89,7 @@ firmware.hex: firmware.elf
 """
 
 _FLASH = "\n# {said}. Read README.md first.\nflash: {needs}\n\t{command}\n"
-"""The part of a make file that writes the processor."""
+"""Part of a make file that writes the program to the processor."""
 
 
 MSP430F2013 = Target(
@@ -129,7 +129,7 @@ MSP430F2013 = Target(
 
 
 def _cortex(name: str, part: str, pins: Mapping[str, str], flash: int, ram: int, **more: Any) -> Target:
-    """A Cortex-M on a micro:bit with some flash and RAM [bytes], whose compiler may be gcc, clang or zig."""
+    """Cortex-M on a micro:bit with given flash and RAM [bytes]; the compiler may be gcc, clang or zig."""
     for_zig = f"zig cc -target thumb-freestanding-eabi -mcpu={name.replace('-', '_')}"
     copied = _FLASH.format(
         said="Onto the drive that the board is", needs="firmware.hex", command='cp firmware.hex "$(MICROBIT)"'
@@ -209,11 +209,11 @@ CORTEX_M4 = _cortex(
 )
 CATALOG: dict[str, Target] = {target.name: target for target in (MSP430F2013, CORTEX_M0, CORTEX_M4)}
 TARGETS = tuple(CATALOG)
-"""Names of the processors that an integer controller can be written for, the usual one first."""
+"""Names of the processors with firmware support, the default first."""
 
 
 def target_of(name: str) -> Target:
-    """The target of a name; ScenarioError where there is none."""
+    """Return the target of a name. Raises ScenarioError if there is none."""
     if name not in CATALOG:
         hint = nearest_name(name, CATALOG)
         raise ScenarioError(f"there is no target '{name}'{hint}; available: {', '.join(CATALOG)}")

@@ -10,7 +10,7 @@ from ppafo.cli.output import CommandOutput
 from ppafo.errors import ScenarioError
 
 MOST_SAMPLES = 10_000_000
-"""Drawn samples that are compared at most."""
+"""Largest number of drawn samples in a comparison."""
 
 
 COMMAND = "export firmware"

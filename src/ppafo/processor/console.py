@@ -1,4 +1,4 @@
-"""A simulator as a program of this machine, spoken to by its standard input and output; and how deep its stack was."""
+"""Simulator as a local program, controlled by its standard input and output, and the stack depth that it reports."""
 
 import os
 import select
@@ -14,12 +14,12 @@ from ppafo.wording import one_line, reason
 UNTOUCHED = 0xA5
 """Fill byte of the stack's RAM, which reveals the bytes that the stack has overwritten."""
 _PATIENCE = 60.0
-"""Seconds without a byte before a simulator is given up; a busy machine starts QEMU in some ten."""
+"""Timeout [s] without a byte from a simulator; QEMU takes about 10 s to start on a busy machine."""
 
 
 @final
 class Console:
-    """A program of this machine that is spoken to by its standard input and output; ``close`` ends it."""
+    """Local program controlled by its standard input and output; ``close`` ends the program."""
 
     def __init__(self, command: Sequence[str], folder: Path) -> None:
         self._name = command[0]
@@ -39,7 +39,7 @@ class Console:
         self.close = finalize(self, _end, self._process)
 
     def say(self, text: bytes) -> None:
-        """Write to the program. SimulationError where it has ended."""
+        """Write text to the program. Raises SimulationError if the program has ended."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(text)
@@ -47,7 +47,7 @@ class Console:
             raise SimulationError(f"{self._name} has ended: {reason(error)}; {self._last()}") from error
 
     def until(self, mark: bytes) -> bytes:
-        """Output of the program up to a mark. SimulationError if it falls silent."""
+        """Return the output of the program up to a mark. Raises SimulationError if no output comes."""
         assert self._process.stdout is not None
         while mark not in self._seen:
             ready, _, _ = select.select([self._process.stdout], [], [], _PATIENCE)

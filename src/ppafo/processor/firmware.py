@@ -1,4 +1,4 @@
-"""A scenario's controller as firmware for a small processor: proof, translated C, a thin layer, make file, page."""
+"""Firmware of a scenario's controller for a small processor: proof, translated C, a thin layer, make file, README."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,14 +37,15 @@ from ppafo.version import __version__
 PRELUDE = "prelude_whole.h"
 _NUMBER = r"(?:bool|int16_t|int32_t) \w+"
 _OF_NUMBERS = re.compile(rf"^PPAFO_INLINE(?= {_NUMBER}\((?:{_NUMBER},\s+)*{_NUMBER}\)$)", re.MULTILINE)
-"""Before the head of a function of numbers alone, in C."""
+"""Qualifier in front of a C function whose parameters and result are numbers."""
 
 
 def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
-    """The typed functions of a law in 16 and 32 bits, and the range of the command and of the next state.
+    """Typed functions of a law in 16 and 32 bits, and proven ranges of the command and of the next state.
 
-    For every number within what ``numbers`` (those of the law) declare, every state within the ranges of the law and
-    every reading. ProgramError where a value may leave 32 bits, or the next state its ranges.
+    The proof covers every number in the declared ranges of ``numbers`` (default: the numbers of the law), every state
+    in the ranges of the law, and every reading. Raises ProgramError if a value may exceed 32 bits, or the next state
+    its ranges.
     """
     collector = SourceCollector("")
     entry = collector.add(law.sample)
@@ -69,7 +70,7 @@ def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
 
 
 def law_source(law: FixedLaw) -> str:
-    """The law in C, with a state of its own and the numbers of ``parameters.h``."""
+    """Return the law in C, with its state and the numbers of ``parameters.h``."""
     collector = SourceCollector("")
     entry = collector.add(law.sample)
     documents = documents_of(collector)
@@ -111,17 +112,17 @@ bool controller_is_sound(void)
 
 
 def _written(row: Any) -> str:
-    """A NamedTuple as C initialises it, nested ones in their place."""
+    """Return the C initialiser of a NamedTuple, nested ones included."""
     return "{" + ", ".join(_written(part) if isinstance(part, tuple) else str(part) for part in row) + "}"
 
 
 def macro(quantity: Quantity) -> str:
-    """Name that a number has in ``parameters.h``."""
+    """Return the name of a number in ``parameters.h``."""
     return f"CONTROLLER_{quantity.name.upper()}"
 
 
 def parameters_header(fixed: "FixedPointController") -> str:
-    """``parameters.h``: every number of a law, its unit, meaning and origin; one beyond its range is refused in C."""
+    """Return ``parameters.h``: every number of a law with unit, meaning and origin; C refuses numbers out of range."""
     scenario, law = fixed.scenario, fixed.law
     control = scenario.controller
     declared: dict[str, Quantity] = {quantity.name: quantity for quantity in CONTROLLERS[control.kind].quantities}
@@ -155,12 +156,12 @@ def parameters_header(fixed: "FixedPointController") -> str:
 
 
 def _nested(row: type, ranges: Iterator[IntegerRange]) -> Range:
-    """The ranges of a NamedTuple, nested ones in their place."""
+    """Return the ranges of a NamedTuple in its nested form."""
     return tuple(next(ranges) if is_number(kind) else _nested(kind, ranges) for _, kind in members(row))
 
 
 def _typed_row(kind: Any, collector: SourceCollector) -> Row:
-    """A NamedTuple of whole numbers as the walk has it."""
+    """Return a NamedTuple of integers as a row type for the range analysis."""
     hints = get_type_hints(kind)
     fields = tuple((name, _typed_row(hints[name], collector) if is_row(hints[name]) else INT) for name in kind._fields)
     return Row(collector.add(kind), fields)
@@ -169,12 +170,12 @@ def _typed_row(kind: Any, collector: SourceCollector) -> Row:
 TICK = 125.0e-6
 """Unit of the sample period [s]: one pulse of the timer."""
 MOST_TICKS = 32767
-"""Largest number of ticks that 16 bits hold with a sign."""
+"""Largest number of ticks in a signed 16-bit integer."""
 _TEMPLATES = ("Makefile", "README.md", "board.h", "board_simulated.c", "controller.h", "host.c", "main.c")
 
 
 class FixedPointController(NamedTuple):
-    """Integer controller: scenario in integer form, law, whole numbers by name, converter, ticks of a sample."""
+    """Integer controller: scenario in integer form, law, integers by name, converter, ticks per sample period."""
 
     scenario: Scenario
     law: FixedLaw
@@ -185,9 +186,9 @@ class FixedPointController(NamedTuple):
 
 
 def integer_form(scenario: Scenario) -> Scenario:
-    """The scenario with the integer form of its controller, and the converter's defaults where it had floats.
+    """Return the scenario with its controller in integer form, with default converter settings if it had none.
 
-    ScenarioError where that controller has none.
+    Raises ScenarioError if the controller has no integer form.
     """
     kind = scenario.controller.kind
     if scenario.controlled != TORQUE:
@@ -210,7 +211,7 @@ def integer_form(scenario: Scenario) -> Scenario:
 
 
 def fixed_point_controller(scenario: Scenario) -> FixedPointController:
-    """The integer controller of a scenario; ScenarioError where the timer cannot make its sample period."""
+    """Integer controller of a scenario. Raises ScenarioError if the timer cannot produce the sample period."""
     scenario = integer_form(scenario)
     period = scenario.controller.period
     ticks = round(period / TICK)
@@ -229,7 +230,7 @@ def fixed_point_controller(scenario: Scenario) -> FixedPointController:
 
 
 def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
-    """Files of the firmware of a scenario's controller, by name. ScenarioError where it has no integer form."""
+    """Firmware files of a scenario's controller, by name. Raises ScenarioError if it has no integer form."""
     chosen = target_of(target)
     fixed = fixed_point_controller(scenario)
     scenario, steps, (top, middle) = fixed.scenario, fixed.steps, fixed.limits

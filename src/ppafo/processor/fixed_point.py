@@ -1,6 +1,6 @@
 """Arithmetic of a small processor: products by shifts and additions, integer gains, converter readings.
 
-A gain is a fraction of 15 bits and a number of places: ``(value * fraction >> 15) >> places``, rounded down each time.
+A gain is a 15-bit fraction and a right shift: ``(value * fraction >> 15) >> places``, rounded down each time.
 """
 
 import math
@@ -12,17 +12,17 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
 
 FRACTION_BITS = 15
-"""Bits behind the point of a fraction."""
+"""Number of fractional bits."""
 LARGEST_FRACTION: int = 2**FRACTION_BITS - 1
-"""Largest fraction in 16 bits with a sign."""
+"""Largest fraction in a signed 16-bit integer."""
 MOST_PLACES = 30
-"""Places that a product of 32 bits is shifted right by at most."""
+"""Largest right shift of a 32-bit product."""
 SHARPENED = int(1.0 / SHARPNESS)
-"""Openings that pass a dead band in full are this part of full opening or more."""
+"""Inverse of the smallest opening, as a fraction of full opening, at which the dead band is compensated in full."""
 
 
 def fraction_of(value: int, fraction: int) -> int:
-    """``value`` (2^30 at most in size) times ``fraction`` / 2^15, rounded down at every bit of the fraction."""
+    """``value`` (at most 2^30 in magnitude) times ``fraction`` / 2^15, rounded down at every bit of the fraction."""
     # The MSP430 has no multiplier, and a product in C would ask for a run-time library that the image does not have.
     total = 0
     left = fraction
@@ -34,9 +34,10 @@ def fraction_of(value: int, fraction: int) -> int:
 
 
 def beyond_band(opening: int, band: int, full: int) -> int:
-    """Command for an ``opening`` from -``full`` to ``full``, beyond a dead band of ``band`` / 2^15; 0 leaves it as is.
+    """Command for an ``opening`` from -``full`` to ``full`` with compensation of the dead band ``band`` / 2^15.
 
-    The law of ``control.torque_loop.beyond_dead_band``, rounded down to whole parts of ``full``.
+    The law of ``control.torque_loop.beyond_dead_band``, rounded down to integer parts of ``full``; a ``band`` of 0
+    returns the opening.
     """
     passed = limited(opening * SHARPENED, full)
     # Between both, which the proof of the ranges does not see.
@@ -53,14 +54,14 @@ def shifted(value: int, places: int) -> int:
 
 
 def limited(value: int, limit: int) -> int:
-    """``value`` within ``limit`` to both sides."""
+    """``value`` limited to the range from -``limit`` to ``limit``."""
     return max(min(value, limit), -limit)
 
 
 def gain_of(factor: float) -> tuple[float, float]:
-    """A factor from 0 to 32767 times 2^15 as a fraction of 15 bits and the places by which a product is shifted right.
+    """Fraction of 15 bits and right shift that multiply by ``factor`` / 2^15, for a factor from 0 to 32767.
 
-    It has as many bits as there are, and is the largest one where the factor is larger.
+    The fraction uses as many bits as possible; a larger factor is limited to the largest representable one.
     """
     if not factor > 0.0:
         return 0.0, 0.0
@@ -76,7 +77,7 @@ def gain_of(factor: float) -> tuple[float, float]:
 
 FEWEST_BITS, MOST_BITS = 8, 14
 COMMAND_STEPS = 1000
-"""Steps from a command of 0 to one of 1: half the ticks of the pulse that drives a proportional valve."""
+"""Integer command for a command of 1: half the ticks of the pulse that drives a proportional valve."""
 LARGEST_READING: int = 2**MOST_BITS - 1
 
 SETTINGS = (
@@ -95,21 +96,21 @@ SETTINGS = (
 
 
 class ConverterLimits(NamedTuple):
-    """The largest reading of a converter, and the one that stands for a reference of 0 N m."""
+    """Largest reading of a converter, and mid-range reading that represents a reference of 0 N m."""
 
     top: int
     middle: int
 
 
 class CountResolution(NamedTuple):
-    """Pressure and torque of one count of a converter [Pa], [N m]."""
+    """Pressure [Pa] and torque [N m] of one count of a converter."""
 
     pressure_step: float
     torque_step: float
 
 
 class ConverterCounts(NamedTuple):
-    """Converter readings, from 0 to the largest one: reference, pressure in chamber 1 and in chamber 2."""
+    """Converter readings from 0 to the largest one: reference, pressure in chamber 1, pressure in chamber 2."""
 
     reference: int
     pressure_1: int
@@ -130,9 +131,9 @@ OF_LIMITS = (
 def converter_of(
     bits: float, pressure_range: float, torque_constant: float
 ) -> tuple[CountResolution, tuple[float, float]]:
-    """Steps and limits of a converter with some bits that shows ``pressure_range`` [Pa] as its largest number.
+    """Steps and limits of a converter with a number of bits and a full scale of ``pressure_range`` [Pa].
 
-    The reference has its 0 N m in the middle, and a count of it is the torque of a count of pressure.
+    A reference of 0 N m is in mid-range, and one count of the reference is the torque of one count of pressure.
     """
     top, middle = float(2 ** int(bits) - 1), float(2 ** (int(bits) - 1))
     step = pressure_range / top
@@ -140,7 +141,7 @@ def converter_of(
 
 
 def count_of(value: float, step: float, top: float) -> int:
-    """Count that a converter shows for a value in the unit of its ``step``: rounded, and within 0 and ``top``."""
+    """Converter count of a value in the unit of its ``step``: rounded, and limited to 0 and ``top``."""
     # What is not negative is rounded by adding a half, in C as in Python.
     return int(max(0.0, min(top, value / step + 0.5)))
 
@@ -157,12 +158,12 @@ def read(
 
 
 def is_inside(reading: int, top: int) -> bool:
-    """False for a reading at an end of its range, where a broken wire or a short circuit puts it."""
+    """Return whether a reading is not at an end of its range, where a broken wire or a short circuit puts it."""
     return reading > 0 and reading < top
 
 
 def still_sound(sound: int, readings: ConverterCounts, limits: ConverterLimits) -> int:
-    """1 as long as no reading was ever at an end of its range, else 0, for good."""
+    """Return 1 while no reading has been at an end of its range, else 0 permanently."""
     inside = (
         is_inside(readings.reference, limits.top)
         and is_inside(readings.pressure_1, limits.top)
@@ -172,5 +173,5 @@ def still_sound(sound: int, readings: ConverterCounts, limits: ConverterLimits) 
 
 
 def error_of(readings: ConverterCounts, limits: ConverterLimits) -> int:
-    """Reference less torque, in counts of pressure."""
+    """Reference minus torque, in counts of pressure."""
     return readings.reference - limits.middle - (readings.pressure_1 - readings.pressure_2)

@@ -1,4 +1,4 @@
-"""Small processors and the images of their firmware: memory and tools of a target, images built and measured."""
+"""Small processors and their firmware images: memory and tools of a target, building and measuring of images."""
 
 import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -15,7 +15,7 @@ from ppafo.wording import one_line
 
 
 class Decision(NamedTuple):
-    """Command in steps, 1 while all readings have been sound, and the cycles or instructions of the sample."""
+    """Decision for one sample: command in steps, 1 while all readings are valid, and cycles or instructions used."""
 
     command: int
     is_sound: int
@@ -31,9 +31,9 @@ class ImageSizes(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """A program for the simulator that was built: its file, what it takes, the addresses of its symbols.
+    """Program built for the simulator: its file, its sizes, and the addresses of its symbols.
 
-    ``shipped`` is what the program for the board takes, which has the real layer around the controller.
+    ``shipped`` are the sizes of the program for the board, which has the hardware layer around the controller.
     """
 
     file: Path
@@ -43,10 +43,10 @@ class Image:
 
 
 class ProcessorSimulator(Protocol):
-    """A simulator with an image in it, which waits for a sample. SimulationError where it does not answer."""
+    """Simulator with a loaded image that waits for a sample. Methods raise SimulationError if it does not respond."""
 
     def begin(self) -> None:
-        """Reset the processor, and let it come to where it waits for a sample."""
+        """Reset the processor and run it until it waits for a sample."""
 
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
         """Controller decisions for up to 50 consecutive samples, in one batch where the simulator can."""
@@ -55,22 +55,21 @@ class ProcessorSimulator(Protocol):
         """Deepest use of the stack [bytes]."""
 
     close: Callable[[], object]
-    """Ends the simulator."""
+    """Function that ends the simulator."""
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A processor that firmware is written for.
+    """Processor with firmware support.
 
-    ``processor`` and ``board`` say what it is, ``clock`` is the processor's [Hz], ``flash`` and ``ram`` are ranges of
-    addresses, ``interrupt_stack`` is what an interrupt of the board puts on the stack [bytes], ``converter_bits`` the
-    bits of its converter. ``words`` fill the templates: how it is compiled, linked and written, which pins it has.
-    ``templates`` are the files that belong to this target alone, ``wiring`` is the one with the part of README.md that
-    says what is wired to it.
+    ``processor`` and ``board`` describe it, ``clock`` is the clock frequency [Hz], ``flash`` and ``ram`` are address
+    ranges, ``interrupt_stack`` is the stack use of an interrupt on the board [bytes], ``converter_bits`` the resolution
+    of its converter. ``words`` fill the templates: commands to compile, link and flash, and pins. ``templates`` are the
+    files of this target alone, ``wiring`` is the file with the wiring section of README.md.
 
-    ``tools`` are the programs that building and simulating need, ``packages`` Debian's packages that have them.
-    ``simulator`` starts one with an image; ``machine`` is QEMU's name of a machine with the processor, which has the
-    clock ``machine_clock`` [Hz]. ``counted`` is what is counted of a sample: cycles or instructions.
+    ``tools`` are the programs for building and simulating, ``packages`` the Debian packages that contain them.
+    ``simulator`` starts a simulator with an image; ``machine`` is the QEMU name of a machine with the processor, with
+    the clock frequency ``machine_clock`` [Hz]. ``counted`` is the cost unit of a sample: cycles or instructions.
     """
 
     name: str
@@ -102,12 +101,12 @@ _SYMBOL = struct.Struct("<IIIBBH")
 
 
 def missing_tools(target: Target) -> tuple[str, ...]:
-    """The tools of a target that this computer lacks."""
+    """Tools of a target that are not installed on this computer."""
     return tuple(tool for tool in target.tools if which(tool) is None)
 
 
 def make_firmware(folder: Path, goals: Sequence[str] = ("all",)) -> None:
-    """Make what is asked for of the files of a firmware in a folder; SimulationError where that fails."""
+    """Run make for some goals in a folder with firmware files. Raises SimulationError if it fails."""
     done = asked(["make", "-C", str(folder), *goals], scratch=folder.absolute())
     if done.returncode != 0:
         # Make says which goal failed; the line of the compiler says why.
@@ -117,9 +116,9 @@ def make_firmware(folder: Path, goals: Sequence[str] = ("all",)) -> None:
 
 @contextmanager
 def processor_simulator(contents: Mapping[str, bytes], target: Target) -> Iterator[tuple[ProcessorSimulator, Image]]:
-    """The simulator of a target with the firmware of these files in it, and the image; both end with the ``with``.
+    """Context manager of the simulator of a target with the firmware of these files loaded; yields simulator and image.
 
-    SimulationError where a tool is missing, the files cannot be built, or the simulator does not answer.
+    Raises SimulationError if a tool is missing, the files cannot be built, or the simulator does not respond.
     """
     absent = missing_tools(target)
     if absent:
@@ -137,7 +136,7 @@ def processor_simulator(contents: Mapping[str, bytes], target: Target) -> Iterat
 
 
 class _Section(NamedTuple):
-    """A section of an ELF file."""
+    """Section of an ELF file."""
 
     name: int
     kind: int
@@ -152,7 +151,7 @@ class _Section(NamedTuple):
 
 
 def _sections(content: bytes) -> list[_Section]:
-    """The sections of a 32-bit ELF file, lowest byte first."""
+    """Sections of a little-endian 32-bit ELF file."""
     # Where the section headers begin, how long each is, and how many there are (e_shoff, e_shentsize, e_shnum).
     (start,) = struct.unpack_from("<I", content, 0x20)
     length, count = struct.unpack_from("<HH", content, 0x2E)
@@ -160,7 +159,7 @@ def _sections(content: bytes) -> list[_Section]:
 
 
 def sizes(image: Path, target: Target) -> ImageSizes:
-    """Flash and RAM that a program takes of a target."""
+    """Flash and RAM of a program on a target."""
     loaded = [section for section in _sections(image.read_bytes()) if section.flags & _LOADED]
     in_ram = [section for section in loaded if section.address in target.ram]
     values = sum(section.size for section in in_ram if section.kind == _WITH_VALUES)
@@ -170,7 +169,7 @@ def sizes(image: Path, target: Target) -> ImageSizes:
 
 
 def read_image(folder: Path, target: Target) -> Image:
-    """The image for the simulator in a folder where a firmware was built."""
+    """Image for the simulator from a folder with built firmware."""
     file, shipped = folder / "simulated.elf", folder / "firmware.elf"
     content = file.read_bytes()
     sections, symbols = _sections(content), {}

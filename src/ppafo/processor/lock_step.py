@@ -1,4 +1,4 @@
-"""A controller on the processor's simulator beside the same in Python: drawn samples, or a run of the plant."""
+"""Comparison of a controller on the processor's simulator and in Python: for drawn samples, or in a run."""
 
 import random
 from collections.abc import Iterator, Sequence
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 
 EPISODE = 200
-"""Drawn samples from one reset to the next."""
+"""Number of drawn samples between two resets."""
 
 TURN = 50
-"""Drawn samples that the processor is asked at once."""
+"""Number of drawn samples per query to the processor."""
 
 
 class PythonProcessor:
-    """The integer controller of a scenario in Python, as the processor computes it."""
+    """Integer controller of a scenario in Python, with the arithmetic of the processor."""
 
     def __init__(self, fixed: FixedPointController) -> None:
         self.law = fixed.law
@@ -38,17 +38,17 @@ class PythonProcessor:
         self.state: Any = fixed.law.begins
 
     def begin(self) -> None:
-        """Forget everything."""
+        """Reset the state."""
         self.state = self.law.begins
 
     def sample(self, readings: ConverterCounts) -> tuple[int, int]:
-        """Command in steps, and the status word that the processor reports with it."""
+        """Command in steps, and status word of the processor."""
         command, self.state = self.law.sample(self.numbers, self.state, readings)
         return command, self.state.sound
 
 
 class _SimulatedController:
-    """The simulated processor as a controller of a scenario; it keeps the decision of every sample."""
+    """Simulated processor as a controller of a scenario, which stores the decision of every sample."""
 
     def __init__(self, simulator: ProcessorSimulator, fixed: FixedPointController) -> None:
         self.simulator = simulator
@@ -61,7 +61,7 @@ class _SimulatedController:
         self.decisions.clear()
 
     def update(self, time: float, reference: float, measurement: Any) -> float:
-        """Command from -1 to 1, from what the converter shows; the processor needs no time [s], it counts samples."""
+        """Command from -1 to 1 for the converter readings; the processor counts samples instead of time [s]."""
         del time
         readings = read(self.fixed.steps, self.fixed.limits, reference, measurement)
         (decision,) = self.simulator.samples((readings,))
@@ -72,8 +72,8 @@ class _SimulatedController:
 class Cost(NamedTuple):
     """Resources of a target that a controller needs.
 
-    Sizes of the program and depth of the stack [bytes]; cycles or instructions of a sample, as the target counts them,
-    the most and the mean of all.
+    Sizes of the program and depth of the stack [bytes]; maximum and mean of the cycles or instructions of a sample, in
+    the unit of the target.
     """
 
     target: Target
@@ -85,9 +85,9 @@ class Cost(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ProcessorRun:
-    """A scenario controlled by the processor's simulator, the same by the integer controller in Python, and the cost.
+    """Scenario run with the simulated processor and with the integer controller in Python, and resources used.
 
-    ``differences`` are samples at which the commands differ; ``same_bits`` is true where every channel is the same.
+    ``differences`` is the number of samples with different commands; ``same_bits`` is True if all channels are equal.
     """
 
     scenario: Scenario
@@ -100,9 +100,9 @@ class ProcessorRun:
 
 
 def run_on_processor(scenario: Scenario, target: str = TARGETS[0]) -> ProcessorRun:
-    """Run a scenario with its controller on the processor's simulator, in virtual time, and once more in the lanes.
+    """Run a scenario with its controller on the processor's simulator, in virtual time, and again in the engine.
 
-    ScenarioError where the controller has no integer form, SimulationError where a tool is missing.
+    Raises ScenarioError if the controller has no integer form, SimulationError if a tool is missing.
     """
     fixed, chosen = fixed_point_controller(scenario), target_of(target)
     with processor_simulator(firmware(scenario, target), chosen) as (simulator, image):
@@ -118,7 +118,7 @@ def run_on_processor(scenario: Scenario, target: str = TARGETS[0]) -> ProcessorR
 
 @dataclass(frozen=True, slots=True)
 class DecisionComparison:
-    """Drawn samples on the processor's simulator and in Python: how many, how many decisions differ, and the cost."""
+    """Decisions on the processor's simulator and in Python: number of samples, of differences, and resources used."""
 
     samples: int
     differences: int
@@ -127,7 +127,7 @@ class DecisionComparison:
 
 
 def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str = TARGETS[0]) -> DecisionComparison:
-    """Give drawn readings to the processor's simulator and to Python, with a reset after every ``EPISODE`` of them."""
+    """Compare decisions for drawn readings on the simulator and in Python, with a reset every ``EPISODE`` samples."""
     fixed, chosen = fixed_point_controller(scenario), target_of(target)
     reference = PythonProcessor(fixed)
     wanted: list[tuple[int, int]] = []
@@ -154,9 +154,9 @@ def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str =
 
 
 def drawn_readings(top: int, samples: int, seed: int) -> Iterator[ConverterCounts]:
-    """Readings of a converter with some largest one: courses that wander, jump, rest at an edge, or break.
+    """Random converter readings up to a largest reading: signals that wander, jump, rest at a limit, or break.
 
-    Each episode has a manner of its own; in two of five a reading comes to an end of its range at some time.
+    Each episode has one kind of signal; in two of five a reading reaches an end of its range at some time.
     """
     draw = random.Random(seed)
     edges = (1, 2, top // 2, top // 2 + 1, top - 2, top - 1)
@@ -176,7 +176,7 @@ def drawn_readings(top: int, samples: int, seed: int) -> Iterator[ConverterCount
 
 
 def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision]) -> Cost:
-    """Resources that the decisions took on a processor. SimulationError without decisions."""
+    """Resources used by decisions on a processor. Raises SimulationError if there are no decisions."""
     if not decisions:
         raise SimulationError("no sample was taken on the processor")
     work = [decision.work for decision in decisions]
@@ -184,7 +184,7 @@ def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision])
 
 
 _MARGINS = FigureMargins(left=0.68, right=0.15, top=0.42, bottom=0.52, row_gap=0.36)
-"""Inches."""
+"""Margins of the figure [inches]."""
 _WIDTH, _TORQUE, _COMMAND = 7.6, 2.6, 0.9
 _LANES = (0, (1, 3))
 
@@ -192,7 +192,7 @@ _LANES = (0, (1, 3))
 def processor_figure(runs: Sequence[ProcessorRun]) -> "Figure":
     """Return the figure of some runs, two panels for each: torque with its reference, and the command to the valve.
 
-    The run in the lanes is drawn as dots on the lines of the processor. With ``torque-task-solenoid`` and
+    The run in the engine is drawn as dots on the lines of the processor. With ``torque-task-solenoid`` and
     ``torque-task-proportional`` it is figure 8 of the paper.
     """
     heights = [_TORQUE, _COMMAND] * len(runs)

@@ -1,4 +1,4 @@
-"""QEMU with a Cortex-M in it, driven by the remote protocol of gdb over its standard input and output."""
+"""QEMU with a Cortex-M, controlled by the gdb remote protocol over its standard input and output."""
 
 import struct
 from collections.abc import Callable, Iterable, Sequence
@@ -9,24 +9,24 @@ from ppafo.processor.console import UNTOUCHED, Console, depth_of_stack
 from ppafo.processor.images import Decision, Image, Target
 
 DEEPEST = 1024
-"""Size of the memory below the end of RAM that is searched for the stack [bytes]."""
+"""Size of the memory below the end of RAM that is searched for used stack [bytes]."""
 _SHIFT = 7
-"""Power of 2 that QEMU takes for an instruction, in nanoseconds."""
+"""Binary logarithm of the duration of an instruction in QEMU, in nanoseconds."""
 _NANOSECONDS = 2**_SHIFT
 """Duration of an instruction on the machine [ns]: more than two ticks of the counter, so that none is missed."""
 _COUNTER_BITS = 24
-"""Bits of SysTick, the counter that counts the ticks of the processor's clock down."""
+"""Number of bits of SysTick, which counts down the ticks of the processor's clock."""
 _PIECE = 1024
-"""Bytes that are read or written at once; a packet has no room for many more."""
+"""Bytes read or written in one packet, close to the largest packet size."""
 _FORM_OF_OUTPUTS = struct.Struct("<hhII")
-"""Command, whether readings are sound, and the counter before and after the sample, as they lie in memory."""
+"""Memory layout of the outputs: command, validity of the readings, and counter before and after the sample."""
 _THUMB, _LENGTH_OF_NOP = 1, 2
-"""Bit of an address that says that the instruction is Thumb, and the bytes of one that does nothing."""
+"""Address bit of a Thumb instruction, and length in bytes of an instruction without effect (nop)."""
 
 
 @final
 class Debugger:
-    """A machine of QEMU that stands still but when it is told to go on; addresses are its processor's."""
+    """QEMU machine that is stopped except between ``go_on`` and the next breakpoint; addresses are the processor's."""
 
     def __init__(self, machine: str, image: Image) -> None:
         time = f"shift={_SHIFT},sleep=off"
@@ -39,18 +39,18 @@ class Debugger:
         self._console.say(b"+")
 
     def reset(self) -> None:
-        """Reset the machine; it stands still at its beginning."""
+        """Reset the machine and leave it stopped at its entry."""
         answer = self.packet(f"qRcmd,{b'system_reset'.hex()}")
         # Before its OK, QEMU may send what the command has to say.
         while answer != "OK":
             answer = self._answer()
 
     def stop_at(self, address: int) -> None:
-        """Let the machine stop before an instruction, whenever it comes there."""
+        """Set a breakpoint before the instruction at an address."""
         self._expect(self.packet(f"Z0,{address:x},2"), "OK")
 
     def go_on(self, address: int | None = None) -> None:
-        """Let the machine run, from an address where one is given, until it stops."""
+        """Run the machine, from an address if one is given, until it stops."""
         # Bit 0 of an address says that the instruction is Thumb; a Cortex-M has no other.
         self._expect(self.packet("c" if address is None else f"c{address | _THUMB:x}")[:3], "T05")
 
@@ -66,13 +66,13 @@ class Debugger:
         return content
 
     def write(self, address: int, content: bytes) -> None:
-        """Put something into memory."""
+        """Write bytes to memory."""
         for at in range(0, len(content), _PIECE):
             piece = content[at : at + _PIECE]
             self._expect(self.packet(f"M{address + at:x},{len(piece):x}:{piece.hex()}"), "OK")
 
     def packet(self, text: str) -> str:
-        """The answer to a packet of the protocol."""
+        """Send a packet of the protocol and return the reply."""
         self._console.say(b"$%b#%02x" % (text.encode(), sum(text.encode()) % 256))
         return self._answer()
 
@@ -87,9 +87,9 @@ class Debugger:
 
 @final
 class QemuSimulator:
-    """QEMU with the image of a controller in it.
+    """QEMU with the image of a controller loaded.
 
-    It has no model of cycles: what is counted are instructions, by a clock that goes on by the same time with each.
+    QEMU does not model cycles: instructions are counted, by a clock that advances by the same time for each.
     """
 
     def __init__(self, target: Target, image: Image) -> None:
@@ -104,7 +104,7 @@ class QemuSimulator:
         self.debugger.go_on()
 
     def begin(self) -> None:
-        """Reset the processor, and let it come to where it waits for a sample."""
+        """Reset the processor and run it until it waits for a sample."""
         self.debugger.reset()
         self.debugger.go_on()
 
@@ -123,5 +123,5 @@ class QemuSimulator:
         return decisions
 
     def stack(self) -> int:
-        """Deepest use of the stack [bytes]: what it has overwritten of RAM that was filled before."""
+        """Deepest use of the stack [bytes]: the overwritten part of RAM that was filled before."""
         return depth_of_stack(self.debugger.read(self._bottom, DEEPEST))

@@ -1,4 +1,4 @@
-"""A scenario's integer controller in C behind the protocol of ``ppafo hil``: the other side of the wire."""
+"""Integer controller of a scenario in C with the protocol of ``ppafo hil``: the controller side of the link."""
 
 import shlex
 
@@ -14,7 +14,7 @@ _TEMPLATES = ("Makefile", "README.md", "host.c", "link.c", "link.h", "plant.h")
 
 
 def example_controller(scenario: Scenario) -> dict[str, bytes]:
-    """Files of a controller at the wire, by name. ScenarioError where it has no form on whole numbers."""
+    """Files of a controller for the link, by name. Raises ScenarioError if it has no integer form."""
     fixed = fixed_point_controller(scenario)
     written = firmware(scenario)
     period = round(scenario.controller.period * MICROSECONDS)

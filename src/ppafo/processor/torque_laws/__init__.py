@@ -1,1 +1,1 @@
-"""Torque laws on whole numbers, as a small processor computes them: on/off control, with a dead zone, and PID."""
+"""Torque laws in integer arithmetic for a small processor: on/off control, dead zone, and PID."""

@@ -1,4 +1,4 @@
-"""The integer controllers, by the names that scenarios give them. To add one: a module beside this, and one word."""
+"""Integer controllers by their names in scenarios. To add one: a module in this folder, and one entry."""
 
 from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.processor.torque_laws.on_off import DEAD_ZONE, ON_OFF

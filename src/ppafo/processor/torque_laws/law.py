@@ -1,4 +1,4 @@
-"""Declaration of an integer controller, in addition to its entry in the catalogue of controllers, and its numbers."""
+"""Declaration of an integer controller and its numbers, in addition to its entry in the catalogue of controllers."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -13,21 +13,21 @@ from ppafo.model.declaration import Quantity
 from ppafo.processor.fixed_point import SETTINGS, ConverterCounts, converter_of
 
 Sample = Callable[[Any, Any, ConverterCounts], tuple[int, Any]]
-"""Command in steps, from -1000 to 1000, and next state, of numbers, state and readings: a pure function of integers."""
+"""Function from numbers, state and readings to a command in steps, -1000 to 1000, and the next state; integers only."""
 Settings = Mapping[str, float]
 _ROUNDING = 1.0e-9
-"""Torque [N m] by which a reference may pass what the converter shows: rounding."""
+"""Torque [N m] by which a reference may exceed the converter range, for rounding."""
 
 
 @dataclass(frozen=True, slots=True)
 class FixedLaw:
-    """The integer form of a controller of the catalogue.
+    """Integer form of a controller in the catalogue.
 
-    ``kind`` runs it in the lanes: its update reads the converter, calls ``sample``, which is the law itself, and gives
-    the command back as a number from -1 to 1. ``numbers`` is the NamedTuple class of what ``sample`` is given beside
-    state and readings; ``number_quantities`` declare the numbers, in order. The state ``begins`` so, and
-    ``state_ranges`` has lowest and highest of every number of it, by its own name; its ``sound`` is what a processor
-    reports.
+    ``kind`` is the form for the engine: its update reads the converter, calls ``sample``, which is the law itself, and
+    returns the command as a number from -1 to 1. ``numbers`` is the NamedTuple class of the parameters of ``sample``;
+    ``number_quantities`` declare its fields, in order. ``begins`` is the initial state, and ``state_ranges`` contains
+    the lowest and highest value of every state variable by name; the state variable ``sound`` is reported by the
+    processor.
     """
 
     kind: ControllerKind
@@ -40,11 +40,11 @@ class FixedLaw:
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """The plan of an integer law, of which ``ControllerKind`` says what it is given and what it makes.
+    """Plan of an integer law, with the arguments and results of ``ControllerKind.plan``.
 
-    ``prepare(settings, period, torque_step)`` makes the numbers after the converter's, for one run, ``quantities``
-    declare all of them in order. ``largest`` is the largest part of its range that any number takes, above 1 where the
-    settings cannot be held. A law without numbers of its own has neither.
+    ``prepare(settings, period, torque_step)`` computes the numbers after the converter's, for one run; ``quantities``
+    declare all numbers in order. ``largest`` returns the largest ratio of a number to the limit of its range, above 1
+    if the settings cannot be represented. A law whose only numbers are the converter's has neither.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Numbers:
     def __call__(
         self, settings: Mapping[str, Any], period: Any, torque_constant: Any, reference: tuple[Any, Any]
     ) -> tuple[dict[str, Any], tuple[Problem, ...]]:
-        """Whole numbers by name, and what may be wrong."""
+        """Integers by name, and problems of the settings."""
         bits, pressure_range = (settings[quantity.name] for quantity in SETTINGS)
         steps, limits = over_runs(converter_of, bits, pressure_range, torque_constant)
         names = tuple(settings)
@@ -102,7 +102,7 @@ def fixed_point_kind(
     update: Callable[[Any, Any, float, Any, float], tuple[float, Any]],
     plan: Numbers,
 ) -> ControllerKind:
-    """The integer form of a law as a controller of the catalogue: its settings, and the converter's."""
+    """Integer form of a law as a controller in the catalogue, with the settings of the law and of the converter."""
     return replace(
         floats,
         name=plan.name,

@@ -1,4 +1,4 @@
-"""On/off control on whole numbers: equation (14), and its second form, with a dead zone and hysteresis.
+"""On/off control in integer arithmetic: equation (14), and its form with a dead zone and hysteresis.
 
 Errors are in counts of the converter, commands in steps of 1/1000.
 """
@@ -27,26 +27,26 @@ from ppafo.processor.torque_laws.law import FixedLaw, Numbers, fixed_point_kind
 
 
 class OnOffNumbers(NamedTuple):
-    """Limits of the readings."""
+    """Parameters of on/off control: limits of the readings."""
 
     limits: ConverterLimits
 
 
 class OnOffCounts(NamedTuple):
-    """1 while all readings have been sound."""
+    """State of on/off control: 1 while all readings have been valid."""
 
     sound: int
 
 
 class OnOffRows(NamedTuple):
-    """Steps of the converter, and what ``on_off_sample`` is given."""
+    """Steps of the converter, and parameters of ``on_off_sample``."""
 
     steps: CountResolution
     numbers: OnOffNumbers
 
 
 def on_off_sample(numbers: OnOffNumbers, state: OnOffCounts, readings: ConverterCounts) -> tuple[int, OnOffCounts]:
-    """Command in steps: 1000 where the error is 0 or more, else -1000; 0, for good, after a reading at an end."""
+    """Command in steps: 1000 for an error of 0 or more, else -1000; permanently 0 after a reading out of range."""
     sound = still_sound(state.sound, readings, numbers.limits)
     command = COMMAND_STEPS if error_of(readings, numbers.limits) >= 0 else -COMMAND_STEPS
     return (command if sound == 1 else 0), OnOffCounts(sound)
@@ -55,7 +55,7 @@ def on_off_sample(numbers: OnOffNumbers, state: OnOffCounts, readings: Converter
 def on_off_update(
     parameters: OnOffRows, state: OnOffCounts, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, OnOffCounts]:
-    """Command from -1 to 1 that ``on_off_sample`` gives for what the converter shows."""
+    """Command from -1 to 1 by ``on_off_sample`` for the converter readings."""
     readings = read(parameters.steps, parameters.numbers.limits, reference, measurement)
     command, after = on_off_sample(each(int, parameters.numbers), each(int, state), readings)
     return float(command) / COMMAND_STEPS, each(float, after)
@@ -88,14 +88,14 @@ class DeadZoneNumbers(NamedTuple):
 
 
 class DeadZoneCounts(NamedTuple):
-    """Direction in which the valve is open, 1, 0 or -1; 1 while all readings have been sound."""
+    """Direction of the opening: 1, 0 (closed) or -1; and 1 while all readings have been valid."""
 
     direction: int
     sound: int
 
 
 class DeadZoneRows(NamedTuple):
-    """Steps of the converter, and what ``dead_zone_sample`` is given."""
+    """Steps of the converter, and parameters of ``dead_zone_sample``."""
 
     steps: CountResolution
     numbers: DeadZoneNumbers
@@ -104,7 +104,7 @@ class DeadZoneRows(NamedTuple):
 def dead_zone_sample(
     numbers: DeadZoneNumbers, state: DeadZoneCounts, readings: ConverterCounts
 ) -> tuple[int, DeadZoneCounts]:
-    """Command in steps: the opening, towards the reference, beyond the dead zone; 0, for good, after a bad reading."""
+    """Command in steps: opening in the direction of an error beyond the dead zone; 0 for good after a bad reading."""
     sound = still_sound(state.sound, readings, numbers.limits)
     error = error_of(readings, numbers.limits)
     # Hysteresis: the valve closes at the release, nearer to the reference than where it opens.
@@ -118,7 +118,7 @@ def dead_zone_sample(
 def dead_zone_update(
     parameters: DeadZoneRows, state: DeadZoneCounts, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, DeadZoneCounts]:
-    """Command from -1 to 1 that ``dead_zone_sample`` gives for what the converter shows."""
+    """Command from -1 to 1 by ``dead_zone_sample`` for the converter readings."""
     readings = read(parameters.steps, parameters.numbers.limits, reference, measurement)
     command, after = dead_zone_sample(each(int, parameters.numbers), each(int, state), readings)
     return float(command) / COMMAND_STEPS, each(float, after)
@@ -133,7 +133,7 @@ def prepare_dead_zone(settings: Mapping[str, float], period: float, torque_step:
 
 
 def largest_dead_zone(settings: Mapping[str, float], period: float, torque_step: float) -> float:
-    """The dead zone over what its number can hold [-]."""
+    """Dead zone divided by the largest value of its number [-]."""
     return settings["dead_zone"] / torque_step / LARGEST_READING
 
 

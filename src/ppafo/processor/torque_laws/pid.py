@@ -1,8 +1,8 @@
-"""PID on whole numbers: equation (13), with anti-windup and derivative filter as options.
+"""PID in integer arithmetic: equation (13), with optional anti-windup and derivative filter.
 
-Commands are in 64 parts of a step while they are summed, the integral in 256 parts of these, the error in counts and
-its slope in 1/65536 counts a sample. What the float form has no limit for is limited far out: the integral at 32 full
-commands, the slope at 8191 counts a sample, what anti-windup pulls back by at 32 full commands.
+During summation a command is in units of 1/64 step, the integral in 1/256 of this unit, the error in counts and its
+slope in 1/65536 counts per sample. Values that are unlimited in the float form have wide limits: the integral 32 full
+commands, the slope 8191 counts per sample, the anti-windup correction 32 full commands.
 """
 
 from collections.abc import Mapping
@@ -36,29 +36,29 @@ from ppafo.processor.torque_laws.law import FixedLaw, Numbers, fixed_point_kind
 
 PART_BITS = 6
 HALF_STEP = 2 ** (PART_BITS - 1)
-"""Half a step of the command, in parts of a step."""
+"""Half a step of the command, in units of the summation (1/64 step)."""
 FULL = COMMAND_STEPS * 2**PART_BITS
-"""A command of 1 while it is summed, in parts of a step."""
+"""Command of 1 during summation, in units of 1/64 step."""
 FINE_BITS = 8
 FINE = 2**FINE_BITS
-"""Parts of a part that the integral is kept in."""
+"""Number of integral units in 1/64 step."""
 WIDE = 2**FRACTION_BITS
-"""Factor of the error, so that ``fraction_of`` keeps all bits of its product with a gain."""
+"""Scale factor of the error, so that ``fraction_of`` keeps all bits of its product with a gain."""
 SLOPE_UNIT = 65536
-"""Parts of a count that the slope is kept in."""
+"""Number of slope units per count."""
 LARGEST_CHANGE = 8191
-"""Largest change of the error [counts]: 8191 * 65536 is below 2^30, the largest value that ``fraction_of`` takes."""
+"""Largest change of the error [counts]: 8191 * 65536 is below 2^30, the largest argument of ``fraction_of``."""
 LARGEST_SLOPE = LARGEST_CHANGE * SLOPE_UNIT
 LARGEST_EXCESS = 32 * FULL
-"""Largest excess that anti-windup pulls back by, in parts of a step: with its fine parts it is below 2^30."""
+"""Largest anti-windup correction, in units of 1/64 step; in integral units it is below 2^30."""
 LARGEST_INTEGRAL = 32 * FULL * FINE
-"""Largest integral, in fine parts: below 2^30."""
+"""Largest integral, in integral units: below 2^30."""
 SHARE = float(2**FRACTION_BITS)
-"""A share of 1."""
+"""Integer value of a fraction of 1."""
 
 
 class PidNumbers(NamedTuple):
-    """Limits of the readings, gains as fractions of 15 bits and places; filter, anti-windup, dead band in 1/2^15."""
+    """Limits of the readings, gains as 15-bit fractions and shifts; filter, anti-windup and dead band in 1/2^15."""
 
     limits: ConverterLimits
     proportional: int
@@ -73,7 +73,7 @@ class PidNumbers(NamedTuple):
 
 
 class PidCounts(NamedTuple):
-    """Integral [1/256 parts], last error [counts], slope [1/65536 counts], 1 once begun, 1 while readings are sound."""
+    """Integral [integral units], error [counts], slope [1/65536 counts], 1 once started, 1 while readings are valid."""
 
     integral: int
     error: int
@@ -83,14 +83,14 @@ class PidCounts(NamedTuple):
 
 
 class PidRows(NamedTuple):
-    """Steps of the converter, and what ``pid_sample`` is given."""
+    """Steps of the converter, and parameters of ``pid_sample``."""
 
     steps: CountResolution
     numbers: PidNumbers
 
 
 def pid_sample(numbers: PidNumbers, state: PidCounts, readings: ConverterCounts) -> tuple[int, PidCounts]:
-    """Command in steps from -1000 to 1000 at a sample; 0, for good, once a reading was at an end of its range."""
+    """Command in steps from -1000 to 1000 for a sample; permanently 0 after a reading at an end of its range."""
     sound = still_sound(state.sound, readings, numbers.limits)
     error = error_of(readings, numbers.limits)
     # Without a last error there is no change: no derivative kick at the first sample.
@@ -120,7 +120,7 @@ def pid_sample(numbers: PidNumbers, state: PidCounts, readings: ConverterCounts)
 def pid_update(
     parameters: PidRows, state: PidCounts, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, PidCounts]:
-    """Command from -1 to 1 that ``pid_sample`` gives for what the converter shows, once every ``period`` [s]."""
+    """Command from -1 to 1 by ``pid_sample`` for the converter readings, once every ``period`` [s]."""
     readings = read(parameters.steps, parameters.numbers.limits, reference, measurement)
     command, after = pid_sample(each(int, parameters.numbers), each(int, state), readings)
     return float(command) / COMMAND_STEPS, each(float, after)
@@ -129,11 +129,12 @@ def pid_update(
 def pid_factors(
     settings: Mapping[str, float], period: float, torque_step: float
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Factors of the law for settings in SI units, a sample period [s] and a torque per count [N m].
+    """Gains and fractions of the law for settings in SI units, a sample period [s] and a torque per count [N m].
 
-    Gains, held as a fraction and places: for the error, in parts of a step per count; for its integral, in fine parts;
-    for the slope, in parts of a step for 1/65536 count a sample times 2^15. Shares [-]: of a change that the slope has
-    at once, of the excess that the integral gives back at a sample, and the dead band.
+    The gains are represented by a fraction and a shift: of the error, in 1/64 step per count; of its integral, in
+    integral units; of the slope, in 1/64 step per 1/65536 count per sample, times 2^15. The fractions [-] are: of a
+    change that enters the slope at once, of the excess that is subtracted from the integral at a sample, and the dead
+    band.
     """
     # Gains of a torque [N m] and of seconds become gains of counts and samples.
     count = torque_step * FULL
@@ -148,14 +149,14 @@ def pid_factors(
 
 
 def prepare_pid(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:
-    """Return the numbers of ``PidNumbers`` after the limits: for settings in SI units, a period [s], a count [N m]."""
+    """Numbers of ``PidNumbers`` after the limits, for settings in SI units, period [s] and torque per count [N m]."""
     gains, shares = pid_factors(settings, period, torque_step)
     scaled = (number for gain in gains for number in gain_of(gain))
     return (*scaled, *(float(min(LARGEST_FRACTION, int(share * SHARE + 0.5))) for share in shares))
 
 
 def largest_pid(settings: Mapping[str, float], period: float, torque_step: float) -> float:
-    """Return the largest factor over what its number can hold [-]; above 1 the settings are refused."""
+    """Largest ratio of a gain to the largest value of its number [-]; above 1 the settings are refused."""
     gains, (_, anti_windup, _) = pid_factors(settings, period, torque_step)
     return max(*gains, anti_windup * LARGEST_FRACTION) / LARGEST_FRACTION
 
