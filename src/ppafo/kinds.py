@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger("ppafo")
 
 Kind = TypeVar("Kind")
-"""Entry of a catalogue: it has a ``name``, or is another package's function, named by its entry point."""
+"""Entry of a catalogue: an object with a ``name``, or a function of another package named by its entry point."""
 
 
 class Kinds(MutableMapping[str, Kind], Generic[Kind]):

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 _SIZE = (6.4, 3.6)
 """Width and height of a picture [inches]."""
 _RESOLUTION = 100
-"""Dots an inch: 640 by 360 points, even numbers as films want them."""
+"""Dots per inch: 640 by 360 pixels, even numbers as video formats require."""
 _SHAFT = 0.15
 """Ratio of the radii of shaft and housing [-]."""
 _NEUTRAL = 90.0
-"""Angle of a neutral ankle [deg]."""
+"""Neutral ankle angle [deg]."""
 
 
 class EpisodeFrame(NamedTuple):

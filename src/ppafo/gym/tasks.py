@@ -19,7 +19,7 @@ GRAM = 1.0e-3
 LOADED, UNLOADED = 60.0, 30.0
 """Heel forces [N] above which the heel counts as loaded, and below which as unloaded, as in walking controllers."""
 LONGEST_SINCE = 10.0
-"""Longest time since a heel strike that is observed [s]."""
+"""Upper bound of the observed time since a heel strike [s]."""
 
 
 class Goal(NamedTuple):
@@ -45,7 +45,7 @@ class Requested(NamedTuple):
 
 
 class Sensed(NamedTuple):
-    """Observation common to all tasks: angle [rad], absolute pressures [bar], torque computed from them [N m]."""
+    """Observation common to all tasks: angle [rad], absolute pressures [bar], torque from the pressures [N m]."""
 
     angle: float
     pressure_1: float

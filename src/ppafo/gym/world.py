@@ -122,9 +122,9 @@ WALKING_TIME = 6.0
 CONTINUOUS, ON_OFF = "continuous", "on_off"
 PHYSICAL, SCALED = "physical", "scaled"
 COMMANDS = 3
-"""Number of commands of a pair of on/off valves: -1, 0 and 1."""
+"""Number of commands for a pair of on/off valves: -1, 0 and 1."""
 LARGEST_RATE, LARGEST_FORCE = 1.0e3, 5.0e3
-"""Bounds of the requested rate [N m/s] and of the forces [N] that are observed."""
+"""Bounds of the observed rate of the requested torque [N m/s] and of the observed forces [N]."""
 HEADROOM = 2.0
 """Largest observed pressure divided by the highest supply pressure: a moving vane compresses its gas."""
 

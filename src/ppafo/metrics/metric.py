@@ -83,7 +83,7 @@ class ReadAt:
     function: PlainFunction | None = None
 
     def __call__(self, readings: Readings) -> Floats:
-        """Metric of metered runs (runs,)."""
+        """Metric of runs without recording (runs,)."""
         row: Any = readings
         numbers = [reduce(_entry, place.split("."), row) for place in self.places]
         found: Floats = numbers[0] if self.function is None else self.function(*numbers)
@@ -215,7 +215,7 @@ def hold(recording: Recording) -> slice | None:
 
 
 def spans(readings: Readings) -> tuple[Floats, Floats]:
-    """Number of samples before the hold and of intervals on the hold, of metered runs; nan if there is no such part."""
+    """Number of samples before the hold and of intervals on it (runs,), for runs without recording; nan if absent."""
     # Read at the end of a run, where the course has seen the whole reference.
     start = readings.course.hold_start
     length = readings.samples - 1 - start

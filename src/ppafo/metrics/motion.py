@@ -120,7 +120,7 @@ FOOT_ERROR = MeterKind("foot_error", FootError, start_foot_error, update_foot_er
 
 
 def read_foot_angle_error(readings: Readings) -> Floats:
-    """``foot_angle_error`` [rad]."""
+    """Metric ``foot_angle_error`` [rad] of runs without recording."""
     return root(readings.meters[FOOT_ERROR.name].total / (readings.samples - 1))
 
 

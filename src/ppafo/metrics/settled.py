@@ -125,13 +125,13 @@ def farther(highest: Floats, lowest: Floats) -> Floats:
 
 
 def read_reversals(readings: Readings) -> Floats:
-    """``settled_reversals`` of the command [1/s]; a duration below a second counts as one second."""
+    """Metric ``settled_reversals`` of the command [1/s]; a duration below a second counts as one second."""
     sums = readings.meters[SETTLED.name]
     return np.asarray(sums.command.turns / larger((sums.taken - 1.0) * readings.interval, 1.0))
 
 
 def read_share_of_hold(readings: Readings) -> Floats:
-    """``settled_share_of_hold`` [-]: duration of the hold divided by duration of the run."""
+    """Metric ``settled_share_of_hold`` [-]: duration of the hold divided by duration of the run."""
     return np.asarray((readings.samples - 1 - readings.course.hold_start) / (readings.samples - 1))
 
 

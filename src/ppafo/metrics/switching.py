@@ -170,12 +170,12 @@ OSCILLATIONS = MeterKind("oscillations", Oscillations, start_oscillations, updat
 
 
 def read_oscillations_ramp(readings: Readings) -> Floats:
-    """``oscillations_ramp``, the number of reversals."""
+    """Metric ``oscillations_ramp``, the number of reversals on the ramp, of runs without recording."""
     return _where_swinging(readings, spans(readings)[0], count_of(readings.meters[OSCILLATIONS.name].turns_on_ramp))
 
 
 def read_oscillations_hold(readings: Readings) -> Floats:
-    """``oscillations_hold``, the number of reversals."""
+    """Metric ``oscillations_hold``, the number of reversals on the hold, of runs without recording."""
     return _where_swinging(readings, spans(readings)[1], count_of(readings.meters[OSCILLATIONS.name].swing.turns))
 
 

@@ -110,19 +110,19 @@ ABSOLUTE_ERROR = MeterKind("absolute_error", AbsoluteError, start_absolute_error
 
 
 def read_rms_error(readings: Readings) -> Floats:
-    """``rms_error`` [N m]."""
+    """Metric ``rms_error`` [N m] of runs without recording."""
     squares = readings.meters[SQUARED_ERROR.name]
     return root((squares.before_hold + squares.on_hold) / (readings.samples - 1))
 
 
 def read_rms_error_ramp(readings: Readings) -> Floats:
-    """``rms_error_ramp`` [N m]."""
+    """Metric ``rms_error_ramp`` [N m], before the hold, of runs without recording."""
     start, _ = spans(readings)
     return root(readings.meters[SQUARED_ERROR.name].before_hold / start)
 
 
 def read_rms_error_hold(readings: Readings) -> Floats:
-    """``rms_error_hold`` [N m]."""
+    """Metric ``rms_error_hold`` [N m] of runs without recording."""
     _, length = spans(readings)
     return root(readings.meters[SQUARED_ERROR.name].on_hold / length)
 
@@ -172,4 +172,4 @@ _OF_TORQUE = (
 METRICS = for_each_reference(_OF_TORQUE, lambda name, controlled: name.replace("error", f"{controlled}_error"))
 
 TRACKING = tuple(kind.name for kind in METRICS)
-"""Names of the errors, of each reference."""
+"""Names of the error metrics, for each controlled quantity."""

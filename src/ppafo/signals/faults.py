@@ -13,7 +13,7 @@ GAP_SAMPLES = 10.0
 """Shortest gap, in median sampling intervals."""
 
 FEWEST_AT_LIMIT = 20
-"""Fewest equal samples that indicate a sensor at its limit."""
+"""Fewest equal samples that indicate a saturated sensor."""
 
 MINIMUM_SAMPLES = 10
 """Fewest samples for an estimate of the noise."""
@@ -21,7 +21,7 @@ MINIMUM_SAMPLES = 10
 _SPREAD_OF_MEDIAN = 1.4826
 """Standard deviation of a normal distribution divided by its median absolute deviation, robust to steps [-]."""
 _KEPT = 3.0
-"""Largest usual difference, in standard deviations."""
+"""Largest third difference used for the noise, in standard deviations."""
 _SHARE_OF_KEPT = 0.98658
 """Standard deviation of a standard normal distribution truncated at 3 standard deviations [-]."""
 _GAIN_OF_DIFFERENCES = math.sqrt(20.0)
@@ -31,13 +31,13 @@ _NOISY_FRACTION = 0.2
 _ABRUPT_FRACTION = 0.3
 """Slope into a plateau at a limit, as a fraction of the steepest slope of the signal."""
 _BEFORE = 5
-"""Samples before a plateau by which its approach is assessed."""
+"""Number of samples before a plateau that show the approach to it."""
 _EXCEPTIONAL = 5
 """Length of a plateau divided by the next longest one, above which it is no converter step [-]."""
 _PARTS = 20
-"""Parts of a signal whose means show a lasting change."""
+"""Number of parts of a signal whose means show a lasting change."""
 _SMOOTH = 1.0e-6
-"""Fraction of the range up to which a value's distance from the line between its neighbours is rounding."""
+"""Deviation of a value from the line between its neighbours, as a fraction of the range, that counts as rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +165,7 @@ def _five_around(values: Floats) -> Floats:
 
 
 _ROUNDING = 1.0e-9
-"""Fraction of a range [-] below which a step is rounding of a file and not of a converter."""
+"""Step, as a fraction of the range [-], below which it is rounding of a file and not of a converter."""
 _SHARE_THAT_DIFFERS = 0.5
 """Largest fraction of distinct values in a signal with a visible converter step."""
 

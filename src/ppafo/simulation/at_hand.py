@@ -1,4 +1,4 @@
-"""Common access to a result with a recording: channels in any unit, tables, and its display in a notebook."""
+"""Common interface of results with a recording: channels in any unit, tables, and display in a notebook."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class RecordedResult(Protocol):
-    """A result of a scenario or a walk that holds its recording."""
+    """Result of a scenario or a walk, with its recording."""
 
     @property
     def scenario(self) -> Scenario:

@@ -31,7 +31,7 @@ MARGIN = 1.5
 LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, LARGEST_OF_TEMPERATURE = 2.0e-4, 1.0e-3, 2.0e-3
 """Default error limits relative to the ranges of angle and pressures, and to the gas temperature [-]."""
 SMALLEST_TOLERANCE = 1.0e-6
-"""Smallest ``run.tolerance`` that a run may have [-]."""
+"""Smallest allowed ``run.tolerance`` [-]."""
 
 MOVE = 1.0e-7
 """Perturbation of a start or a measurement, as a fraction of its range."""
@@ -209,7 +209,7 @@ class Check:
 
 
 Again = Callable[[Sequence[Run]], Sequence[RecordedResult]]
-"""Function that runs other plans of the same scenario."""
+"""Function that executes other planned runs of the same scenario."""
 
 
 def finer(run: Run) -> Run:

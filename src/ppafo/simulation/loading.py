@@ -1,4 +1,4 @@
-"""Loading of a scenario in SI units by name, file or plain values; every mistake is one clear line."""
+"""Loading of a scenario in SI units by name, file or plain values; each mistake gives a one-line error."""
 
 import copy
 from collections.abc import Callable, Iterable, Mapping

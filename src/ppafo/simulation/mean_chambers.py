@@ -74,7 +74,7 @@ class ShapedParts(NamedTuple):
 
 
 class ChamberParts(NamedTuple):
-    """Chambers of an actuator at an angle [rad]."""
+    """Function for the chambers of an actuator at an angle [rad]."""
 
     at: Callable[[Any, Range, Surroundings, float], MeanChambers]
 
@@ -145,7 +145,7 @@ def usual_chambers(settings: Any, stops: Range, around: Surroundings, *, parts: 
 
 
 def vane_growth(settings: VaneSettings, _stops: Range, _around: Surroundings) -> float:
-    """Volume of chamber 1 of a vane displaced per angle [m^3/rad], independent of the angle."""
+    """Volume displaced per angle in chamber 1 of a vane [m^3/rad], independent of the angle."""
     return settings.displacement_per_radian
 
 

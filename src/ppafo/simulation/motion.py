@@ -167,7 +167,7 @@ FREE_MOTION = VaneKind(
     plan=_plan,
     measured=_measured,
 )
-"""Equation (1), with a constant external torque."""
+"""Free motion by equation (1), with a constant external torque."""
 
 
 def _read_locked(
@@ -269,4 +269,4 @@ LEG_MOTION = VaneKind(
     plan=_plan_leg,
     measured=_measured_leg,
 )
-"""Equation (11), without ground."""
+"""Motion with the foot of a leg by equation (11), without ground contact."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ppafo.signals.recording import Recording
 
 ScenarioType_contra = TypeVar("ScenarioType_contra", contravariant=True)
-"""A scenario, which has a motion and is defined above it."""
+"""Scenario type of a kind of motion, defined in a package above."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ class MotionKind(Protocol[ScenarioType_contra]):
 
     @property
     def is_repeated_for_its_error(self) -> bool:
-        """True if runs are so short that the error estimate, a second run, is made without request."""
+        """True if runs are short enough to be repeated for an error estimate without request."""
 
     def plan(self, scenario: ScenarioType_contra, /) -> "tuple[Run, tuple[Problem, ...]]":
         """Return the run and its possible problems, as ``plan_vane`` does."""

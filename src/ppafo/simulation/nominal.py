@@ -40,7 +40,7 @@ AREA_PATHS, SONIC_PATHS = (
     {section: tuple(f"{section}.{quantity.name}" for quantity in form) for section in (VALVE, LEAK)}
     for form in (AREA_FORM, SONIC_FORM)
 )
-"""Paths of the numbers of an orifice in each of its forms, by its section."""
+"""Paths of the numbers of an orifice, by section, for each of the two forms."""
 LEAST_SHARE = 0.05
 """Smallest dead volume as a fraction of the chamber volume at mid-range [-]."""
 USUAL_RANGE = 1.0e6
@@ -52,12 +52,12 @@ _SPOOL = "proportional"
 
 
 def yes(number: float) -> float:
-    """Return 1 for any finite number, so that a column of numbers gives one of ones."""
+    """Return 1 for any finite number, elementwise for a column."""
     return 1.0 + 0.0 * number
 
 
 def no(number: float) -> float:
-    """Return 0 for any finite number, so that a column of numbers gives one of zeros."""
+    """Return 0 for any finite number, elementwise for a column."""
     return 0.0 * number
 
 
@@ -80,7 +80,7 @@ def flow_of_sonic(molar_mass: float, temperature: float, sonic: float) -> float:
 
 
 def product_of(molar_mass: float, temperature: float) -> float:
-    """R T / M [J/kg], from molar mass [kg/mol] and temperature [K]."""
+    """Specific gas constant times temperature, R T / M [J/kg], from molar mass [kg/mol] and temperature [K]."""
     return specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass) * temperature
 
 

@@ -172,7 +172,7 @@ def number_at(scenario: Scenario, path: str) -> float:
 
 
 def other_form(device: Device, section: str) -> tuple[str, ...]:
-    """Return the number names of the form in which an orifice (``valve`` or ``actuator.leak``) is not given."""
+    """Return the names of the numbers in the form that an orifice (``valve`` or ``actuator.leak``) does not have."""
     orifice = device.valve.orifice if section == "valve" else device.actuator.leak
     return tuple(quantity.name for quantity in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM))
 

@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 MAXIMUM_STEPS = 1.0e9
 
 WHOLE = 1.0e-9
-"""Relative difference up to which a number of steps is a whole one."""
+"""Relative difference up to which a number of steps counts as an integer."""
 
 
 def plan_run(scenario: Scenario) -> Run:

@@ -106,7 +106,7 @@ class FreeMotion:
 
     @property
     def form(self) -> str:
-        """Fixed form of the motion, independent of its numbers, in words."""
+        """Form of the motion in words, independent of its numbers."""
         return (
             "free" if self.leg is None else f"free with the foot of a leg, whose shank is led, `{self.leg.shank.kind}`"
         )
@@ -150,7 +150,7 @@ class PrescribedMotion:
 
     @property
     def form(self) -> str:
-        """Fixed form of the motion, independent of its numbers, in words."""
+        """Form of the motion in words, independent of its numbers."""
         return f"prescribed, `{self.profile.kind}`"
 
     @property
@@ -163,7 +163,7 @@ class PrescribedMotion:
 
 
 class Motion(Protocol):
-    """Motion of the ankle: a vane alone, or a leg with the device, which is defined in a package above."""
+    """Motion of the ankle: a vane alone, or a walking leg with the device, defined in a package above."""
 
     @property
     def motion_kind(self) -> "MotionKind[Scenario]":

@@ -230,7 +230,7 @@ def results_of(scenario: Scenario, runs: Sequence[Run]) -> list[Result]:
 
 
 def simulate_many(scenarios: Sequence[Scenario], threads: int | None = None) -> list[Result]:
-    """Run many scenarios side by side, each exactly as if it ran alone."""
+    """Run many scenarios in parallel; each result is exactly as if run alone."""
     runs = [plan_run(scenario) for scenario in scenarios]
     # A Python controller does not run in the lanes: its scenario runs by itself below.
     inside = [index for index, scenario in enumerate(scenarios) if scenario.controller.custom is None]

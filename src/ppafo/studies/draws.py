@@ -81,7 +81,7 @@ class Uncertainty:
 
 
 def replicate_seed(seed: int, replicate: int) -> int:
-    """Return the seed of one of several independent replicates."""
+    """Return the seed of one replicate, independent of the seeds of the others."""
     return int(np.random.SeedSequence([seed, replicate]).generate_state(1, np.uint64)[0])
 
 

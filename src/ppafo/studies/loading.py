@@ -1,4 +1,4 @@
-"""Loading of a study in SI units by name, file or plain data; every mistake is one clear line."""
+"""Loading of a study in SI units by name, file or plain data; each mistake gives a one-line error."""
 
 import copy
 from collections.abc import Iterable, Mapping, Sequence

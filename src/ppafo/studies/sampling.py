@@ -33,9 +33,9 @@ _WORDS_PER_STEP = 4
 _FRACTION_BITS = 53
 """Bits of a float's significand, including the implicit one."""
 _SOBOL_BITS = 32
-"""Bits of a number of the Sobol sequence, which repeats after 2**32 draws."""
+"""Number of bits of a Sobol sequence, which repeats after 2**32 draws."""
 MAXIMUM_SOBOL_DIMENSIONS = 21201
-"""Dimensions for which SciPy has direction numbers (Joe and Kuo, 2008)."""
+"""Largest number of dimensions with direction numbers in SciPy (Joe and Kuo, 2008)."""
 
 
 def uniform_numbers(sample: SamplingPlan, dimensions: int, first: int, count: int) -> Floats:

@@ -42,7 +42,7 @@ WHOLE = (NOISE, "wearer.person")
 _UNIT_OF_DIFFERENCE = {"Pa_a": "Pa_d"}
 _OFFSET_UNITS = ("degC", "°C")
 DEVIATIONS_IN_HALF_WIDTH = 1.959963984540054
-"""Standard deviations of a normal distribution in the half width of its 95 % interval."""
+"""Half width of the 95 % interval of a normal distribution, in standard deviations."""
 _STATED_DIFFERENCES = {"psi_g": "psi_d", "psi_a": "psi_d", "degC": "K", "°C": "K"}
 _SMALLEST_SAID, _LARGEST_SAID = 1.0e-3, 1.0e7
 """Range of numbers that are displayed in the unit in which they were given."""

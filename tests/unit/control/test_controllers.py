@@ -129,6 +129,12 @@ def test_without_its_feedforward_it_is_the_pid_of_the_catalogue() -> None:
     assert commands("pid_feedforward", torques, feedforward=0.0, **gains) == commands("pid", torques, **gains)
 
 
+def test_a_law_without_an_integral_gain_has_no_integral_to_wind_up() -> None:
+    gains = {"proportional_gain": 0.3, "integral_gain": 0.0, "derivative_gain": 0.0, "anti_windup": 80.0}
+    clipped = commands("pid", [-30.0, -30.0, -30.0, 1.0], **gains)
+    assert clipped == [1.0, 1.0, 1.0, commands("pid", [1.0], **gains)[0]]
+
+
 def test_the_feedforward_alone_nearly_follows_the_ramp() -> None:
     none = ["proportional_gain=0 1/(N m)", "integral_gain=0 1/(N m s)", "derivative_gain=0 s/(N m)"]
     task = [*WITHIN_REACH, "controller.kind=pid_feedforward", *(f"controller.{gain}" for gain in none)]

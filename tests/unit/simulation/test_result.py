@@ -137,7 +137,8 @@ def test_a_run_that_follows_its_reference_says_so_in_its_second_line() -> None:
     result = ppafo.simulate("torque-task-proportional", {"reference.level": 4.0})
     verdict, blank = str(result).splitlines()[1:3]
     assert (verdict, blank) == (result.following, "")
-    assert re.fullmatch(r"the torque follows its reference: RMS error [\d.]+ N m from [\d.]+ s on, 0.2 N m allowed", verdict)
+    words = r"the torque follows its reference: RMS error [\d.]+ N m from [\d.]+ s on, 0.2 N m allowed"
+    assert re.fullmatch(words, verdict)
     assert result.tracking is None
     assert ppafo.simulate("step-response").following == ""
 

@@ -57,7 +57,7 @@ def pid_command(gains: PidGains, state: PidState, error: float, ahead: float, pe
 
     The integral is a sum of rectangles. The slope is a backward difference through a filter of first order with the
     time constant ``derivative_filter``. Anti-windup by back-calculation: the excess of the command over its limits is
-    subtracted from the integral at the rate ``anti_windup``.
+    subtracted from the integral at the rate ``anti_windup``; a law without an integral gain has none.
     """
     # The first sample has none before it: no kick of the derivative.
     change = (error - state.error) * state.started
@@ -66,8 +66,10 @@ def pid_command(gains: PidGains, state: PidState, error: float, ahead: float, pe
     integral = state.integral + gains.integral_gain * error * period
     unlimited = ahead + gains.proportional_gain * error + integral + gains.derivative_gain * slope
     command = max(-1.0, min(1.0, unlimited))
-    # Back-calculation: it acts only while the command is clipped, since both are equal otherwise.
-    integral = integral + gains.anti_windup * period * (command - unlimited)
+    # Back-calculation: it acts only while the command is clipped, since both are equal otherwise. Without an integral
+    # gain it would leave a bias that nothing takes back.
+    rate = gains.anti_windup if gains.integral_gain > 0.0 else 0.0
+    integral = integral + rate * period * (command - unlimited)
     return command, PidState(integral=integral, error=error, slope=slope, started=1.0)
 
 

@@ -143,8 +143,9 @@ def pid_factors(
         settings["integral_gain"] * period * count * FINE,
         settings["derivative_gain"] / period * count * (WIDE / SLOPE_UNIT),
     )
-    shares = (period / (period + settings["derivative_filter"]), settings["anti_windup"] * period)
-    return gains, (*shares, settings["dead_band"])
+    # As in floating point: without an integral gain there is no integral to wind up.
+    anti_windup = settings["anti_windup"] * period if settings["integral_gain"] > 0.0 else 0.0
+    return gains, (period / (period + settings["derivative_filter"]), anti_windup, settings["dead_band"])
 
 
 def prepare_pid(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:

@@ -27,9 +27,9 @@ _SAME = 1.0e-6
 class OutputRequest:
     """Outputs requested for every run.
 
-    ``metrics`` are by name, ``bands`` the channels to trace, ``every`` the interval and ``times`` the times of the
-    traces [s]. ``custom`` is the Python object that controls the runs one after the other, None for a compiled
-    controller.
+    ``metrics`` maps names to metrics, ``bands`` are the channels to trace, ``every`` is the interval and ``times`` are
+    the times of the traces [s]. ``custom`` is the Python object that controls the runs one after the other, None for a
+    compiled controller.
     """
 
     metrics: Mapping[str, MetricKind]

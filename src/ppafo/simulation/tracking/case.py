@@ -1,4 +1,4 @@
-"""Run that does not follow its reference, and a cause of that."""
+"""Run that does not follow its reference, and a cause of this failure."""
 
 from typing import NamedTuple
 
