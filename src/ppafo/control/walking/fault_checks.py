@@ -201,8 +201,8 @@ FALL_TIME = 0.1
 """Time constant [s] of the filtered pressures that detect a falling reading."""
 
 FALLS = 0.03
-"""Fraction by which a falling reading is below its filtered value: 0.3 for a venting chamber at 140 kPa, and 0.04 for a
-hose with a tenth of its conductance, no fault of the sensor."""
+"""Smallest relative excess of the filtered value over a falling reading. The excess is 0.3 for a venting chamber at
+140 kPa, and 0.04 for a hose with a tenth of its conductance, which is no fault of the sensor."""
 
 DWELLS, TURNS_BACK = 0.235, 0.35
 """Largest fractions of the stride in which a force and an ankle angle may stay within one converter step: in a usual
