@@ -108,7 +108,7 @@ def test_every_figure_is_a_picture_of_some_size(out: Path) -> None:
         content = (out / f"{name}.png").read_bytes()
         width, height = struct.unpack(">II", content[16:24])
         assert content.startswith(b"\x89PNG")
-        assert min(width, height) > 500
+        assert min(width, height) > 450
         drawing = (out / f"{name}.svg").read_text(encoding="utf-8")
         assert drawing.count("<path") > 50
 

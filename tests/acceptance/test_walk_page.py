@@ -80,8 +80,8 @@ def test_the_walk_file_of_the_page_loses_its_help_as_the_page_says(
     (said,) = re.findall(r"^With `--minutes 0.2` this file has (help in 2 of 10 strides)", PAGE, re.MULTILINE)
     assert main(["walk", str(path), "--minutes", "0.2", "--out", str(tmp_path / "out")]) == 1
     printed = capsys.readouterr().out
-    assert said in printed
-    assert "less help" in printed.splitlines()[3]
+    assert printed.splitlines()[1] == f"{said}: fewer than half"
+    assert "less help" in printed.splitlines()[4]
 
 
 def test_the_task_sequence_and_the_bottle_of_the_page_load(tmp_path: Path) -> None:

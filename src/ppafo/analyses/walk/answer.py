@@ -88,12 +88,14 @@ def safety_remarks(worn: WalkResult) -> list[str]:
             )
     if not worn.events:
         return remarks
-    helped, strides = int(worn.helped.sum()), worn.helped.size
     remarks += event_lines(worn.events)
-    if strides:
-        enough = "" if worn.is_helped else ": fewer than half"
-        remarks.append(f"help in {helped} of {strides} strides{enough}")
-    return remarks
+    return [*remarks, _helped_text(worn)] if worn.helped.size else remarks
+
+
+def _helped_text(worn: WalkResult) -> str:
+    """Return the number of strides with help, and whether it is too small."""
+    enough = "" if worn.is_helped else ": fewer than half"
+    return f"help in {int(worn.helped.sum())} of {worn.helped.size} strides{enough}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,7 +188,10 @@ def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
     verdict = tried(configuration, worn.tracking)
     # How the torque follows what is requested, and the gains in force with their origin.
     in_force = gains_of(configuration, law_of(configuration))
-    follows = following_text(worn) if verdict is None and "strides" in worn.metrics else ""
+    if worn.is_helped:
+        follows = following_text(worn) if verdict is None and "strides" in worn.metrics else ""
+    else:
+        follows = _helped_text(worn)
     first_lines = [follows if verdict is None else verdict.sentence, "" if in_force is None else in_force.sentence]
     gait, overrides = motion.gait, configuration.origin.overrides
     title = f" ({gait.title})" if gait.title else ""
