@@ -17,7 +17,7 @@ _OFTEN = 0.1
 """Fraction of the samples with a request that counts as often [-]."""
 _DORSIFLEXION = ("landing_peak_torque", "swing_peak_torque", "hold_stiffness", "hold_damping")
 """Settings of a walking controller that request a torque in dorsiflexion."""
-_ANGLESCAUSES_OF_WALK = 400
+_ANGLES = 400
 """Number of samples of a walk at which the reach is compared with the request."""
 
 
@@ -28,16 +28,17 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
         return None
     device, torque = scenario.device, static_torque(scenario.device)
     reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
-    places = np.unique(np.linspace(0, angle.size - 1, _ANGLESCAUSES_OF_WALK).astype(np.intp))
+    places = np.unique(np.linspace(0, angle.size - 1, _ANGLES).astype(np.intp))
     reaches = np.array([torque_reach(device, float(angle[place]), torque) for place in places])
     above, below = reference[places] - reaches[:, 1], reaches[:, 0] - reference[places]
     share = float(np.mean((above > 0.0) | (below > 0.0)))
     if share <= _OFTEN:
         return None
-    most = [level_text("N m", float(np.max(np.abs(numbers)))) for numbers in (reaches, reference)]
+    lacks_most = int(np.argmax(np.maximum(above, below)))
+    given = float(reaches[lacks_most, 1 if above[lacks_most] > 0.0 else 0])
     text = (
-        f"in {100.0 * share:.0f} % of the time its controller asks for more than the actuator gives there, {most[0]} "
-        f"at most of {most[1]} asked for"
+        f"in {100.0 * share:.0f} % of the time its controller asks for more than the actuator gives there, "
+        f"{level_text('N m', given)} of {level_text('N m', float(reference[places][lacks_most]))} asked for at worst"
     )
     if np.mean(below > 0.0) > _OFTEN and -reaches[:, 0].min() <= ONE_WAY * reaches[:, 1].max():
         return _one_way_request(case, float(reaches[:, 0].min()), float(reference[places].min()))
