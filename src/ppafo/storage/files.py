@@ -3,6 +3,7 @@
 import contextlib
 import errno
 import os
+import re
 import secrets
 import shutil
 import tempfile
@@ -48,6 +49,11 @@ def text_of(content: bytes, encoding: str = "utf-8", remedy: str = "") -> str:
     if "\0" in text:
         raise DataError(f"is not a text file (byte {text.index(chr(0))} is zero)")
     return text
+
+
+def is_address(path: str | Path) -> bool:
+    """Return whether a path is an address of another computer, such as ``s3://bucket``."""
+    return re.match(r"[a-z][a-z0-9+]+:/", str(path)) is not None
 
 
 def write_file(path: str | Path, content: bytes) -> Path:

@@ -7,7 +7,6 @@ listed by a foreign mark, is ever removed.
 """
 
 import os
-import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
@@ -23,7 +22,7 @@ from ppafo.documents.regular_file import read_regular_file
 from ppafo.errors import DataError, refused_as
 from ppafo.signals import Recording, recording_kind
 from ppafo.storage.comma_separated import csv_bytes, read_csv
-from ppafo.storage.files import add_files, check_folder_can_be_replaced, read_bytes, replace_folder
+from ppafo.storage.files import add_files, check_folder_can_be_replaced, is_address, read_bytes, replace_folder
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.wording import one_line, reason
 
@@ -119,7 +118,7 @@ def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes]
 
     Files in ``kept``, such as one that grows from run to run, may have been changed if they have the given content.
     """
-    if re.match(r"[a-z][a-z0-9+]+:/", str(folder)):
+    if is_address(folder):
         raise DataError(f"{folder}: is an address; a {kind.noun} is written into a folder of this computer")
     is_folder = os.path.isdir(folder)  # noqa: PTH112  # Path.is_dir raises where no file can have the name
     # A link to nowhere is there too, and would be replaced by a folder.

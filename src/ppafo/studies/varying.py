@@ -221,7 +221,11 @@ def _logarithmic(entry: declared.LogUniform | declared.LogNormal, varied: Varied
 def _normal(entry: declared.Normal | declared.TruncatedNormal, varied: VariedPath) -> Distribution:
     """Return a normal distribution, truncated or not."""
     bounds = _bounds(entry, varied) if isinstance(entry, declared.TruncatedNormal) else None
-    mean, deviation = _key(entry, "mean", varied), _deviation(entry, varied)
+    mean, said = _key(entry, "mean", varied), f"standard_deviation = {entry.standard_deviation!r}"
+    with refused_as(UnitError, said, UnitError):
+        deviation = varied.distance(entry.standard_deviation)
+    if deviation <= 0.0:
+        raise UnitError(f"{said} must be more than 0")
     return NormalAround(mean, deviation) if bounds is None else NormalBetween(mean, deviation, *bounds)
 
 
@@ -268,14 +272,6 @@ def _bounds(entry: Any, varied: VariedPath) -> tuple[float, float]:
     if minimum >= maximum:
         raise UnitError(f"minimum = {entry.minimum!r} must be less than maximum = {entry.maximum!r}")
     return minimum, maximum
-
-
-def _deviation(entry: Any, varied: VariedPath) -> float:
-    with refused_as(UnitError, f"standard_deviation = {entry.standard_deviation!r}", UnitError):
-        deviation = varied.distance(entry.standard_deviation)
-    if deviation <= 0.0:
-        raise UnitError(f"standard_deviation = {entry.standard_deviation!r} must be more than 0")
-    return deviation
 
 
 def _key(entry: Any, key: str, varied: VariedPath) -> float:

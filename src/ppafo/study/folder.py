@@ -2,7 +2,6 @@
 
 import contextlib
 import io
-import re
 import shutil
 import stat
 import time
@@ -12,7 +11,7 @@ from typing import Any
 
 from ppafo.documents.json_text import json_document
 from ppafo.errors import DataError
-from ppafo.storage.files import LEFT_ASIDE, write_file
+from ppafo.storage.files import LEFT_ASIDE, is_address, write_file
 
 _MAXIMUM_BYTES_OF_DOCUMENT = 100_000_000
 """Largest document that is read [bytes]; documents of studies are far smaller."""
@@ -81,6 +80,6 @@ class StudyFolder:
 
 def study_folder(path: str | Path) -> StudyFolder:
     """Return the folder at a path; DataError for the address of another computer."""
-    if re.match(r"[a-z][a-z0-9+]+:/", str(path)):
+    if is_address(path):
         raise DataError(f"{path}: is an address; results of a study go into a folder of this computer")
     return StudyFolder(Path(path).absolute())

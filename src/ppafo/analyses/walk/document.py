@@ -115,12 +115,9 @@ def metrics_table(
 def csv_of(columns: Mapping[str, Iterable[Any]]) -> bytes:
     """Return simulated columns as CSV; a missing value is an empty cell."""
     lists = (values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values())
-    rows = (",".join(map(_cell, row)) for row in zip(*lists, strict=True))
+    rows = (
+        ",".join("" if value is None else value if isinstance(value, str) else repr(value) for value in row)
+        for row in zip(*lists, strict=True)
+    )
     lines = ["# simulated: a model's own output, not measured", ",".join(columns), *rows]
     return ("\n".join(lines) + "\n").encode()
-
-
-def _cell(value: object) -> str:
-    if value is None:
-        return ""
-    return value if isinstance(value, str) else repr(value)

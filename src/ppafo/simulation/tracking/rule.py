@@ -256,6 +256,11 @@ class TaskExcess(NamedTuple):
     still: Floats
 
 
+def largest_share(rests: Any, only_switches: bool) -> Any:
+    """Largest share of the RMS error in the wanted change with which a task follows [-]; ``rests`` may be (runs,)."""
+    return LARGEST_SHARE_SWITCHED if only_switches else np.where(rests, LARGEST_SHARE, LARGEST_SHARE_MOVING)
+
+
 def excess_of_task(settled: SettledPart, only_switches: bool) -> TaskExcess:
     """Numbers of a task divided by their limits, apart from command reversals: the task follows if none is above 1.
 
@@ -266,8 +271,7 @@ def excess_of_task(settled: SettledPart, only_switches: bool) -> TaskExcess:
     # Degrees count for an angle, however far it goes.
     worst = settled.worst / np.maximum(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * way)
     span = np.where(way > 0.0, settled.span / np.maximum(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * way), 0.0)
-    most = np.where(rests, LARGEST_SHARE, LARGEST_SHARE_MOVING)
-    off = share / (LARGEST_SHARE_SWITCHED if only_switches else most)
+    off = share / largest_share(rests, only_switches)
     if only_switches:
         # It swings about its reference by design: its mean error is to be less.
         beside = np.abs(settled.missing) / (LARGEST_MEAN_SWITCHED * settled.wanted)

@@ -12,14 +12,13 @@ from ppafo.simulation.tracking.load_causes import torque_beyond_reach
 from ppafo.simulation.tracking.remedies import Remedy, change_text
 from ppafo.simulation.tracking.rule import (
     LARGEST_SHARE,
-    LARGEST_SHARE_MOVING,
-    LARGEST_SHARE_SWITCHED,
     LARGEST_SHARE_WALK,
     REVERSALS,
     Failure,
     failure_of_task,
     failure_of_walk,
     is_noisy,
+    largest_share,
     most_reversals,
     settled_task,
     settled_walk,
@@ -162,12 +161,8 @@ def following_text(result: "RecordedResult") -> str:
     settled = case.settled
     if settled.ends_on_ramp:
         return ""
-    if not case.scenario.follows_reference:
-        share = LARGEST_SHARE_WALK
-    elif case.only_switches:
-        share = LARGEST_SHARE_SWITCHED
-    else:
-        share = LARGEST_SHARE if settled.rests else LARGEST_SHARE_MOVING
+    is_task = case.scenario.follows_reference
+    share = float(largest_share(settled.rests, case.only_switches)) if is_task else LARGEST_SHARE_WALK
     error, allowed = (change_text(controlled.name, each) for each in (settled.error, share * settled.wanted))
     since = _time_text(settled.start)
     return f"the {controlled.words} follows its reference: RMS error {error}{since}, {allowed} allowed"
