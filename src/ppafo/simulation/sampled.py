@@ -88,7 +88,10 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     """
     run = SampledRun(batch)
     # What an earlier run left behind in the object must not steer this one.
-    controller.reset()
+    try:
+        controller.reset()
+    except (NameError, AttributeError, TypeError) as error:
+        raise _slip(controller, error) from error
     for _ in range(run.samples):
         now = (run.time, run.requested, run.measurement())
         try:
@@ -123,6 +126,10 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
 def _slip(controller: PythonController, error: NameError | AttributeError | TypeError) -> SimulationError:
     """Return the error for a programming error in a controller: file, line, message and nearest name."""
     frame = traceback.extract_tb(error.__traceback__)[-1]
+    if frame.filename == __file__:
+        # Its own body has not begun: the call itself does not fit.
+        allowed = "write reset(self) and update(self, time, reference, measurement)"
+        return SimulationError(f"{type(controller).__name__}: {error}; {allowed}")
     walked = next(reversed(list(traceback.walk_tb(error.__traceback__))))[0]
     name, hint = getattr(error, "name", None), ""
     if name is not None and isinstance(error, AttributeError):
