@@ -20,7 +20,7 @@ from ppafo.parameters.graph import outside
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.numbers import check_parts
 from ppafo.simulation.plan import MAXIMUM_STEPS
-from ppafo.simulation.sampled import run_sampled
+from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
 from ppafo.walking.bottle.coupling import BottleLife, Schedule, life_on_bottle, run_on_bottle
 from ppafo.walking.bottle.course import WALKED
