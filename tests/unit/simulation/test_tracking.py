@@ -60,7 +60,7 @@ def test_a_pair_that_is_too_large_and_a_load_that_is_too_heavy_are_named() -> No
     )
     assert pair.tracking is not None
     assert pair.tracking.kind == "oscillates"
-    assert "in the 95 ms that they are late" in pair.tracking.sentence
+    assert "in their dead time of 95 ms" in pair.tracking.sentence
     pushed = simulate("cylinder-servo", ["motion.external_torque=14 N m"]).tracking
     assert pushed is not None
     assert "the joint lies on its lower stop: it needs 14 N m at" in pushed.sentence
@@ -69,7 +69,7 @@ def test_a_pair_that_is_too_large_and_a_load_that_is_too_heavy_are_named() -> No
 @pytest.mark.parametrize(
     ("changes", "share"),
     [
-        (["reference.level=4 N m"], "2.19 N m in the 75 ms that it is late, 0.55 times the 4 N m wanted"),
+        (["reference.level=4 N m"], "2.19 N m in its dead time of 75 ms, 0.55 times the 4 N m wanted"),
         (["reference.level=4 N m", "valve.switching_interval=5 ms", "controller.rate=300 Hz"], ""),
         (["reference.level=4 N m", "valve.area=4.5 mm^2"], ""),
         (["device.valve=proportional", "valve.area=60 mm^2"], ""),

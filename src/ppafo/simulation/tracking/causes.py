@@ -100,15 +100,15 @@ def oscillation(case: Case) -> TrackingCause | None:
 def _steps_of_pair(case: Case, law: ControllerKind, quicker: float) -> TrackingCause:
     """Cause: change by a pair of on/off valves during its dead time, as a multiple of the wanted change."""
     scenario = case.scenario
-    step, late = pair_step(scenario, law)
+    step, dead_time = pair_step(scenario, law)
     step *= quicker
     controlled = scenario.controlled if TORQUE in law.controls else TORQUE
-    share = step / case.settled.wanted
+    ratio = step / case.settled.wanted
     text = (
-        f"its valves change it by {change_text(controlled, step)} in the {1.0e3 * late:.3g} ms that they are late, "
-        f"{share:.2g} times what is wanted"
+        f"its valves change it by {change_text(controlled, step)} in their dead time of {1.0e3 * dead_time:.3g} ms, "
+        f"{ratio:.2g} times what is wanted"
     )
-    return TrackingCause(text, smaller_pair(scenario, share), "take faster or smaller valves")
+    return TrackingCause(text, smaller_pair(scenario, ratio), "take faster or smaller valves")
 
 
 def _static_friction(case: Case) -> TrackingCause | None:
