@@ -53,7 +53,8 @@ def walk_with_and_without(
     from ppafo.simulation.scenario import Scenario
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.walking.loading import check_duration_once, load_walk
-    from ppafo.walking.walk import compare_walks, walk_population
+    from ppafo.walking.population import walk_population
+    from ppafo.walking.walk import compare_walks
 
     if check and wearers is not None:
         raise ArgumentError("check: is for the walk of one wearer; leave out wearers, or check")
