@@ -8,7 +8,9 @@ from ppafo.studies.draws import study_of
 from ppafo.study.blocks import chunk, chunk_count, chunk_size
 
 
-@pytest.mark.parametrize(("duration", "runs", "chunks"), [("0.3 s", 200, 1), ("30 s", 200, 4), ("30 s", 20_000, 40)])
+@pytest.mark.parametrize(
+    ("duration", "runs", "chunks"), [("0.3 s", 200, 1), ("30 s", 200, 2), ("30 s", 1000, 8), ("30 s", 20_000, 20)]
+)
 def test_few_long_runs_are_kept_in_several_chunks(small: Any, duration: str, runs: int, chunks: int) -> None:
     del small["runs_of_chunk"], small["correlations"]
     small["outputs"] = {"metrics": ["rms_error"]}
