@@ -29,7 +29,10 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     """
     run = SampledRun(batch)
     # What an earlier run left behind in the object must not steer this one.
-    controller.reset()
+    try:
+        controller.reset()
+    except (NameError, AttributeError, TypeError) as error:
+        raise _programming_error(controller, error) from error
     for _ in range(run.samples):
         inputs = (run.time, run.reference, run.measurement())
         try:
@@ -64,6 +67,10 @@ def _programming_error(controller: PythonController, error: NameError | Attribut
     """Return the error for a programming error in a controller: file, line, message and nearest name."""
     # The innermost frame is that of the mistake.
     frame, line = list(traceback.walk_tb(error.__traceback__))[-1]
+    if frame.f_code.co_filename == __file__:
+        # The method's own body has not begun: its arguments do not fit.
+        signatures = "reset(self) and update(self, time, reference, measurement)"
+        return SimulationError(f"{type(controller).__name__}: {error}; write {signatures}")
     name, hint = getattr(error, "name", None), ""
     if name is not None and isinstance(error, AttributeError):
         hint = nearest_name(name, [known for known in dir(error.obj) if not known.startswith("_")])

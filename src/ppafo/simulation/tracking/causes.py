@@ -7,7 +7,7 @@ import numpy as np
 from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import followed
 from ppafo.metrics.switching import SHUT
-from ppafo.model.controlled import ANGLE, TORQUE
+from ppafo.model.controlled import ANGLE, TORQUE, error_functions
 from ppafo.simulation.law_signals import anywhere
 from ppafo.simulation.mean_chambers import quicker_at
 from ppafo.simulation.tracking.case import Case, TrackingCause
@@ -143,10 +143,21 @@ def _static_friction(case: Case) -> TrackingCause | None:
 
 
 def _fully_open_valve(case: Case) -> TrackingCause | None:
-    """Cause: the valve is fully open for most of the settled part."""
-    if case.fully_open <= _MOSTLY:
+    """Cause: the valve is fully open for most of the settled part, towards the reference or away from it."""
+    scenario, samples = case.scenario, case.settled.samples
+    command = case.recording["command"][samples]
+    is_open = case.is_fully_open
+    if np.mean(is_open) <= _MOSTLY:
         return None
-    text = f"its valve is fully open for {100.0 * case.fully_open:.0f} % of the time: it is too small for this task"
+    reference, value = (series[samples] for series in followed(case.recording))
+    # Sign of the command that reduces a positive error.
+    upwards = error_functions(scenario.controlled, scenario.device.supply.is_vacuum).steered(1.0)
+    is_away = np.asarray(upwards * command * (reference - value) < 0.0)[is_open]
+    opened = f"its valve is fully open for {100.0 * np.mean(is_open):.0f} % of the time"
+    if np.mean(is_away) > _MOSTLY:
+        text = f"{opened}, away from the reference for {100.0 * np.mean(is_away):.0f} % of it"
+        return TrackingCause(text, (), "turn the sign of its command or of what it measures")
+    text = f"{opened}: it is too small for this task"
     return TrackingCause(text, sized_valves(case.scenario, (3.0, 10.0)), "take a larger valve or a slower reference")
 
 

@@ -5,11 +5,11 @@ from collections.abc import Iterable
 
 from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import ANGLE, CONTROLLED
+from ppafo.simulation.default_gains import DEAD_TIME, RATE
 from ppafo.simulation.gains import terms_of
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.torque_loop import DEAD_TIME, RATE
 from ppafo.simulation.tracking.remedies import change_text, smaller_pair
 from ppafo.simulation.tracking.rule import smallest_change, torque_limit
 from ppafo.units.shown import in_units
