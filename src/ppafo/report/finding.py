@@ -249,7 +249,7 @@ class Finding(Generic[T_co]):
 
         The folder must be absent, empty or an earlier result; otherwise DataError is raised.
         """
-        from ppafo.storage.result_folder import write_marked_folder
+        from ppafo.storage.owned_folder import write_marked_folder
 
         write_marked_folder(Path(folder), files_of(self), self.command or self.name)
 

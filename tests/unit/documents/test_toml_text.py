@@ -17,7 +17,7 @@ from ppafo.parameters import load_parameter_set
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import read_csv, read_recording
 from ppafo.storage.netcdf_reading import read_netcdf
-from ppafo.storage.result_folder import read_json
+from ppafo.storage.owned_folder import read_json
 
 KIND = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", ScenarioError)
 

@@ -72,7 +72,9 @@ def bottle(
     from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
     from ppafo.report.stored_figure import stated_units
     from ppafo.signals import Recording
-    from ppafo.storage.result_folder import RUN_FILE, read_json, read_recording
+    from ppafo.storage.owned_folder import read_json
+    from ppafo.storage.reading import read_recording
+    from ppafo.storage.result_folder import RUN_FILE
     from ppafo.units.shown import shown_in, units_in_force
     from ppafo.walking import WalkResult
     from ppafo.walking.bottle.coupling import Schedule
