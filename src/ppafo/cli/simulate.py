@@ -45,10 +45,10 @@ def simulate(
         check_result_folder(folder)
 
     from ppafo.simulation.simulate import simulate as run_scenario
-    from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
+    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 
     with shown_in(loaded.device.shown):
-        tell_coarse_pairs([loaded])
+        warn_of_coarse_pairs([loaded])
         report = assessed(run_scenario(loaded), check)
         return CommandOutput(
             _text(report),

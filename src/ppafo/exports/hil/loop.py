@@ -153,7 +153,7 @@ class Bench:
         self._answer_time = 0.0
         send_time, delay = 0.0, 0.0
         while self._continues and not is_stopped():
-            sequence = self.plant.taken
+            sequence = self.plant.sample
             # The controller has the first sample already.
             if sequence:
                 delay = self.pace.delay(sequence * self.period)
@@ -175,8 +175,8 @@ class Bench:
         if is_cut_short:
             self.answers.vent(STOPPED)
             self._announce_end()
-            until = min(self.plant.samples, self.plant.taken + math.ceil(AFTER_STOP / self.period))
-            while self.plant.taken < until:
+            until = min(self.plant.samples, self.plant.sample + math.ceil(AFTER_STOP / self.period))
+            while self.plant.sample < until:
                 self._advance(VENT, None, None)
         self._announce_end()
         return LinkTraffic(
@@ -213,7 +213,7 @@ class Bench:
     @property
     def _continues(self) -> bool:
         """False at the end of the run, and after the plant has diverged."""
-        return self.plant.taken < self.plant.samples and not self._has_diverged
+        return self.plant.sample < self.plant.samples and not self._has_diverged
 
     @property
     def _expects_no_answer(self) -> bool:
@@ -234,7 +234,7 @@ class Bench:
 
     def _advance(self, command: float, delay: float | None, response_time: float | None) -> None:
         """Log the current sample, and advance the plant to the next one under a command [-]."""
-        sequence = self.plant.taken
+        sequence = self.plant.sample
         self.rows.append(
             LogRow(
                 sequence=sequence,
@@ -246,7 +246,7 @@ class Bench:
                 is_vented=bool(self.answers.vent_reason),
             )
         )
-        self.plant.go_on(command)
+        self.plant.advance(command)
 
     def _new_sample(self, flags: int = 0) -> wire.WireSample:
         """Return the current state of the plant as the sample to send; the last one after the plant has diverged."""
@@ -256,7 +256,7 @@ class Bench:
         if self._has_diverged:
             return self._sample
         values = {
-            "reference": plant.requested,
+            "reference": plant.reference,
             "angle": measured.angle,
             "pressure_1": measured.pressure_1,
             "pressure_2": measured.pressure_2,
@@ -265,8 +265,8 @@ class Bench:
         return wire.WireSample(
             flags=flags | (wire.VENTED if self.answers.vent_reason else 0) | wire.COMPUTED,
             run=self.answers.run,
-            sequence=plant.taken,
-            time=round(plant.taken * self.period * wire.MICROSECONDS) % wire.WRAP,
+            sequence=plant.sample,
+            time=round(plant.sample * self.period * wire.MICROSECONDS) % wire.WRAP,
             counts={name: wire.count_of(name, value) for name, value in values.items()},
         )
 
