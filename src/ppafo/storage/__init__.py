@@ -2,7 +2,6 @@
 
 from ppafo.storage.comma_separated import read_csv, write_csv
 from ppafo.storage.netcdf import dataset_of, write_netcdf
-from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import StoredResult, check_result_folder, read_stored, write_result
 
 __all__ = [
@@ -10,7 +9,6 @@ __all__ = [
     "check_result_folder",
     "dataset_of",
     "read_csv",
-    "read_recording",
     "read_stored",
     "write_csv",
     "write_netcdf",

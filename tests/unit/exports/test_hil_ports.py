@@ -28,7 +28,7 @@ from ppafo.exports.hil.wire import Answer, Reader, WireSample, answer_bytes, sam
 from ppafo.processor.link import example_controller
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.storage import read_recording
+from ppafo.storage.reading import read_recording
 from tests.example_board import COMPILER, SENT, WHOLE, built, running
 from tests.virtual_wire import ProportionalPartner, free_port
 
