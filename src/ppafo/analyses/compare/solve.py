@@ -14,7 +14,7 @@ from ppafo.running import tried
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
-from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
+from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, Uncertainty, uncertainty_of
 from ppafo.studies.limits import CONFIDENCE, check_fraction
@@ -107,7 +107,7 @@ def compared(
         for task, overrides in named_tasks
         for configuration in configurations
     }
-    tell_coarse_pairs(scenarios.values())
+    warn_of_coarse_pairs(scenarios.values())
     # Metrics that all scenarios can have: without a reference there is no error.
     metrics = [
         name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios.values())

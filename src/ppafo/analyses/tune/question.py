@@ -56,12 +56,12 @@ def tune(
     from ppafo.analyses.tune.problem import Problem, load_tuning
     from ppafo.analyses.tune.solve import solve_tuning
     from ppafo.errors import StudyError
-    from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
+    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 
     if isinstance(tuning, Problem) and overrides:
         raise StudyError("a loaded Problem takes no overrides; give them to load_tuning")
     problem = tuning if isinstance(tuning, Problem) else load_tuning(tuning, overrides)
     if seed is not None:
         problem = problem.with_seed(seed)
-    tell_coarse_pairs([problem.scenario])
+    warn_of_coarse_pairs([problem.scenario])
     return finding_of(solve_tuning(problem, threads, progress))
