@@ -14,8 +14,8 @@ import sys
 from pathlib import Path
 
 from ppafo.walking.loading import load_walk
+from ppafo.walking.population import walk_population
 from ppafo.walking.task_sequence import FILE
-from ppafo.walking.walk import walk_population
 
 CONFIGURATIONS = ("solenoid", "proportional")
 SENSORS = {

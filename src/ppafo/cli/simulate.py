@@ -50,9 +50,9 @@ def simulate(
 def _run(chosen: "Configured", folder: Path, check: bool) -> CommandOutput:
     from ppafo.running import gains, tried
     from ppafo.simulation.simulate import simulate
-    from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
+    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 
-    tell_coarse_pairs([chosen])
+    warn_of_coarse_pairs([chosen])
     result = simulate(chosen)
     in_force, verdict = gains(chosen), tried(chosen, result.tracking)
     # A run that diverged has no result to repeat; its exit code says so already.

@@ -1,9 +1,9 @@
 """Problems of a document as one-line text: key, value, allowed values and nearest name."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, TypeGuard, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
@@ -17,13 +17,16 @@ LABEL = r"^[^\x00-\x20\x7f-\xa0](?:[^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\xa0])?
 QUANTITY = r"^\s*[+-]?(\d|\.\d)"
 """Pattern of the start of a number with its unit."""
 _LONGEST_VALUE = 60
-_MAXIMUM_SAID = 5
-_MAXIMUM_HOMES = 3
+_MAXIMUM_PROBLEMS = 5
+_MAXIMUM_TABLES = 3
+"""Number of tables that have an unknown key, up to which they are named."""
+_MISSING = {"missing": "", "union_tag_not_found": ".kind"}
+"""Problem types of missing keys, with the suffix to append to the path."""
 
 
 def is_gap(detail: ErrorDetails) -> bool:
     """Return True if a problem is only a missing key."""
-    return detail["type"] in _GAPS
+    return detail["type"] in _MISSING
 
 
 def is_unknown_kind(detail: ErrorDetails) -> bool:
@@ -36,23 +39,25 @@ def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
 
     For a value that matches none of several types only the first reason is given. The number of problems is limited.
     """
-    above = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
-    # What is wrong with a table or list because of something in it is said there.
-    spots = {detail["loc"]: (_spot(model, detail["loc"]), detail) for detail in details if detail["loc"] not in above}
-    of_values = {spot.path: (spot, detail) for spot, detail in reversed(spots.values()) if not is_gap(detail)}
-    ordered = sorted(reversed(of_values.values()), key=lambda problem: problem[1]["type"] != "extra_forbidden")
-    said = []
-    for spot, detail in ordered[:_MAXIMUM_SAID]:
-        if detail["type"] == "extra_forbidden":
-            said.append(_unknown_key(spot, model))
+    containers = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
+    missing: list[str] = []
+    problems: dict[str, tuple[_Key, ErrorDetails]] = {}
+    for detail in details:
+        # A table or list that is wrong because of a value in it has the problem of this value.
+        if detail["loc"] in containers:
+            continue
+        key = _key_at(detail["loc"], model)
+        if is_gap(detail):
+            missing.append(f"{key.path}{_MISSING[detail['type']]}")
         else:
-            said.append(_SENTENCES.get(detail["type"], _any_other)(spot, detail))
-    if len(ordered) > _MAXIMUM_SAID:
-        said.append(f"and {len(ordered) - _MAXIMUM_SAID} more like these")
-    gaps = [f"{spot.path}{_GAPS[detail['type']]}" for spot, detail in spots.values() if is_gap(detail)]
-    if gaps:
-        said.append(said_missing(gaps))
-    return "; ".join(said)
+            problems.setdefault(key.path, (key, detail))
+    ordered = sorted(problems.values(), key=lambda problem: problem[1]["type"] != "extra_forbidden")
+    messages = [_message(key, detail, model) for key, detail in ordered[:_MAXIMUM_PROBLEMS]]
+    if len(ordered) > _MAXIMUM_PROBLEMS:
+        messages.append(f"and {len(ordered) - _MAXIMUM_PROBLEMS} more like these")
+    if missing:
+        messages.append(said_missing(list(dict.fromkeys(missing))))
+    return "; ".join(messages)
 
 
 def quote(value: object) -> str:
@@ -62,123 +67,131 @@ def quote(value: object) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class _Spot:
-    """Location of a problem in a file: dotted path, model of its last key, and type of its value."""
+class _Key:
+    """Key of a document: dotted path, type of the table that has it, and type of its value (None if unknown)."""
 
     path: str
-    holder: Any
-    wanted: Any
+    table: Any
+    value_type: Any
 
 
-def _spot(model: Any, location: Iterable[int | str]) -> _Spot:
-    """Return the spot at a pydantic location, which names the kind of a union as if it were a key."""
-    keys: list[str] = []
-    holder = wanted = model
-    for part in map(str, location):
-        if kinds := _kinds(wanted):
-            wanted = kinds.get(part)
+def _key_at(location: Iterable[int | str], model: type[BaseModel]) -> _Key:
+    """Return the key at a pydantic location, which contains the kind of a union as if it were a key."""
+    names: list[str] = []
+    table: Any = model
+    value_type: Any = model
+    for name in map(str, location):
+        if kinds := _tables_by_kind(value_type):
+            value_type = kinds.get(name)
             continue
-        holder = wanted
-        keys.append(one_line(part))
-        if not _is_model(holder):
-            # A table or list by names or numbers has the same at any.
-            members = [member for member in get_args(holder) if member is not Ellipsis]
-            wanted = members[-1] if members else None
-        elif part not in holder.model_fields:
-            wanted = None
+        table = value_type
+        names.append(one_line(name))
+        if not _is_model(table):
+            # The values of a list, or of a table with free names, have one type.
+            types = [item for item in get_args(table) if item is not Ellipsis]
+            value_type = types[-1] if types else None
+        elif name not in table.model_fields:
+            value_type = None
         else:
-            wanted = holder.model_fields[part].annotation
-            # What may be left out, as X | None, is an X where it is there.
-            members = [member for member in get_args(wanted) if member is not type(None)]
-            if get_origin(wanted) in (Union, UnionType) and len(members) == 1:
-                wanted = members[0]
-    return _Spot(".".join(keys), holder, wanted)
+            value_type = table.model_fields[name].annotation
+            # The value of an optional key, X | None, is an X if it is given.
+            types = [item for item in get_args(value_type) if item is not type(None)]
+            if get_origin(value_type) in (Union, UnionType) and len(types) == 1:
+                value_type = types[0]
+    return _Key(".".join(names), table, value_type)
 
 
-def _kinds(node: Any) -> dict[str, Any]:
-    """Return the members of a union of kinds by kind; empty for any other type."""
-    tables = [table for table in _models_in(node) if "kind" in table.model_fields]
+def _is_model(value_type: Any) -> TypeGuard[type[BaseModel]]:
+    return isinstance(value_type, type) and issubclass(value_type, BaseModel)
+
+
+def _tables_in(value_type: Any) -> list[type[BaseModel]]:
+    """Return the tables of a union; empty for any other type."""
+    if get_origin(value_type) is Annotated:
+        return _tables_in(get_args(value_type)[0])
+    is_union = get_origin(value_type) in (Union, UnionType)
+    return [item for item in get_args(value_type) if _is_model(item)] if is_union else []
+
+
+def _tables_by_kind(value_type: Any) -> dict[str, type[BaseModel]]:
+    """Return the tables of a union by their kind; empty for any other type."""
+    tables = [table for table in _tables_in(value_type) if "kind" in table.model_fields]
     return {get_args(table.model_fields["kind"].annotation)[0]: table for table in tables}
 
 
-def _is_model(node: Any) -> bool:
-    return isinstance(node, type) and issubclass(node, BaseModel)
+def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
+    """Return the message on a problem at a key of a document."""
+    assignment = f"{key.path} = {quote(detail['input'])}"
+    match detail["type"]:
+        case "extra_forbidden":
+            return _unknown_key(key, model)
+        case "literal_error":
+            words = detail["ctx"]["expected"].replace(" or ", ",")
+            return f"{assignment} is not allowed{_allowed_words(detail['input'], words)}"
+        case "union_tag_invalid":
+            kind = detail["ctx"]["tag"]
+            words = _allowed_words(kind, detail["ctx"]["expected_tags"])
+            return f"{key.path}.kind = {quote(kind)} is not known{words}"
+        case "string_pattern_mismatch":
+            return _wrong_text(assignment, detail)
+        case "string_type":
+            return f"{assignment} must be a text in quotation marks"
+        case "model_type" | "model_attributes_type" | "dict_type":
+            fields = key.value_type.model_fields if _is_model(key.value_type) else {}
+            required = [name for name, field in fields.items() if field.is_required()]
+            plural = "s" if len(required) > 1 else ""
+            content = f" with the key{plural} {', '.join(required)}" if required else f", [{key.path}]"
+            return f"{assignment} must be a table{content}"
+    # "Input should be less than 5" becomes "must be less than 5".
+    _, separator, requirement = detail["msg"].partition(" should ")
+    requirement = requirement if separator else f"be {detail['msg']}"
+    return f"{assignment}: must {one_line(requirement)}"
 
 
-def _unknown_key(spot: _Spot, model: type[BaseModel]) -> str:
-    """Return the message on an unknown key, with the tables that have such a key or the nearest allowed name."""
-    allowed, key = list(spot.holder.model_fields), spot.path.rpartition(".")[2]
-    homes: list[str] = []
-    left: list[tuple[str, Any]] = [("", model)]
-    seen = set()
-    while left:
-        path, node = left.pop(0)
-        for member in [node] if _is_model(node) else _models_in(node):
-            if (path, member) in seen or len(path) > _LONGEST_VALUE:
-                continue
-            seen.add((path, member))
-            if key in member.model_fields and (table := f"[{path}]" if path else "the top of the file") not in homes:
-                homes.append(table)
-            left += [(f"{path}.{name}".strip("."), field.annotation) for name, field in member.model_fields.items()]
-    is_elsewhere = 0 < len(homes) <= _MAXIMUM_HOMES
-    hint = f", which is a key of {' and '.join(homes)}" if is_elsewhere else nearest_name(key, allowed)
-    return f"unknown key '{spot.path}'{hint}; allowed here: {', '.join(allowed)}"
-
-
-def _models_in(node: Any) -> list[Any]:
-    """Return the tables that a value of a type can be, except those in lists or under free names."""
-    if get_origin(node) is Annotated:
-        return _models_in(get_args(node)[0])
-    return [member for member in get_args(node) if _is_model(member)] if get_origin(node) in (Union, UnionType) else []
-
-
-def _unknown_word(spot: _Spot, detail: ErrorDetails) -> str:
-    """Return the message on an unknown word, with the allowed words; also for the kind of a table."""
-    is_kind, context = detail["type"] == "union_tag_invalid", detail["ctx"]
-    word = context["tag"] if is_kind else detail["input"]
-    said = context["expected_tags"] if is_kind else context["expected"].replace(" or ", ",")
-    allowed = [name.strip(" '") for name in said.split(",")]
-    refused = (
-        f"{spot.path}.kind = {quote(word)} is not known" if is_kind else f"{spot.path} = {quote(word)} is not allowed"
-    )
-    return f"{refused}{nearest_name(str(word), allowed)}; allowed: {', '.join(allowed)}"
-
-
-def _wrong_name(spot: _Spot, detail: ErrorDetails) -> str:
-    """Return the message on an invalid name or quantity; pydantic marks a name that is the key of a table."""
+def _wrong_text(assignment: str, detail: ErrorDetails) -> str:
+    """Return the message on a text that does not have the pattern of a name, a quantity or a label."""
+    # Pydantic marks a name that is the key of a table.
     if detail["loc"][-1] == "[key]":
         table = one_line(".".join(map(str, detail["loc"][:-2])))
         return f"{table}: the name {quote(detail['input'])} must consist of letters, digits, '-' and '_'"
     if detail["ctx"]["pattern"] == QUANTITY:
-        return f"{spot.path} = {quote(detail['input'])} does not start with a number; write for example '1.3 m/s'"
+        return f"{assignment} does not start with a number; write for example '1.3 m/s'"
     if detail["ctx"]["pattern"] == LABEL:
-        return f"{spot.path} = {quote(detail['input'])} must be a line of text without spaces around it"
-    return f"{spot.path} = {quote(detail['input'])} must consist of lower-case letters, digits, '-' and '_'"
+        return f"{assignment} must be a line of text without spaces around it"
+    return f"{assignment} must consist of lower-case letters, digits, '-' and '_'"
 
 
-def _not_a_table(spot: _Spot, detail: ErrorDetails) -> str:
-    fields = spot.wanted.model_fields if _is_model(spot.wanted) else {}
-    required = [name for name, field in fields.items() if field.is_required()]
-    keys = f" with the key{'s' * (len(required) > 1)} {', '.join(required)}" if required else f", [{spot.path}]"
-    return f"{spot.path} = {quote(detail['input'])} must be a table{keys}"
+def _allowed_words(word: object, allowed: str) -> str:
+    """Return the end of a message on an unknown word: nearest and allowed ones, which pydantic separates by commas."""
+    words = [item.strip(" '") for item in allowed.split(",")]
+    return f"{nearest_name(str(word), words)}; allowed: {', '.join(words)}"
 
 
-def _any_other(spot: _Spot, detail: ErrorDetails) -> str:
-    """Return pydantic's message in ppafo's wording: "Input should be less than 5" becomes "must be less than 5"."""
-    if detail["type"] == "string_type":
-        return f"{spot.path} = {quote(detail['input'])} must be a text in quotation marks"
-    _, wanted, must = detail["msg"].partition(" should ")
-    said = f"must {must}" if wanted else f"must be {detail['msg']}"
-    return f"{spot.path} = {quote(detail['input'])}: {one_line(said)}"
+def _unknown_key(key: _Key, model: type[BaseModel]) -> str:
+    """Return the message on an unknown key, with the tables that have such a key or the nearest allowed name."""
+    allowed, name = list(key.table.model_fields), key.path.rpartition(".")[2]
+    tables = _tables_with(name, model)
+    is_elsewhere = 0 < len(tables) <= _MAXIMUM_TABLES
+    hint = f", which is a key of {' and '.join(tables)}" if is_elsewhere else nearest_name(name, allowed)
+    return f"unknown key '{key.path}'{hint}; allowed here: {', '.join(allowed)}"
 
 
-_GAPS = {"missing": "", "union_tag_not_found": ".kind"}
-"""Problem types of missing keys, with the suffix to append to the path."""
-_SENTENCES: dict[str, Callable[[_Spot, ErrorDetails], str]] = {
-    "literal_error": _unknown_word,
-    "string_pattern_mismatch": _wrong_name,
-    "union_tag_invalid": _unknown_word,
-    "model_type": _not_a_table,
-    "model_attributes_type": _not_a_table,
-    "dict_type": _not_a_table,
-}
+def _tables_with(name: str, model: type[BaseModel]) -> list[str]:
+    """Return the tables of a document that have this key, the outer ones first; not those in lists."""
+    paths: list[str] = []
+    seen = set()
+    level: list[tuple[str, type[BaseModel]]] = [("", model)]
+    while level:
+        inner: list[tuple[str, type[BaseModel]]] = []
+        for path, table in level:
+            # Tables may contain themselves.
+            if (path, table) in seen or len(path) > _LONGEST_VALUE:
+                continue
+            seen.add((path, table))
+            if name in table.model_fields:
+                paths.append(f"[{path}]" if path else "the top of the file")
+            for key, field in table.model_fields.items():
+                tables = [field.annotation] if _is_model(field.annotation) else _tables_in(field.annotation)
+                inner += [(f"{path}.{key}".strip("."), inner_table) for inner_table in tables]
+        level = inner
+    return list(dict.fromkeys(paths))

@@ -25,10 +25,9 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of, with_duration
-from ppafo.walking.person import draw_gaits
+from ppafo.walking.person import draw_people
 from ppafo.walking.planning import batch_of_many, plan_walk
 from ppafo.walking.walk import lasting
-from ppafo.walking.wearer import draw_builds
 from ppafo.wording import nearest_name
 
 
@@ -50,9 +49,7 @@ class _WalkEpisodes:
             # Person 0 of a population is always the one of the configuration; the second one is drawn.
             seed = float(generator.integers(0, LARGEST_SEED))
             drawn = replace(self.commanded, sensors=replace(self.commanded.sensors, seed=int(seed)))
-            build = draw_builds(2, generator)
-            gaits = draw_gaits(walk_of(self.base).gait, build.stature, generator)
-            batch = batch_of_many(drawn, build, gaits, generator)
+            batch = batch_of_many(drawn, draw_people(walk_of(self.base).gait, 2, generator))
             columns.parameters[:, number], columns.states[:, number] = batch.parameters[:, 1], batch.states[:, 1]
         return columns, np.zeros((0, len(generators)))
 

@@ -22,8 +22,9 @@ SHORTEST_HOLD = 0.1
 class SettledSums(NamedTuple):
     """Sums over the samples of the settled part so far, and extremes of the controlled quantity over the run.
 
-    ``squares`` is the sum of squared errors, ``total`` the sum of errors, ``taken`` the number of samples, ``swing``
-    the reversal state of the error, ``lowest_error`` and ``highest_error`` the extremes of the error, ``command`` the
+    ``squares`` is the sum of squared errors, ``total`` the sum of errors, ``taken`` the number of samples,
+    ``reference_squares`` and ``reference_total`` the sums for the reference less ``begun``, ``swing`` the reversal
+    state of the error, ``lowest_error`` and ``highest_error`` the extremes of the error, ``command`` the
     reversals of the command, and ``lowest_angle`` and ``highest_angle`` the extremes of the angle [rad]. ``begun`` is
     the initial controlled value, ``lowest`` and ``highest`` its extremes. ``met_upwards`` is 1 once the value has been
     at or below the reference, and ``top`` the highest value since then; ``met_downwards`` and ``bottom`` are the
@@ -33,6 +34,8 @@ class SettledSums(NamedTuple):
     squares: float
     total: float
     taken: float
+    reference_squares: float
+    reference_total: float
     swing: Swing
     lowest_error: float
     highest_error: float
@@ -56,6 +59,8 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
         squares=error * error,
         total=error,
         taken=1.0,
+        reference_squares=error * error,
+        reference_total=-error,
         swing=Swing(error, UNDECIDED, error),
         lowest_error=error,
         highest_error=error,
@@ -76,6 +81,8 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
     """Sums with one more sample; they restart at half of the run and at half of the hold."""
     value = sample.value
     error = value - sample.reference
+    # From the initial value, or the square of a pressure would hide its change.
+    ahead = sample.reference - state.begun
     # The first sample of a half is that from which on twice its number is at least this.
     of_run, of_hold = course.samples - 1.0, course.hold_start + course.samples - 1.0
     twice = 2.0 * sample.number
@@ -91,6 +98,8 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
         squares=error * error + (0.0 if anew else state.squares),
         total=error + (0.0 if anew else state.total),
         taken=1.0 if anew else state.taken + 1.0,
+        reference_squares=ahead * ahead + (0.0 if anew else state.reference_squares),
+        reference_total=ahead + (0.0 if anew else state.reference_total),
         swing=Swing(
             error if anew else swing.play, UNDECIDED if anew else swing.turns, error if anew else swing.highest
         ),
@@ -124,6 +133,11 @@ def farther(highest: Floats, lowest: Floats) -> Floats:
     return found
 
 
+def deviation(squares: Floats, total: Floats, count: Floats) -> Floats:
+    """Standard deviation from the sum of squares, the sum and the number of samples."""
+    return np.sqrt(np.maximum(squares / count - (total / count) ** 2, 0.0))
+
+
 def read_reversals(readings: Readings) -> Floats:
     """Metric ``settled_reversals`` of the command [1/s]; a duration below a second counts as one second."""
     sums = readings.meters[SETTLED.name]
@@ -144,6 +158,7 @@ _NUMBERS: dict[str, Callable[[Readings], Floats]] = {
     "missing": _of_sums("total", "taken", by=mean_of),
     "worst": _of_sums("highest_error", "lowest_error", by=farther),
     "span": _of_sums("highest_error", "lowest_error", by=less),
+    "wave": _of_sums("reference_squares", "reference_total", "taken", by=deviation),
     "turns": _of_sums("swing.turns", by=count_of),
     "angle_range": _of_sums("highest_angle", "lowest_angle", by=less),
     **{name: _of_sums(name) for name in ("begun", "lowest", "highest", "top", "bottom")},

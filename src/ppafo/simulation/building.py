@@ -52,6 +52,7 @@ from ppafo.simulation.declaration import (
     quantities,
     reference_settings,
 )
+from ppafo.simulation.default_gains import loop_terms
 from ppafo.simulation.document import REFERENCE_OF, DocumentReader, controlled_in, kind_at, value_at
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
 from ppafo.simulation.law_signals import LEG_PATHS, MOVED, PERIOD_PATH, seen_in_scenario
@@ -73,7 +74,6 @@ from ppafo.simulation.scenario import (
     Sensors,
     SupplyLine,
 )
-from ppafo.simulation.torque_loop import loop_terms
 from ppafo.units import format_quantity, split_quantity
 from ppafo.units.shown import shown_in, shown_text, written_text
 from ppafo.wording import nearest_name, one_line

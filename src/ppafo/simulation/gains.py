@@ -10,9 +10,9 @@ from ppafo.model.ports import load_torque
 from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import LinkFunction
 from ppafo.simulation.declaration import law_settings
+from ppafo.simulation.default_gains import DEAD_TIME, RATE, loop_terms
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
-from ppafo.simulation.torque_loop import DEAD_TIME, RATE, loop_terms
 
 _OF_LOOP = frozenset(
     (

@@ -1,38 +1,28 @@
-"""Runs with a Python object as controller, sample by sample, on the compiled model of all other runs."""
+"""Compiled run that is stepped from one controller sample to the next, with the command of the caller."""
 
-import logging
 import math
-import traceback
 from collections.abc import Callable
 from typing import Any, final
-from weakref import WeakSet
 
-import numpy as np
-
-from ppafo.control.kind import PythonController
 from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, RunnableProgram, effort_for, load_program, samples_in
 from ppafo.engine.rows import group_of, row_numbers
-from ppafo.errors import ScenarioError, SimulationError
+from ppafo.errors import ScenarioError
 from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import NOTHING_SEEN, GaitMeasurement, Measurement, measure, measure_gait
-from ppafo.model.valves.kind import VENT, VENTS_ABOVE
-from ppafo.wording import nearest_name
-
-logger = logging.getLogger("ppafo")
-
-_SAID: "WeakSet[type]" = WeakSet()
-"""Controller classes whose limited commands have been reported."""
 
 
 @final
 class SampledRun:
-    """Single run in progress whose command [-] the caller sets at each sample."""
+    """Single run in progress whose command [-] the caller sets at each sample.
+
+    ``samples`` is the number of samples of the whole run, ``sample`` the index of the current one.
+    """
 
     def __init__(self, batch: Batch, module: RunnableProgram | None = None) -> None:
         program, clock = batch.program, batch.clock
         self.samples = math.ceil(clock.step_count / clock.steps_per_sample)
-        self.taken = 0
+        self.sample = 0
         self._batch = batch
         self._block = LaneBlock(
             load_program(program, effort_for(batch)) if module is None else module,
@@ -41,169 +31,110 @@ class SampledRun:
             batch.parameters,
             batch.states,
         )
-        self._reference, self._step = _group(batch, "reference"), _group(batch, "timing").step
-        self._see = (_gait_measurements if program.walks else _measurement_source)(batch, self._block)
-        self._command_row = row_numbers(program.state_rows())["result.command"]
+        self._reference, self._step = _parameter_group(batch, "reference"), _parameter_group(batch, "timing").step
+        self._rows = row_numbers(program.state_rows())
+        self._plant, self._sensors = (_parameter_group(batch, name) for name in ("plant", "sensors"))
+        if program.walks:
+            self._measure: Callable[[], Any] = self._walk_measurement
+            self._last_measurement = NOTHING_SEEN
+            # Delayed readings and gas temperatures of a walk are kept inside the compiled program alone.
+            if program.late_readings or program.is_thermal:
+                raise ScenarioError(
+                    "a Python controller cannot run a walk with delayed sensors or a thermal gas model; "
+                    "use a controller kind"
+                )
+            self._gait_sensors = _parameter_group(batch, "gait_sensors")
+        else:
+            self._measure = self._vane_measurement
+            effects = [_parameter_group(batch, effect.name) for effect in program.effects]
+            self._shown_signals = in_program(shown_signals, program, effects)
 
     @property
     def time(self) -> float:
         """Time of the current sample [s]."""
-        time: float = self.taken * self._batch.clock.steps_per_sample * self._step
+        time: float = self.sample * self._batch.clock.steps_per_sample * self._step
         return time
 
     @property
-    def requested(self) -> float:
+    def reference(self) -> float:
         """Reference at the current sample [N m]."""
-        requested: float = self._batch.program.reference.value(self._reference, self.time)[0]
-        return requested
+        reference: float = self._batch.program.reference.value(self._reference, self.time)[0]
+        return reference
 
     def measurement(self) -> Any:
-        """Sensor readings at the current sample: a ``Measurement``, or in a walk a ``GaitMeasurement``."""
-        return self._see(self.taken)
+        """Sensor readings at the current sample: a ``Measurement``, or in a walk a ``GaitMeasurement``.
 
-    def go_on(self, command: float) -> None:
+        Walking sensors have memory: their measurement is taken once a sample.
+        """
+        return self._measure()
+
+    def advance(self, command: float) -> None:
         """Advance to the next sample with a command."""
         clock = self._batch.clock
-        done = self.taken * clock.steps_per_sample
-        self._block.states[self._command_row] = command
+        step = self.sample * clock.steps_per_sample
+        self._block.states[self._rows["result.command"]] = command
         # The last sample of a run may have fewer steps.
-        self._block.advance(min(clock.steps_per_sample, clock.step_count - done))
-        self.taken += 1
+        self._block.advance(min(clock.steps_per_sample, clock.step_count - step))
+        self.sample += 1
 
     def result(self) -> BatchResult:
         """States and record so far, including the sample reached by the last command."""
-        clock, outcome = self._batch.clock, self._block.result()
-        steps = min(self.taken * clock.steps_per_sample, clock.step_count)
-        kept = samples_in(steps, clock.record_every) if clock.record_every else None
-        # The record at the end of a step is taken when the next one begins, but for the last of the run.
-        late = 1 if kept is not None and steps < clock.step_count and (kept - 1) * clock.record_every >= steps else 0
-        return BatchResult(outcome.states, outcome.record[: None if kept is None else kept - late])
+        clock, result = self._batch.clock, self._block.result()
+        if not clock.record_every:
+            return result
+        steps = min(self.sample * clock.steps_per_sample, clock.step_count)
+        rows = samples_in(steps, clock.record_every)
+        # A step records the state at its end when the next step begins, and only the last of a run does so at once.
+        last_recorded_step = steps if steps == clock.step_count else steps - 1
+        if (rows - 1) * clock.record_every > last_recorded_step:
+            rows -= 1
+        return BatchResult(result.states, result.record[:rows])
+
+    def _vane_measurement(self) -> Measurement:
+        """Measurement of the present state, or of an earlier state for delayed sensors."""
+        program, clock = self._batch.program, self._batch.clock
+        if program.late_signals and self.sample > 0:
+            signals = self._block.late_signals(self.sample * clock.steps_per_sample)
+            angle, pressure_1, pressure_2 = signals[:, 0]
+        else:
+            groups, state = program.state_rows(), self._block.states[:, 0].tolist()
+            effect_states = {name: group_of(name, groups, state) for name in program.effect_states}
+            angle, *masses = (state[self._rows[f"state.{name}"]] for name in ("angle", "mass_1", "mass_2"))
+            pressures = program.actuator.pressures(self._plant, angle, *masses)
+            angle, pressure_1, pressure_2 = self._shown_signals(effect_states, angle, *pressures)
+        if program.ideal_sensors:
+            torque = program.actuator.torque(self._plant, angle, pressure_1, pressure_2)
+            return Measurement(angle, pressure_1, pressure_2, torque)
+        return measure(self._sensors, angle, pressure_1, pressure_2, self._plant, self.sample, parts=program.functions)
+
+    def _walk_measurement(self) -> GaitMeasurement:
+        """Measurement of a walking controller, of the present state."""
+        program, state = self._batch.program, self._block.states[:, 0].tolist()
+        angle, mass_1, mass_2, heel_force, toe_force = (
+            state[self._rows[path]]
+            for path in ("state.angle", "state.mass_1", "state.mass_2", "walk.heel_force", "walk.toe_force")
+        )
+        pressures = program.actuator.pressures(self._plant, angle, mass_1, mass_2)
+        if program.ideal_sensors:
+            torque = program.actuator.torque(self._plant, angle, *pressures)
+            return GaitMeasurement(angle, *pressures, torque, heel_force, toe_force)
+        measurement, self._last_measurement = measure_gait(
+            self._sensors,
+            self._gait_sensors,
+            self._last_measurement,
+            angle,
+            *pressures,
+            heel_force,
+            toe_force,
+            self._plant,
+            self.time,
+            self.sample,
+            parts=program.functions,
+        )
+        return measurement
 
 
-def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
-    """Run a batch of one with a Python controller.
-
-    A command beyond the valve's range is limited; a warning is logged once for each class of controllers. Raises
-    SimulationError for a command that is no finite number, and for a programming error in the controller.
-    """
-    run = SampledRun(batch)
-    # What an earlier run left behind in the object must not steer this one.
-    controller.reset()
-    for _ in range(run.samples):
-        now = (run.time, run.requested, run.measurement())
-        try:
-            command = controller.update(*now)
-        except (NameError, AttributeError, TypeError) as error:
-            raise _slip(controller, error) from error
-        # A comparison that was meant to be a command is a bool, which Python takes for a whole number.
-        is_number = isinstance(command, int | float | np.floating) and not isinstance(command, bool)
-        if not is_number or not math.isfinite(command):
-            raise SimulationError(
-                f"{type(controller).__name__}.update returned {command!r} at t = {run.time:.6g} s; it must return a "
-                f"finite number"
-            )
-        # Above what opens the valve fully there is one more command, of a walk: both chambers are vented.
-        is_vent = batch.program.walks and command > VENTS_ABOVE
-        taken = VENT if is_vent else max(-1.0, min(1.0, float(command)))
-        if taken != command:
-            allowed = f"-1 to 1, or {VENT:g} to vent both chambers" if batch.program.walks else "-1 to 1"
-            if type(controller) not in _SAID:
-                _SAID.add(type(controller))
-                logger.warning(
-                    "ppafo: %s.update returned %g at t = %.6g s; commands are %s: those beyond are limited",
-                    type(controller).__name__,
-                    command,
-                    run.time,
-                    allowed,
-                )
-        run.go_on(taken)
-    return run.result()
-
-
-def _slip(controller: PythonController, error: NameError | AttributeError | TypeError) -> SimulationError:
-    """Return the error for a programming error in a controller: file, line, message and nearest name."""
-    frame = traceback.extract_tb(error.__traceback__)[-1]
-    walked = next(reversed(list(traceback.walk_tb(error.__traceback__))))[0]
-    name, hint = getattr(error, "name", None), ""
-    if name is not None and isinstance(error, AttributeError):
-        hint = nearest_name(name, [known for known in dir(error.obj) if not known.startswith("_")])
-    elif name is not None:
-        hint = nearest_name(name, [*walked.f_locals, *walked.f_globals])
-    return SimulationError(f"{frame.filename}, line {frame.lineno}: {type(controller).__name__}: {error}{hint}")
-
-
-def _group(batch: Batch, name: str) -> Any:
+def _parameter_group(batch: Batch, name: str) -> Any:
     """NamedTuple of a group of parameters of the single run, as floats."""
     values: Any = batch.parameters[:, 0].tolist()
     return group_of(name, batch.program.parameter_rows(), values)
-
-
-def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measurement]:
-    """Function that returns the measurement at a sample: of the present state, or earlier for delayed sensors."""
-    program, per_sample = batch.program, batch.clock.steps_per_sample
-    rows = row_numbers(program.state_rows())
-    plant, sensors, actuator = _group(batch, "plant"), _group(batch, "sensors"), program.actuator
-    groups = program.state_rows()
-    show = in_program(shown_signals, program, [_group(batch, effect.name) for effect in program.effects])
-
-    def see(sample: int) -> Measurement:
-        state = block.states[:, 0]
-        if program.late_signals and sample > 0:
-            angle, pressure_1, pressure_2 = block.late_signals(sample * per_sample)[:, 0]
-        else:
-            angle = float(state[rows["state.angle"]])
-            masses = float(state[rows["state.mass_1"]]), float(state[rows["state.mass_2"]])
-            pressure_1, pressure_2 = actuator.pressures(plant, angle, *masses)
-            values = state.tolist()
-            states = {name: group_of(name, groups, values) for name in program.effect_states}
-            angle, pressure_1, pressure_2 = show(states, angle, pressure_1, pressure_2)
-        if program.ideal_sensors:
-            return Measurement(
-                angle=angle,
-                pressure_1=pressure_1,
-                pressure_2=pressure_2,
-                torque=actuator.torque(plant, angle, pressure_1, pressure_2),
-            )
-        return measure(sensors, angle, pressure_1, pressure_2, plant, sample, parts=program.functions)
-
-    return see
-
-
-def _gait_measurements(batch: Batch, block: LaneBlock) -> Callable[[int], GaitMeasurement]:
-    """Function that returns the measurement of a walking controller at a sample, of the present state.
-
-    Raises ScenarioError for delayed sensors and for gas with an energy balance, which are only available to compiled
-    controllers.
-    """
-    program, actuator, rows = batch.program, batch.program.actuator, row_numbers(batch.program.state_rows())
-    if program.late_readings or program.is_thermal:
-        raise ScenarioError(
-            "a Python controller cannot run a walk with delayed sensors or a thermal gas model; use a controller kind"
-        )
-    plant, sensors, gait_sensors = (_group(batch, name) for name in ("plant", "sensors", "gait_sensors"))
-    period, last = batch.clock.steps_per_sample * _group(batch, "timing").step, NOTHING_SEEN
-
-    def see(sample: int) -> GaitMeasurement:
-        nonlocal last
-        state = block.states[:, 0]
-        angle, mass_1, mass_2, heel, toe = (
-            float(state[rows[path]])
-            for path in ("state.angle", "state.mass_1", "state.mass_2", "walk.heel_force", "walk.toe_force")
-        )
-        pressures = actuator.pressures(plant, angle, mass_1, mass_2)
-        if program.ideal_sensors:
-            return GaitMeasurement(
-                angle=angle,
-                pressure_1=pressures[0],
-                pressure_2=pressures[1],
-                torque=actuator.torque(plant, angle, *pressures),
-                heel_force=heel,
-                toe_force=toe,
-            )
-        time, functions = sample * period, program.functions
-        seen, last = measure_gait(
-            sensors, gait_sensors, last, angle, *pressures, heel, toe, plant, time, sample, parts=functions
-        )
-        return seen
-
-    return see

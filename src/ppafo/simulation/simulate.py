@@ -223,7 +223,7 @@ def results_of(scenario: Scenario, runs: Sequence[Run]) -> list[Result]:
     if custom is None:
         outcomes = run_together(runs)
     else:
-        from ppafo.simulation.sampled import run_sampled
+        from ppafo.simulation.python_controller import run_sampled
 
         outcomes = [run_sampled(batch_of(run), custom) for run in runs]
     return [result_of(scenario, run, outcome) for run, outcome in zip(runs, outcomes, strict=True)]

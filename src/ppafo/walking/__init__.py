@@ -2,8 +2,9 @@
 
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.loading import list_walks, load_walk
+from ppafo.walking.population import Population, walk_population
 from ppafo.walking.result import WalkResult
-from ppafo.walking.walk import Population, WalkComparison, compare_walks, walk, walk_population
+from ppafo.walking.walk import WalkComparison, compare_walks, walk
 
 __all__ = [
     "Population",

@@ -37,6 +37,7 @@ from ppafo.simulation.building import (
     read_supply_line,
 )
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE
+from ppafo.simulation.default_gains import loop_terms
 from ppafo.simulation.document import DocumentReader, kind_at, value_at
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
 from ppafo.simulation.law_signals import IN_WALK, PERIOD_PATH
@@ -53,7 +54,6 @@ from ppafo.simulation.scenario import (
     Sensors,
     SupplyLine,
 )
-from ppafo.simulation.torque_loop import loop_terms
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (

@@ -36,7 +36,7 @@ from ppafo.simulation.scenario import ProfileChoice, Scenario
 from ppafo.walking.declaration import FORCES, WALK_SENSORS
 from ppafo.walking.gait_series import heel_rocker
 from ppafo.walking.motion import walk_of
-from ppafo.walking.person import VariedGaits, crowd_of, leg_of_person, person_of, settings_of_person
+from ppafo.walking.person import Person, crowd_of, leg_of_person, person_of, settings_of_person
 from ppafo.walking.preparation import (
     HIGHEST_ANGLE,
     LOWEST_ANGLE,
@@ -53,7 +53,7 @@ from ppafo.walking.preparation import (
     with_leg,
 )
 from ppafo.walking.task_sequence import PlannedSequence, TaskSequence, plan_task_sequence, standing_gait
-from ppafo.walking.wearer import BodyScale, leg_parameters
+from ppafo.walking.wearer import leg_parameters
 
 NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
 """Reference of a walk: none, because a walking controller generates its own."""
@@ -131,10 +131,10 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     return run, (too_many_steps(scenario, run.step, run.step_count), *stiff_loads(run))
 
 
-def batch_of_many(scenario: Scenario, build: BodyScale, gaits: VariedGaits, generator: np.random.Generator) -> Batch:
-    """Return the walks of many wearers as a batch without recording; the first wearer is the one of the scenario."""
-    run, _ = plan_walks(crowd_of(scenario, build, gaits, generator))
-    return unrecorded(run, build.mass.size)
+def batch_of_many(scenario: Scenario, people: Person) -> Batch:
+    """Return the walks of many wearers as a batch without recording."""
+    run, _ = plan_walks(crowd_of(scenario, people))
+    return unrecorded(run, np.size(people.mass))
 
 
 def unrecorded(run: Run, runs: int) -> Batch:

@@ -1,7 +1,6 @@
 """Simulation of a walk, or of many wearers, and comparison with no device and with a healthy ankle."""
 
 import math
-from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,24 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.arguments import Count, Minutes, Overrides, Seed, checked
+from ppafo.arguments import Minutes, Overrides, checked
 from ppafo.control.walking import event_on_off
-from ppafo.control.walking.fault_flags import FAULT_FLAGS
-from ppafo.engine.lane_rows import LANES
-from ppafo.engine.lanes import STEPS_PER_CALL, Batch, Floats, begin_block, effort_for, run_batch
-from ppafo.engine.rows import row_numbers
-from ppafo.engine.run import NEVER_FAILED, batch_of
+from ppafo.engine.lanes import STEPS_PER_CALL, begin_block, effort_for
+from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.metrics import Metric
-from ppafo.metrics.strides import PER_STRIDE
-from ppafo.model.helping import STOPPED
 from ppafo.model.leg import passive_torque
 from ppafo.parameters.device import Actuator, FootPlate, Friction
 from ppafo.parameters.graph import outside
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.numbers import check_parts
 from ppafo.simulation.plan import MAXIMUM_STEPS
-from ppafo.simulation.sampled import run_sampled
+from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
 from ppafo.walking.bottle.coupling import BottleLife, Schedule, life_on_bottle, run_on_bottle
 from ppafo.walking.bottle.course import WALKED
@@ -34,14 +28,10 @@ from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.declaration import THRESHOLDS
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
-from ppafo.walking.person import crowd_of, draw_gaits
-from ppafo.walking.planning import fed_device, plan_walk, plan_walks, task_sequence_of_walk, unrecorded
+from ppafo.walking.planning import fed_device, plan_walk, task_sequence_of_walk
 from ppafo.walking.preparation import FaultSettings
-from ppafo.walking.result import REMEDY, WalkResult, result_of_walk
-from ppafo.walking.safety_events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
+from ppafo.walking.result import WalkResult, result_of_walk
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
-from ppafo.walking.task_sequence import turns_walked
-from ppafo.walking.wearer import draw_builds
 
 Progress = Callable[[float, float], None]
 
@@ -271,168 +261,3 @@ def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
             summary = "moment of the wearer's dorsiflexors, mean over the stride"
             metrics["dorsiflexor_moment"] = Metric(float(moment[:-1].mean()), "N m", summary)
     return metrics
-
-
-MAXIMUM_WEARERS = 1_000_000
-"""Largest number of wearers of a population."""
-
-STEPS_AT_ONCE = 1.0e8
-"""Total number of steps of a group of wearers that is simulated at once, a few seconds of computing time."""
-
-SHOWN = {
-    "gas": ("Gas per stride", "gas mass", 3),
-    "positive_push_off_work": ("Positive work on the wearer in push-off", "energy", 2),
-    "net_push_off_work": ("Net work on the wearer in push-off", "energy", 2),
-    "toe_clearance": ("Lowest toe height in mid-swing, relative to healthy", "body length", 1),
-    "toe_landing": ("Strides that begin on the toes", "fraction", 0),
-    "body_mass": ("Body mass", "mass", 1),
-    "shank_length": ("Shank", "body length", 1),
-    "stride_time": ("Stride time", "time", 3),
-    "stance_share": ("Stance", "fraction", 1),
-}
-"""Title, kind of quantity and number of decimals of the quantities shown for every wearer."""
-
-
-@dataclass(frozen=True, slots=True)
-class WearerQuantity:
-    """Unit and meaning of a quantity that is evaluated for every wearer."""
-
-    unit: str
-    summary: str
-
-
-OUTCOMES: dict[str, WearerQuantity] = {
-    name: WearerQuantity(quantity.unit, f"{quantity.summary}, mean over all strides of a wearer")
-    for name, quantity in PER_STRIDE.items()
-}
-TRAITS: dict[str, WearerQuantity] = {
-    "body_mass": WearerQuantity("kg", "mass of the body"),
-    "shank_length": WearerQuantity("m", "knee to ankle"),
-    "stride_time": WearerQuantity("s", "from one heel strike to the next"),
-    "stance_share": WearerQuantity("-", "fraction of the stride until toe-off"),
-}
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Population:
-    """Wearers and the outcomes of their walks, each an array (wearers,) by name, in SI units.
-
-    - ``scenario``: walk of the first wearer
-    - ``minutes``: duration of each walk [min]
-    - ``seed``: random seed of the wearers
-    - ``traits``, ``outcomes``: traits of the wearers, and outcomes of their walks, without wearers whose simulation
-      diverged
-    - ``diverged``: number of wearers whose simulation diverged
-    - ``vented``: number of wearers whose controller stopped permanently
-    - ``paused``: number of other wearers with reduced assistance for a while
-    - ``fault_flags``: number of vented and paused wearers by their last fault flag, the most frequent first
-    """
-
-    scenario: Scenario
-    minutes: float
-    seed: int
-    traits: Mapping[str, Floats]
-    outcomes: Mapping[str, Floats]
-    diverged: int
-    vented: int
-    paused: int
-    fault_flags: Mapping[str, int]
-
-    @property
-    def count(self) -> int:
-        """Number of wearers whose walk was completed."""
-        return int(self.outcomes["gas"].size)
-
-    @property
-    def message(self) -> str:
-        """Description of the end of the walks."""
-        if not self.diverged:
-            return "completed"
-        return f"{self.diverged} of {self.diverged + self.count} wearers diverged and are left out; {REMEDY}"
-
-    def __repr__(self) -> str:
-        return f"Population of {self.count} wearers, {self.scenario.name}, {self.minutes:g} min: {self.message}"
-
-
-@checked
-def walk_population(
-    scenario: Scenario | str | Path,
-    *,
-    wearers: Count,
-    minutes: Minutes | None = None,
-    seed: Seed = 1,
-    progress: Progress = silent,
-) -> Population:
-    """Simulate the walks of many randomly drawn wearers; the first is the wearer of the configuration.
-
-    Arguments:
-        scenario: a walk, its name or its file
-        wearers: number of wearers
-        minutes: duration of each walk [min]; default: the length that the walk states
-        seed: random seed of the wearers
-        progress: called with the number of wearers that have walked and the number of all
-
-    Returns:
-        Population with one value of every outcome for each wearer [SI]
-
-    Raises:
-        ScenarioError: a walk or a number of wearers that cannot be used
-
-    >>> import ppafo
-    >>> population = ppafo.walk_population("solenoid", wearers=2, minutes=0.1)
-    >>> [f"{clearance:.3f} m" for clearance in population.outcomes["toe_clearance"]]
-    ['-0.035 m', '-0.033 m']
-    """
-    if not 1 <= wearers <= MAXIMUM_WEARERS:
-        raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")
-    configuration = scenario if isinstance(scenario, Scenario) else load_walk(scenario)
-    if walk_of(configuration).bottle is not None:
-        raise ScenarioError(
-            "several wearers walk at a constant supply pressure: omit the bottle, or the number of wearers"
-        )
-    if walk_of(configuration).person:
-        raise ScenarioError(
-            "several wearers are drawn at random around one: omit wearer.person, or the number of wearers"
-        )
-    # One generator, in this order, so that a seed gives the same people every time.
-    generator = np.random.default_rng(seed)
-    build = draw_builds(wearers, generator)
-    gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
-    crowd = crowd_of(configuration, build, gaits, generator)
-    planned = task_sequence_of_walk(crowd)
-    if minutes is None and planned is not None:
-        minutes = float(np.max(planned.duration)) / 60.0
-    seconds = lasting(configuration, minutes).run.duration
-    run, _ = plan_walks(with_duration(crowd, seconds))
-    batch = unrecorded(run, wearers)
-    # Groups small enough for an interrupt to be seen and for progress to be reported.
-    group, results = max(1, int(STEPS_AT_ONCE / batch.clock.step_count / LANES)) * LANES, []
-    for first in range(0, wearers, group):
-        part = slice(first, first + group)
-        one = Batch(batch.program, batch.clock, batch.parameters[:, part], batch.states[:, part])
-        results.append(run_batch(one).states)
-        progress(float(min(first + group, wearers)), float(wearers))
-    states = np.concatenate(results, axis=1)
-    rows = {path: states[row] for path, row in row_numbers(batch.program.state_rows()).items()}
-    good = (rows["result.failure_time"] >= NEVER_FAILED) & np.isfinite(states).all(axis=0)
-    walked = run.step * run.step_count
-    # Numbers of each wearer from the totals; ``strides`` walked, parts of one included.
-    strides = walked * gaits.timing["frequency"] if planned is None else turns_walked(planned.timed, walked)
-    # Who never strikes must not divide by zero.
-    strikes = np.maximum(rows["walk.strides"], 1.0)
-    over = {"toe_clearance": strikes, "toe_landing": strikes}
-    outcomes = {name: rows[quantity.total] / over.get(name, strides) for name, quantity in PER_STRIDE.items()}
-    traits = {
-        "body_mass": walk_of(configuration).wearer.body_mass * build.mass,
-        "shank_length": walk_of(configuration).wearer.shank_length * build.stature,
-        "stride_time": gaits.stride_time,
-        "stance_share": gaits.timing["toe_off"],
-    }
-    kept = [{name: values[good] for name, values in table.items()} for table in (traits, outcomes)]
-    vented, paused, flags = 0, 0, Counter[str]()
-    if SAFE_ROW in rows:
-        stopped, less = rows[SAFE_ROW][good] == STOPPED, rows[VENTINGS_ROW][good] > 0.0
-        vented, paused = int(stopped.sum()), int((~stopped & less).sum())
-        flags.update(FAULT_FLAGS[flag].name for flag in rows[f"{FINDING_ROW}.fault_flag"][good][less].tolist())
-    lost, last = int((~good).sum()), dict(flags.most_common())
-    return Population(configuration, seconds / 60.0, seed, kept[0], kept[1], lost, vented, paused, last)

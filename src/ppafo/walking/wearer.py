@@ -1,4 +1,4 @@
-"""Wearer of the device: segments of one leg and the ankle, in SI units, and the variation between wearers.
+"""Wearer of the device: segments of one leg and the ankle, in SI units, and their scaling between people.
 
 A person is scaled in mass and length. Each segment keeps its fraction of the body mass, its fraction of the stature and
 the relative position of its mass centre (as in table 4.1 of Winter, Biomechanics and Motor Control of Human Movement,
@@ -12,32 +12,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, NamedTuple
 
-import numpy as np
-
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.leg import LegParameters
 from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
-from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import FOOT
 from ppafo.simulation.document import DocumentReader, value_at
 
 SHANK_SHARE = 0.246
 """Shank length as a fraction of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement,
 4th ed. 2009. The paper states a shank of 0.46 m and no stature, which results in 1.87 m."""
-
-MASS_VARIATION = 0.166
-STATURE_VARIATION = 0.039
-"""Relative standard deviations of body mass and stature: 85.5 +- 14.2 kg and 1756 +- 69 mm for men in ANSUR II (Gordon
-et al. 2014, NATICK/TR-15/007)."""
-
-CORRELATION = 0.5
-"""Correlation between body mass and stature. Assumed: the survey's table of means does not contain it."""
-
-MAXIMUM_DEVIATIONS = 2.5
-"""Limit of random draws [standard deviations]; larger deviations are clipped."""
 
 _SAME = 1.0e-3
 """Relative difference of body masses or statures that is due to rounding."""
@@ -155,31 +141,6 @@ def leg_parameters(wearer: Wearer, rocker: HeelRocker) -> LegParameters:
 def paper_subject() -> Wearer:
     """Return the default wearer of a walk: the subject of the paper."""
     return Wearer(**{quantity.name: float(quantity.default or 0.0) for quantity in WEARER})
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class BodyScale:
-    """Body mass and stature of many people relative to one person [-], each (people,)."""
-
-    mass: Floats
-    stature: Floats
-
-
-def draw_builds(count: int, generator: np.random.Generator) -> BodyScale:
-    """Draw the builds of ``count`` people; the first person has the build of the wearer unchanged."""
-    normal = draw_bounded_normal(generator, (2, count))
-    stature = normal[0]
-    # Two normal numbers with this correlation, from two that have none.
-    mass = CORRELATION * normal[0] + np.sqrt(1.0 - CORRELATION**2) * normal[1]
-    multiples = 1.0 + MASS_VARIATION * mass, 1.0 + STATURE_VARIATION * stature
-    for values in multiples:
-        values[0] = 1.0
-    return BodyScale(*multiples)
-
-
-def draw_bounded_normal(generator: np.random.Generator, shape: tuple[int, ...]) -> Floats:
-    """Return standard normal draws [-] of this shape, clipped at ``MAXIMUM_DEVIATIONS``."""
-    return np.clip(generator.standard_normal(shape), -MAXIMUM_DEVIATIONS, MAXIMUM_DEVIATIONS)
 
 
 _PAPER = paper_subject()

@@ -136,6 +136,7 @@ def test_what_a_run_from_python_loads_does_not_grow_unnoticed(run_from_python: l
         "engine.generator",
         "engine.led_leg",
         "simulation.check",
+        "simulation.python_controller",
         "simulation.sampled",
     )
     assert not {f"ppafo.{name}" for name in late} & loaded

@@ -324,14 +324,14 @@ class LeavingPlant:
     samples = 50
 
     def __init__(self) -> None:
-        self.taken = 0
-        self.requested = 1.0
+        self.sample = 0
+        self.reference = 1.0
 
     def measurement(self) -> Measurement:
-        return Measurement(1.0, math.nan if self.taken >= 7 else 2.0e5, 1.0e5, 0.0)
+        return Measurement(1.0, math.nan if self.sample >= 7 else 2.0e5, 1.0e5, 0.0)
 
-    def go_on(self, command: float) -> None:
-        self.taken += 1
+    def advance(self, command: float) -> None:
+        self.sample += 1
 
 
 def test_a_plant_that_leaves_what_is_possible_ends_the_run() -> None:

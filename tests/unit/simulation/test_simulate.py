@@ -148,6 +148,25 @@ def test_python_controller_that_returns_no_finite_number_is_refused_with_the_tim
         simulate(torque_task("proportional").controlled_by(Broken()))
 
 
+def test_a_python_controller_whose_methods_take_other_arguments_is_told_which_they_take(
+    torque_task: Callable[[str], Scenario],
+) -> None:
+    class TwoArguments:
+        def reset(self) -> None: ...
+
+        def update(self, time: float, reference: float) -> float:
+            return 0.0
+
+    class ResetTakesMore(Proportional):
+        def reset(self, gain: float) -> None: ...  # type: ignore[override]
+
+    for controller in (TwoArguments(), ResetTakesMore()):
+        with pytest.raises(SimulationError) as refused:
+            simulate(torque_task("proportional").controlled_by(controller))  # type: ignore[arg-type]
+        assert str(refused.value).startswith(f"{type(controller).__name__}: ")
+        assert str(refused.value).endswith("; write reset(self) and update(self, time, reference, measurement)")
+
+
 def test_commands_of_a_python_controller_are_clipped(torque_task: Callable[[str], Scenario]) -> None:
     result = simulate(torque_task("proportional").controlled_by(Proportional(1e6)))
     assert float(np.abs(result.recording["command"]).max()) == 1.0

@@ -60,7 +60,7 @@ def test_a_pair_that_is_too_large_and_a_load_that_is_too_heavy_are_named() -> No
     )
     assert pair.tracking is not None
     assert pair.tracking.kind == "oscillates"
-    assert "in the 95 ms that they are late" in pair.tracking.sentence
+    assert "in their dead time of 95 ms" in pair.tracking.sentence
     pushed = simulate("cylinder-servo", ["motion.external_torque=14 N m"]).tracking
     assert pushed is not None
     assert "the joint lies on its lower stop: it needs 14 N m at" in pushed.sentence
@@ -69,7 +69,7 @@ def test_a_pair_that_is_too_large_and_a_load_that_is_too_heavy_are_named() -> No
 @pytest.mark.parametrize(
     ("changes", "share"),
     [
-        (["reference.level=4 N m"], "2.19 N m in the 75 ms that it is late, 0.55 times the 4 N m wanted"),
+        (["reference.level=4 N m"], "2.19 N m in its dead time of 75 ms, 0.55 times the 4 N m wanted"),
         (["reference.level=4 N m", "valve.switching_interval=5 ms", "controller.rate=300 Hz"], ""),
         (["reference.level=4 N m", "valve.area=4.5 mm^2"], ""),
         (["device.valve=proportional", "valve.area=60 mm^2"], ""),
@@ -139,6 +139,42 @@ def test_a_run_that_ends_on_its_ramp_is_not_judged_by_its_lag() -> None:
     assert (follows(run_ensemble(base, columns, with_companions([], base)).metrics, base, columns) == 1.0).all()
 
 
+SMALL_SINE = [
+    "reference.kind=sine",
+    "reference.level=3 N m",
+    "reference.amplitude=0.6 N m",
+    "reference.frequency=5 Hz",
+    "controller.derivative_gain=0 s/(N m)",
+]
+"""Sine that is small beside its mean."""
+
+
+def test_a_loop_that_keeps_only_the_mean_of_a_sine_does_not_follow_it() -> None:
+    slow = simulate(TASK, [*SMALL_SINE, "controller.proportional_gain=0.01 1/(N m)"])
+    assert slow.tracking is not None
+    assert slow.tracking.kind == "does not follow"
+    assert slow.tracking.error < 0.2 * slow.tracking.wanted
+    quick = simulate(TASK, [*SMALL_SINE, "controller.proportional_gain=4.5 1/(N m)"])
+    assert quick.tracking is None
+    # A constant delay behind a slow ramp is not judged by how little the ramp changes.
+    ramp = ["reference.kind=sine", "reference.level=3 N m", "reference.amplitude=1.5 N m", "reference.frequency=0.1 Hz"]
+    assert (
+        simulate(TASK, [*ramp, "reference.phase=-0.125", "controller.proportional_gain=0.5 1/(N m)"]).tracking is None
+    )
+
+
+def test_a_valve_that_opens_away_from_the_reference_is_not_called_too_small() -> None:
+    class Opens:
+        def reset(self) -> None: ...
+
+        def update(self, time: float, reference: float, measurement: object) -> float:
+            return 1.0
+
+    told = simulate(load_scenario(TASK, ["reference.level=2 N m"]).controlled_by(Opens())).tracking
+    assert told is not None
+    assert "away from the reference for 100 % of it; turn the sign" in told.sentence
+
+
 @pytest.mark.parametrize(
     ("scenario", "column", "values"),
     [
@@ -147,10 +183,11 @@ def test_a_run_that_ends_on_its_ramp_is_not_judged_by_its_lag() -> None:
         ("torque-task-solenoid", "reference.level", [0.5, 4.0, 5.9, 7.0]),
         ("pressure-loop", "controller.proportional_gain", [1.0e-8, 1.0e-5]),
         ("cylinder-servo", "motion.external_torque", [0.2, 5.0, 14.0]),
+        ("sine", "controller.proportional_gain", [0.001, 0.01, 0.1, 4.5]),
     ],
 )
 def test_metered_runs_are_judged_as_their_recordings_are(scenario: str, column: str, values: list[float]) -> None:
-    base = load_scenario(scenario)
+    base = load_scenario(TASK, SMALL_SINE) if scenario == "sine" else load_scenario(scenario)
     columns = {column: np.array(values)}
     metered = run_ensemble(base, columns, with_companions([], base)).metrics
     alone = [simulate(with_numbers(base, {column: value})).tracking is None for value in values]

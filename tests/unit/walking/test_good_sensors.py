@@ -8,7 +8,8 @@ import pytest
 from ppafo.gait import load_gait
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
-from ppafo.walking.walk import compare_walks, walk, walk_population
+from ppafo.walking.population import walk_population
+from ppafo.walking.walk import compare_walks, walk
 
 MINUTES = 0.25
 SLOW = 0.99

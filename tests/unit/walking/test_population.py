@@ -7,23 +7,18 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.rows import leaf_paths
+from ppafo.engine.rows import leaf_paths, leaves, rebuilt
 from ppafo.engine.run import Run, batch_of, state_row_numbers
 from ppafo.gait import load_gait
 from ppafo.gait.gait import KNEE, GaitCurve
+from ppafo.model.gait import Series
 from ppafo.walking import load_walk, walk_population
-from ppafo.walking.gait_series import gait_timing
+from ppafo.walking.gait_series import SERIES, gait_timing
 from ppafo.walking.motion import walk_of, with_duration
-from ppafo.walking.person import SERIES, START_VARIATION, THRESHOLD_VARIATION, SeriesOfMany, draw_gaits
+from ppafo.walking.person import Person, draw_people
 from ppafo.walking.planning import batch_of_many, plan_walk
-from ppafo.walking.wearer import (
-    MASS_VARIATION,
-    STATURE_VARIATION,
-    draw_bounded_normal,
-    draw_builds,
-    paper_subject,
-    scaled,
-)
+from ppafo.walking.variation import MASS_VARIATION, STATURE_VARIATION, draw_builds, draw_gaits
+from ppafo.walking.wearer import paper_subject, scaled
 
 MINUTES = 0.15
 
@@ -41,10 +36,16 @@ def test_the_first_wearer_is_that_of_the_configuration(name: str) -> None:
         assert people.outcomes[work][0] * strides == pytest.approx(alone[rows[f"walk.{work}"]], rel=1e-9)
 
 
-def varied(curve: GaitCurve | None, series: SeriesOfMany, index: int) -> GaitCurve:
+def coefficients(series: Series) -> tuple[np.ndarray, np.ndarray]:
+    """Cosines and sines of many people, each (people, harmonics)."""
+    table = np.array(series.harmonics)
+    return table[:, 0].T, table[:, 1].T
+
+
+def varied(curve: GaitCurve | None, series: Series, index: int) -> GaitCurve:
     assert curve is not None
-    cosines, sines = (tuple(values[index].tolist()) for values in (series.cosines, series.sines))
-    return replace(curve, mean=float(series.mean[index]), cosines=cosines, sines=sines)
+    cosines, sines = (tuple(values[index].tolist()) for values in coefficients(series))
+    return replace(curve, mean=float(np.asarray(series.mean)[index]), cosines=cosines, sines=sines)
 
 
 def with_heel_of(run: Run, shared: Run, stature: float) -> Run:
@@ -61,34 +62,29 @@ def with_heel_of(run: Run, shared: Run, stature: float) -> Run:
 def test_any_wearer_walks_as_it_would_alone() -> None:
     configuration, index, count = load_walk("solenoid"), 3, 5
     people = walk_population(configuration, minutes=MINUTES, wearers=count, seed=3)
-    generator = np.random.default_rng(3)
-    build = draw_builds(count, generator)
-    gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
-    scale = 1.0 + THRESHOLD_VARIATION * draw_bounded_normal(generator, (count,))[index]
-    start = START_VARIATION * draw_bounded_normal(generator, (count,))[index]
+    drawn = draw_people(walk_of(configuration).gait, count, np.random.default_rng(3))
+    person = rebuilt(Person, [float(values[index]) for values in leaves(drawn)])
     settings = dict(configuration.controller.settings)
-    settings |= {name: settings[name] * scale for name in ("load_threshold", "unload_threshold")}
-    settings["push_off_start"] += start
-    segments = scaled(walk_of(configuration).wearer, build.mass, build.stature)
+    settings |= {name: settings[name] * person.thresholds for name in ("load_threshold", "unload_threshold")}
+    settings["push_off_start"] += person.start
+    segments = scaled(walk_of(configuration).wearer, person.mass, person.stature)
     gait = replace(
         walk_of(configuration).gait,
-        stride_time=float(gaits.stride_time[index]),
-        stance_share=float(gaits.timing["toe_off"][index]),
+        stride_time=person.stride_time,
+        stance_share=person.timing.toe_off,
         **{
-            name: varied(walk_of(configuration).gait.curve(name), gaits.series[field], index)
+            name: varied(walk_of(configuration).gait.curve(name), getattr(drawn.series, field), index)
             for field, name in SERIES.items()
         },
     )
-    timing = gait_timing(gait)
-    for name, values in gaits.timing.items():
-        assert float(values[index]) == pytest.approx(getattr(timing, name), rel=1e-9), name
-    wearer = replace(walk_of(configuration).wearer, **{name: float(values[index]) for name, values in segments.items()})
+    assert person.timing == pytest.approx(gait_timing(gait), rel=1e-9)
+    wearer = replace(walk_of(configuration).wearer, **segments)
     motion = replace(walk_of(configuration), wearer=wearer, gait=gait)
     alone = replace(configuration, motion=motion, controller=replace(configuration.controller, settings=settings))
     shared = plan_walk(with_duration(configuration, 60.0 * MINUTES))
-    run = with_heel_of(plan_walk(with_duration(alone, 60.0 * MINUTES)), shared, float(build.stature[index]))
+    run = with_heel_of(plan_walk(with_duration(alone, 60.0 * MINUTES)), shared, person.stature)
     many = with_duration(configuration, 60.0 * MINUTES)
-    begun = batch_of_many(many, build, gaits, np.random.default_rng(3)).states[:, index]
+    begun = batch_of_many(many, drawn).states[:, index]
     paths = [path for group, row in run.program.state_rows().items() for path in leaf_paths(row, group)]
     for path, value, own in zip(paths, begun.tolist(), batch_of(run).states[:, 0].tolist(), strict=True):
         assert value == pytest.approx(own, rel=1e-9, abs=1e-12), path
@@ -111,10 +107,10 @@ def test_the_same_seed_gives_the_same_wearers_and_another_one_others() -> None:
 
 
 def test_builds_vary_as_stated_and_keep_the_shares_of_segments() -> None:
-    build = draw_builds(20_000, np.random.default_rng(1))
-    assert build.mass.std() == pytest.approx(MASS_VARIATION, rel=0.04)
-    assert build.stature.std() == pytest.approx(STATURE_VARIATION, rel=0.04)
-    assert np.corrcoef(build.mass, build.stature)[0, 1] == pytest.approx(0.5, abs=0.03)
+    mass, stature = draw_builds(20_000, np.random.default_rng(1))
+    assert mass.std() == pytest.approx(MASS_VARIATION, rel=0.04)
+    assert stature.std() == pytest.approx(STATURE_VARIATION, rel=0.04)
+    assert np.corrcoef(mass, stature)[0, 1] == pytest.approx(0.5, abs=0.03)
     wearer = paper_subject()
     leg = scaled(wearer, np.array([1.0, 2.0]), np.array([1.0, 1.5]))
     assert leg["shank_length"].tolist() == pytest.approx([0.46, 0.69])
@@ -124,28 +120,30 @@ def test_builds_vary_as_stated_and_keep_the_shares_of_segments() -> None:
 
 def test_gaits_vary_by_the_deviation_of_each_curve() -> None:
     gait = load_gait()
-    gaits = draw_gaits(gait, np.ones(4000), np.random.default_rng(1))
+    drawn, _, stride_time = draw_gaits(gait, np.ones(4000), np.random.default_rng(1))
     phases = 2.0 * np.pi * np.outer(np.arange(1, 9), np.linspace(0.0, 1.0, 200, endpoint=False))
     for field, curve in (("shank", gait.shank_angle), ("ankle", gait.ankle_angle)):
-        series = gaits.series[field]
-        values = series.mean[:, None] + series.cosines @ np.cos(phases) + series.sines @ np.sin(phases)
+        series = getattr(drawn, field)
+        cosines, sines = coefficients(series)
+        values = series.mean[:, None] + cosines @ np.cos(phases) + sines @ np.sin(phases)
         spread = float(np.sqrt(np.mean((values - values.mean(axis=0)) ** 2)))
         assert spread == pytest.approx(curve.deviation, rel=0.06)
-    assert gaits.stride_time.std() == pytest.approx(gait.stride_time_deviation, rel=0.06)
+    assert stride_time.std() == pytest.approx(gait.stride_time_deviation, rel=0.06)
 
 
 def test_the_way_of_the_knee_is_as_long_as_people_are_tall() -> None:
     gait = load_gait()
     stature = np.linspace(1.0, 1.2, 50)
-    gaits = draw_gaits(gait, stature, np.random.default_rng(1))
+    drawn, _, stride_time = draw_gaits(gait, stature, np.random.default_rng(1))
     for name in KNEE:
-        curve, found = gait.curve(name), gaits.series[name]
-        ways = found.cosines[:, : curve.harmonics] * (gaits.stride_time**2)[:, None]
+        curve, (cosines, _) = gait.curve(name), coefficients(getattr(drawn, name))
+        ways = cosines[:, : curve.harmonics] * (stride_time**2)[:, None]
         assert curve.deviation == 0.0
         np.testing.assert_allclose(ways, np.outer(stature, curve.cosines) * gait.stride_time**2, rtol=1e-12)
     noisy = replace(gait, knee_up=replace(gait.curve("knee_up"), deviation=0.4), stride_time_deviation=0.0)
-    people = draw_gaits(noisy, np.ones(4000), np.random.default_rng(1)).series["knee_up"]
-    power = people.mean.var() + 0.5 * (people.cosines.var(axis=0) + people.sines.var(axis=0)).sum()
+    series = draw_gaits(noisy, np.ones(4000), np.random.default_rng(1))[0].knee_up
+    cosines, sines = coefficients(series)
+    power = np.var(series.mean) + 0.5 * (cosines.var(axis=0) + sines.var(axis=0)).sum()
     assert np.sqrt(power) == pytest.approx(0.4, rel=0.06)
 
 

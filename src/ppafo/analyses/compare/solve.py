@@ -13,7 +13,7 @@ from ppafo.running import tried
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
-from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
+from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, Uncertainty, uncertainty_of
 from ppafo.studies.limits import CONFIDENCE, check_fraction
@@ -97,7 +97,7 @@ def compared(
     for task, texts in overrides.items():
         for configuration in configurations:
             scenarios[task, configuration.name] = with_overrides(configuration.scenario, texts)
-    tell_coarse_pairs(scenarios.values())
+    warn_of_coarse_pairs(scenarios.values())
     # Those of the table that all scenarios can have: without a reference there is no error.
     metrics = [
         name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios.values())

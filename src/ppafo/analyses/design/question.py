@@ -77,7 +77,7 @@ def design(
     from ppafo.arguments.words import units_given
     from ppafo.errors import StudyError
     from ppafo.parameters.parts.catalogue import DEFAULT
-    from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
+    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 
     wished = {"mass": mass, "torque": torque, "pressure": pressure, "minutes": minutes}
     report = progress or report_nothing
@@ -97,5 +97,5 @@ def design(
     if named:
         raise StudyError(f"{', '.join(named)}: the design file states what is wanted; give one or the other")
     chosen = load_design(problem) if isinstance(problem, str | Path) else problem
-    tell_coarse_pairs([chosen.scenario])
+    warn_of_coarse_pairs([chosen.scenario])
     return profile.finding_of(size_for_profile(chosen, threads, report))

@@ -69,11 +69,11 @@ def find(
     from ppafo.analyses.find.solve import outermost
     from ppafo.loading import scenario_or_load
     from ppafo.parameters.parameter_set import units_of_texts
-    from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
+    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.studies.study import with_overrides
 
     base = with_overrides(scenario_or_load(scenario), overrides)
-    tell_coarse_pairs([base])
+    warn_of_coarse_pairs([base])
     # As in 'supply.pressure=2..6 bar_g' and 'final_error <= 30 N cm'.
     given = units_of_texts((vary.rpartition("..")[2], such_that.rpartition("=")[2]))
     with shown_in({**base.device.shown, **given}):

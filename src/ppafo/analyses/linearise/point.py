@@ -29,7 +29,7 @@ from ppafo.model.plant import ThermalParameters
 from ppafo.model.ports import friction_at_rest
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.profiles import profile_values
-from ppafo.simulation.sampled import run_sampled
+from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Scenario
 
 STEADY = 1.0e-9

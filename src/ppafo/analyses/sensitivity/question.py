@@ -63,7 +63,7 @@ def sensitivity(
     from ppafo.analyses.sensitivity.methods import METHODS
     from ppafo.analyses.sensitivity.solve import DEFAULT_SAMPLES, SensitivitySettings, analyse
     from ppafo.errors import StudyError
-    from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
+    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.studies.draws import drawn_in
     from ppafo.study.runs import RunCounter, Runs, with_companions
     from ppafo.wording import nearest_name
@@ -81,7 +81,7 @@ def sensitivity(
     count = DEFAULT_SAMPLES[by.name] if samples is None else samples
     settings = SensitivitySettings(count, chosen.sample.seed if seed is None else seed, confidence, maximum_failed)
     tally = RunCounter(count * by.block_rows(len(used.drawn)), progress)
-    tell_coarse_pairs([base.scenario])
+    warn_of_coarse_pairs([base.scenario])
     runs = Runs(base.scenario, with_companions(requested, base.scenario), tally, used.gauge, threads)
     with shown_in(chosen.shown_for(base.scenario)):
         return finding_of(analyse(runs, used, by, settings, f"{chosen.name}, {base.name}", base.scenario, requested))

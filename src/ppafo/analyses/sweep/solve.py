@@ -30,7 +30,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding
 from ppafo.signals.recording import CHANNELS
-from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
+from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 from ppafo.storage.files import temporary_folder
 from ppafo.storage.parquet import TableColumn, encode_texts, matrix_of, parquet_bytes, table_of
 from ppafo.studies.distributions import Floats
@@ -245,7 +245,7 @@ def sweep(
     check_can_be_swept(chosen)
     kept = temporary_folder("ppafo-study") if out is None else None
     folder = study_folder(kept.name if kept is not None else str(out))
-    tell_coarse_pairs(configuration.scenario for configuration in chosen.configurations)
+    warn_of_coarse_pairs(configuration.scenario for configuration in chosen.configurations)
     store = StudyStore.claim(chosen, folder, agreed, threads)
     _work(store, threads, progress)
     results = StudyResults(folder, read_manifest(folder), {}, kept)

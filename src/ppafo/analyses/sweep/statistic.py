@@ -19,7 +19,7 @@ from ppafo.errors import at_fault
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding
-from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
+from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 from ppafo.studies.distributions import floored_interval, noise_interval
 from ppafo.studies.draws import REPLICATES, Columns, Uncertainty, drawn_in
 from ppafo.studies.limits import atmosphere_of, check_metrics
@@ -100,7 +100,7 @@ def estimate(
     # A probability may be 0, of which a fraction says nothing: its width is a difference.
     asked = width or (PROBABILITY_WIDTH if what.threshold is not None else DEFAULT_WIDTH)
     rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
-    tell_coarse_pairs([base.scenario])
+    warn_of_coarse_pairs([base.scenario])
     runs = Runs(base.scenario, wanted, RunCounter(rule.first, progress), uncertainty.gauge, threads)
     with shown_in(chosen.shown_for(base.scenario)):
         first = chosen.sample.seed if seed is None else seed

@@ -59,7 +59,7 @@ def tune(
     from ppafo.analyses.tune.result import FRESH_DRAWS
     from ppafo.analyses.tune.solve import REFINEMENTS, crossed, judge, rows_of_gains, scales_of, search, setting_of
     from ppafo.errors import StudyError
-    from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
+    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.studies.distributions import Floats
     from ppafo.studies.sampling import NOISE_DRAWS
     from ppafo.study.runs import RunCounter, Runs, with_companions
@@ -72,7 +72,7 @@ def tune(
         # Noise alone follows the seed of the search; draws of a study keep the seed of the study.
         if problem.spread is not None and not problem.spread.study:
             problem = replace(problem, spread=replace(problem.spread, seed=seed))
-    tell_coarse_pairs([problem.scenario])
+    warn_of_coarse_pairs([problem.scenario])
     effort, spread = problem.effort, problem.spread
     candidates = effort.candidates_per_gain * len(problem.searched) * (effort.generations + 1) * effort.starts
     expected = candidates + REFINEMENTS * len(problem.searched) * effort.starts + 3

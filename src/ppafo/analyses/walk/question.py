@@ -51,9 +51,10 @@ def walk_with_and_without(
     from ppafo.analyses.walk.wearers import wearers_finding
     from ppafo.errors import ArgumentError
     from ppafo.simulation.scenario import Scenario
-    from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
+    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.walking.loading import check_duration_once, load_walk
-    from ppafo.walking.walk import compare_walks, walk_population
+    from ppafo.walking.population import walk_population
+    from ppafo.walking.walk import compare_walks
 
     if check and wearers is not None:
         raise ArgumentError("check: is for the walk of one wearer; leave out wearers, or check")
@@ -62,7 +63,7 @@ def walk_with_and_without(
     if not isinstance(chosen, Scenario):
         check_duration_once(overrides, minutes)
         chosen = load_walk(chosen, overrides, gait=gait, task_sequence=task_sequence, bottle=bottle)
-    tell_coarse_pairs([chosen])
+    warn_of_coarse_pairs([chosen])
     report = progress or report_nothing
     if wearers is not None:
         advance = _reporter(report, "wearers", 0.0)

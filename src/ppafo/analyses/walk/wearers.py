@@ -14,9 +14,15 @@ from ppafo.simulation.scenario import UNITS
 from ppafo.units.shown import in_units
 from ppafo.walking.figures.population import population_figure
 from ppafo.walking.motion import person_remarks
-from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
-from ppafo.walking.walk import OUTCOMES, SHOWN, TRAITS, Population, WearerQuantity
-from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
+from ppafo.walking.population import OUTCOMES, SHOWN, TRAITS, Population
+from ppafo.walking.variation import (
+    CORRELATION,
+    MASS_VARIATION,
+    MAXIMUM_DEVIATIONS,
+    START_VARIATION,
+    STATURE_VARIATION,
+    THRESHOLD_VARIATION,
+)
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Quantiles in the table, as fractions of the wearers."""
@@ -84,8 +90,7 @@ def wearers_finding(population: Population) -> Finding[Wearers]:
     if population.diverged:
         remarks.append(population.message)
     # One line for each wearer, in SI units.
-    columns = {f"{name} [{trait.unit}]": population.traits[name] for name, trait in TRAITS.items()}
-    columns |= {f"{name} [{outcome.unit}]": population.outcomes[name] for name, outcome in OUTCOMES.items()}
+    columns = {f"{name} [{unit}]": tables[name] for name, (unit, _) in {**TRAITS, **OUTCOMES}.items()}
     draw = partial(population_figure, population)
     figure = Section("The wearers", name="wearers", caption=_WEARERS_CAPTION, draw=draw, is_detail=True)
     return Finding(
@@ -106,16 +111,16 @@ def wearers_finding(population: Population) -> Finding[Wearers]:
     )
 
 
-def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, WearerQuantity]) -> dict[str, dict[str, object]]:
+def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, tuple[str, str]]) -> dict[str, dict[str, object]]:
     """Return the quantiles of every number in SI units, with unit and meaning."""
     return {
         name: {
-            "unit": number.unit,
-            "summary": number.summary,
+            "unit": unit,
+            "summary": summary,
             "mean": float(table[name].mean()) if table[name].size else None,
             "quantiles": dict(zip(map(str, QUANTILES), np.quantile(table[name], QUANTILES).tolist(), strict=True))
             if table[name].size
             else {},
         }
-        for name, number in numbers.items()
+        for name, (unit, summary) in numbers.items()
     }

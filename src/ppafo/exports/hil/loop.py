@@ -323,12 +323,12 @@ class Bench:
         self._answered_at = 0.0
         sent, late = 0.0, 0.0
         while self._is_going_on and not is_stopped():
-            if self.plant.taken:
-                late = self.pace.late(self.plant.taken * self.period)
+            if self.plant.sample:
+                late = self.pace.late(self.plant.sample * self.period)
                 sent = self.pace.now()
-                self.judge.sent = self.plant.taken
+                self.judge.sent = self.plant.sample
                 self.port.send(wire.sample_bytes(self._shown))
-            next_due = (self.plant.taken + 1) * self.period
+            next_due = (self.plant.sample + 1) * self.period
             # Nothing is to come where the port broke, or the plant is vented and the last sample had no answer.
             is_given_up = bool(self.port.failure or (self.judge.vented and self.judge.sent - self.judge.answered > 1))
             # In lock step nothing is waited for then, or each sample would take a second.
@@ -346,8 +346,8 @@ class Bench:
         if stopped:
             self.judge.vent(STOPPED)
             self._say_over()
-            until = min(self.plant.samples, self.plant.taken + math.ceil(AFTER_STOP / self.period))
-            while self.plant.taken < until:
+            until = min(self.plant.samples, self.plant.sample + math.ceil(AFTER_STOP / self.period))
+            while self.plant.sample < until:
                 self._go_on(VENT, None, None)
         self._say_over()
         vented = next((row.due for row in self.rows if row.is_vented), None)
@@ -367,7 +367,7 @@ class Bench:
 
     def _go_on(self, command: float, sent_late: float | None, answered_after: float | None) -> None:
         """Log the current sample, and advance the plant to the next one under a command [-]."""
-        sequence = self.plant.taken
+        sequence = self.plant.sample
         self.rows.append(
             LogRow(
                 sequence=sequence,
@@ -379,7 +379,7 @@ class Bench:
                 is_vented=bool(self.judge.vented),
             )
         )
-        self.plant.go_on(command)
+        self.plant.advance(command)
 
     def _take(self, data: bytes) -> bool:
         """Process received data; return True if the last sent sample has been answered."""
@@ -394,7 +394,7 @@ class Bench:
     @property
     def _is_going_on(self) -> bool:
         """False at the end of the run, and after the plant has diverged."""
-        return self.plant.taken < self.plant.samples and not self._has_diverged
+        return self.plant.sample < self.plant.samples and not self._has_diverged
 
     def _show(self, flags: int) -> None:
         """Store the current state of the plant as the sample to send."""
@@ -404,7 +404,7 @@ class Bench:
         if self._has_diverged:
             return
         shown = {
-            "reference": plant.requested,
+            "reference": plant.reference,
             "angle": seen.angle,
             "pressure_1": seen.pressure_1,
             "pressure_2": seen.pressure_2,
@@ -413,8 +413,8 @@ class Bench:
         self._shown = wire.WireSample(
             flags=flags | (wire.VENTED if self.judge.vented else 0) | wire.COMPUTED,
             run=self.judge.run,
-            sequence=plant.taken,
-            time=round(plant.taken * self.period * wire.MICROSECONDS) % wire.WRAP,
+            sequence=plant.sample,
+            time=round(plant.sample * self.period * wire.MICROSECONDS) % wire.WRAP,
             counts={name: wire.count_of(name, value) for name, value in shown.items()},
         )
 

@@ -17,7 +17,7 @@ from ppafo.metrics import METRICS, has_channels
 from ppafo.metrics.gas import WITH_ENERGY_BALANCE
 from ppafo.metrics.metric import MetricKind, Readings
 from ppafo.signals.recording import OF_SECOND_CHAMBER
-from ppafo.simulation.sampled import run_sampled
+from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Scenario
 
 _SAME = 1.0e-6

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.control.kind import ControllerKind
 from ppafo.metrics.switching import SHUT
@@ -39,10 +40,11 @@ class Case(NamedTuple):
         return self.law is not None and self.law.only_switches
 
     @property
-    def fully_open(self) -> float:
-        """Fraction of the settled part in which the valve is fully open [-]."""
+    def is_fully_open(self) -> NDArray[np.bool_]:
+        """True for each sample of the settled part with a fully open valve."""
         command = np.abs(self.recording["command"][self.settled.samples])
-        return float(np.mean((command >= _FULLY_OPEN) & (command <= 1.0 + SHUT)))
+        mask: NDArray[np.bool_] = (command >= _FULLY_OPEN) & (command <= 1.0 + SHUT)
+        return mask
 
 
 class TrackingCause(NamedTuple):

@@ -7,7 +7,7 @@ import numpy as np
 from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import followed
 from ppafo.metrics.switching import SHUT
-from ppafo.model.controlled import ANGLE, TORQUE
+from ppafo.model.controlled import ANGLE, TORQUE, error_functions
 from ppafo.simulation.law_signals import anywhere
 from ppafo.simulation.mean_chambers import quicker_at
 from ppafo.simulation.tracking.case import Case, TrackingCause
@@ -100,15 +100,15 @@ def oscillation(case: Case) -> TrackingCause | None:
 def _steps_of_pair(case: Case, law: ControllerKind, quicker: float) -> TrackingCause:
     """Cause: change by a pair of on/off valves during its dead time, as a multiple of the wanted change."""
     scenario = case.scenario
-    step, late = pair_step(scenario, law)
+    step, dead_time = pair_step(scenario, law)
     step *= quicker
     controlled = scenario.controlled if TORQUE in law.controls else TORQUE
-    share = step / case.settled.wanted
+    ratio = step / case.settled.wanted
     text = (
-        f"its valves change it by {change_text(controlled, step)} in the {1.0e3 * late:.3g} ms that they are late, "
-        f"{share:.2g} times what is wanted"
+        f"its valves change it by {change_text(controlled, step)} in their dead time of {1.0e3 * dead_time:.3g} ms, "
+        f"{ratio:.2g} times what is wanted"
     )
-    return TrackingCause(text, smaller_pair(scenario, share), "take faster or smaller valves")
+    return TrackingCause(text, smaller_pair(scenario, ratio), "take faster or smaller valves")
 
 
 def _static_friction(case: Case) -> TrackingCause | None:
@@ -143,10 +143,21 @@ def _static_friction(case: Case) -> TrackingCause | None:
 
 
 def _fully_open_valve(case: Case) -> TrackingCause | None:
-    """Cause: the valve is fully open for most of the settled part."""
-    if case.fully_open <= _MOSTLY:
+    """Cause: the valve is fully open for most of the settled part, towards the reference or away from it."""
+    scenario, samples = case.scenario, case.settled.samples
+    command = case.recording["command"][samples]
+    is_open = case.is_fully_open
+    if np.mean(is_open) <= _MOSTLY:
         return None
-    text = f"its valve is fully open for {100.0 * case.fully_open:.0f} % of the time: it is too small for this task"
+    reference, value = (series[samples] for series in followed(case.recording))
+    # Sign of the command that reduces a positive error.
+    upwards = error_functions(scenario.controlled, scenario.device.supply.is_vacuum).steered(1.0)
+    is_away = np.asarray(upwards * command * (reference - value) < 0.0)[is_open]
+    opened = f"its valve is fully open for {100.0 * np.mean(is_open):.0f} % of the time"
+    if np.mean(is_away) > _MOSTLY:
+        text = f"{opened}, away from the reference for {100.0 * np.mean(is_away):.0f} % of it"
+        return TrackingCause(text, (), "turn the sign of its command or of what it measures")
+    text = f"{opened}: it is too small for this task"
     return TrackingCause(text, sized_valves(case.scenario, (3.0, 10.0)), "take a larger valve or a slower reference")
 
 

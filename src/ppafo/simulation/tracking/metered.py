@@ -119,6 +119,7 @@ def _settled_task(scenario: Scenario, numbers: Mapping[str, Floats], least: floa
         rests=(share >= SHORTEST_HOLD) & is_held,
         worst=numbers["worst"],
         span=numbers["span"],
+        wave=numbers["wave"],
         way=np.maximum(asked, highest - lowest) if scenario.controlled == ANGLE else 0.0,
         ends_on_ramp=(share <= 0.0) & PROFILES[scenario.reference.kind].is_monotone,
     )

@@ -4,12 +4,12 @@ import logging
 from collections.abc import Iterable
 
 from ppafo.control.kind import ControllerKind
-from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
+from ppafo.model.controlled import ANGLE, CONTROLLED
+from ppafo.simulation.default_gains import DEAD_TIME, RATE
 from ppafo.simulation.gains import terms_of
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.torque_loop import DEAD_TIME, RATE
 from ppafo.simulation.tracking.remedies import change_text, smaller_pair
 from ppafo.simulation.tracking.rule import smallest_change, torque_limit
 from ppafo.units.shown import in_units
@@ -23,24 +23,15 @@ _LARGEST_STEP = 0.25
 def pair_step(scenario: Scenario, law: ControllerKind) -> tuple[float, float]:
     """Step R theta of a pair [SI unit of the controlled quantity], and its dead time theta [s]."""
     terms = terms_of(scenario, law)
-    rate, late = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
-    return rate * late, late
+    rate, dead_time = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
+    return rate * dead_time, dead_time
 
 
-def tell_coarse_pairs(scenarios: Iterable[Scenario]) -> None:
+def warn_of_coarse_pairs(scenarios: Iterable[Scenario]) -> None:
     """Log a warning for each scenario with a too coarse pair of valves, before the runs; equal warnings once."""
     for text in dict.fromkeys(map(coarse_pair, scenarios)):
         if text:
             logger.warning("ppafo: %s", text)
-
-
-def _wanted(scenario: Scenario) -> float:
-    """Largest wanted change of a torque or a pressure, in SI."""
-    kind, start = CONTROLLED[scenario.controlled], 0.0
-    if kind.name != TORQUE:
-        start = float(kind.value(0.0, scenario.initial.pressure_1, scenario.initial.pressure_2, 0.0))
-    extent = max(abs(float(bound) - start) for bound in profile_bounds(scenario.reference))
-    return max(extent, smallest_change(scenario))
 
 
 @in_units(lambda scenario: scenario.device.shown)
@@ -50,20 +41,31 @@ def coarse_pair(scenario: Scenario) -> str:
     In a walk the wanted change is the largest torque of its controller. Angle loops are not checked, because their step
     depends on the joint as much as on the pair.
     """
-    law, kind = scenario.law, CONTROLLED[scenario.controlled]
-    limit = 0.0 if scenario.follows_reference else torque_limit(scenario.controller.settings)
-    is_asked = scenario.follows_reference or limit > 0.0
-    if law is None or not is_asked or kind.name == ANGLE or "switching_interval" not in scenario.device.valve.settings:
+    law, controlled = scenario.law, CONTROLLED[scenario.controlled]
+    is_pair = "switching_interval" in scenario.device.valve.settings
+    if law is None or not is_pair or controlled.name == ANGLE:
         return ""
-    wanted = limit or _wanted(scenario)
-    step, late = pair_step(scenario, law)
-    share = step / wanted
-    if share <= _LARGEST_STEP:
+    wanted = _wanted_change(scenario)
+    if wanted == 0.0:
         return ""
-    changed, whole = change_text(kind.name, step), change_text(kind.name, wanted)
-    smaller = smaller_pair(scenario, share)[0].text
+    step, dead_time = pair_step(scenario, law)
+    ratio = step / wanted
+    if ratio <= _LARGEST_STEP:
+        return ""
+    step_text, wanted_text = change_text(controlled.name, step), change_text(controlled.name, wanted)
+    smaller = smaller_pair(scenario, ratio)[0].text
     return (
-        f"{scenario.name}: the pair of valves changes the {kind.words} by {changed} in the {1.0e3 * late:.3g} ms that "
-        f"it is late, {share:.2g} times the {whole} wanted: {smaller}, faster valves or larger chambers make that step "
-        "smaller"
+        f"{scenario.name}: the pair of valves changes the {controlled.words} by {step_text} in its dead time of "
+        f"{1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the {wanted_text} wanted: {smaller}, faster valves or larger "
+        "chambers make that step smaller"
     )
+
+
+def _wanted_change(scenario: Scenario) -> float:
+    """Largest change of torque or pressure that is wanted, in SI; 0 for a walk without a torque limit."""
+    if not scenario.follows_reference:
+        return torque_limit(scenario.controller.settings)
+    initial = scenario.initial
+    start = float(CONTROLLED[scenario.controlled].value(0.0, initial.pressure_1, initial.pressure_2, 0.0))
+    extent = max(abs(float(bound) - start) for bound in profile_bounds(scenario.reference))
+    return max(extent, smallest_change(scenario))

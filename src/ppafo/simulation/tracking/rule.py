@@ -36,8 +36,12 @@ LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE = math.radians(2.0), 0.05
 """Largest angle error for a moving reference [rad], or divided by the reference's range [-] if that allows more."""
 LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE = math.radians(1.0), 0.03
 """Largest range of the angle error for a reference at rest, in the same two ways: a swing of 1 deg is visible."""
-LARGEST_SHARE_WALK = 0.5
-"""RMS torque error of a walk divided by the RMS of the requested torque [-]."""
+LARGEST_SHARE_OF_WAVE = 0.5
+"""Standard deviation of the error divided by the standard deviation of a moving reference [-].
+
+A controller that only keeps the mean of a sine has 1.0, however small the sine is beside its mean; a constant delay on
+a slow ramp has 0. In a walk it is the RMS torque error divided by the RMS of the requested torque.
+"""
 LARGEST_PEAK = 1.5
 """Peak of the value divided by the wanted change [-]."""
 LARGEST_PEAK_WALK = 1.5
@@ -74,7 +78,7 @@ class SettledPart(NamedTuple):
     ``rests`` is true if reference and joint stand still; ``ends_on_ramp`` if the run ends before a monotone reference
     rests. ``start`` [s] is the start of the settled part, 0 for a walk. ``worst`` is the largest error and ``span`` the
     range of the error. ``way`` is the range of initial value and reference for an angle, 0 for other quantities.
-    ``reversals`` [1/s] is the rate of command reversals.
+    ``reversals`` [1/s] is the rate of command reversals; ``wave`` the standard deviation of the reference.
     """
 
     samples: slice | NDArray[np.bool_]
@@ -93,6 +97,7 @@ class SettledPart(NamedTuple):
     span: float = 0.0
     way: float = 0.0
     reversals: float = 0.0
+    wave: float = 0.0
 
     @property
     def share(self) -> float:
@@ -198,6 +203,7 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
         span=float(np.ptp(error)),
         way=max(asked, float(np.ptp(reference))) if is_angle else 0.0,
         reversals=command_reversals(recording, samples) / max(float(time[-1] - time[samples][0]), 1.0),
+        wave=float(np.std(reference[samples])),
     )
 
 
@@ -231,7 +237,7 @@ def excess_of_walk(settled: SettledPart, turning: Floats | float, limit: float) 
     limit, 0 for none. The numbers of ``settled`` may be arrays (runs,).
     """
     peak = settled.peak / (LARGEST_PEAK_WALK * limit) if limit > 0.0 else 0.0
-    return np.maximum(np.maximum(turning, peak), settled.share / LARGEST_SHARE_WALK)
+    return np.maximum(np.maximum(turning, peak), settled.share / LARGEST_SHARE_OF_WAVE)
 
 
 def failure_of_walk(settled: SettledPart, turning: float, limit: float) -> Failure | None:
@@ -256,9 +262,18 @@ class TaskExcess(NamedTuple):
     still: Floats
 
 
-def largest_share(rests: Any, only_switches: bool) -> Any:
-    """Largest share of the RMS error in the wanted change with which a task follows [-]; ``rests`` may be (runs,)."""
-    return LARGEST_SHARE_SWITCHED if only_switches else np.where(rests, LARGEST_SHARE, LARGEST_SHARE_MOVING)
+def largest_error(settled: SettledPart, only_switches: bool) -> Floats:
+    """Largest RMS error with which a task follows, in the unit of ``settled``, whose numbers may be arrays (runs,)."""
+    if only_switches:
+        return LARGEST_SHARE_SWITCHED * np.asarray(settled.wanted)
+    rests, wanted, wave = np.asarray(settled.rests), np.asarray(settled.wanted), np.asarray(settled.wave)
+    # A wave below what a reference at rest may be missed by is judged as rest.
+    is_wave = ~rests & (wave > LARGEST_SHARE * wanted)
+    allowed: Floats = np.where(rests, LARGEST_SHARE, LARGEST_SHARE_MOVING) * wanted
+    # An offset beside the wave is judged by the share alone.
+    of_wave = np.hypot(LARGEST_SHARE_OF_WAVE * wave, settled.missing)
+    limit: Floats = np.where(is_wave, np.minimum(allowed, of_wave), allowed)
+    return limit
 
 
 def excess_of_task(settled: SettledPart, only_switches: bool) -> TaskExcess:
@@ -271,7 +286,7 @@ def excess_of_task(settled: SettledPart, only_switches: bool) -> TaskExcess:
     # Degrees count for an angle, however far it goes.
     worst = settled.worst / np.maximum(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * way)
     span = np.where(way > 0.0, settled.span / np.maximum(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * way), 0.0)
-    off = share / largest_share(rests, only_switches)
+    off = np.asarray(settled.error) / largest_error(settled, only_switches)
     if only_switches:
         # It swings about its reference by design: its mean error is to be less.
         beside = np.abs(settled.missing) / (LARGEST_MEAN_SWITCHED * settled.wanted)

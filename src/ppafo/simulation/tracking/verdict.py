@@ -12,13 +12,13 @@ from ppafo.simulation.tracking.load_causes import torque_beyond_reach
 from ppafo.simulation.tracking.remedies import Remedy, change_text
 from ppafo.simulation.tracking.rule import (
     LARGEST_SHARE,
-    LARGEST_SHARE_WALK,
+    LARGEST_SHARE_OF_WAVE,
     REVERSALS,
     Failure,
     failure_of_task,
     failure_of_walk,
     is_noisy,
-    largest_share,
+    largest_error,
     most_reversals,
     settled_task,
     settled_walk,
@@ -162,8 +162,8 @@ def following_text(result: "RecordedResult") -> str:
     if settled.ends_on_ramp:
         return ""
     is_task = case.scenario.follows_reference
-    share = float(largest_share(settled.rests, case.only_switches)) if is_task else LARGEST_SHARE_WALK
-    error, allowed = (change_text(controlled.name, each) for each in (settled.error, share * settled.wanted))
+    largest = float(largest_error(settled, case.only_switches)) if is_task else LARGEST_SHARE_OF_WAVE * settled.wanted
+    error, allowed = (change_text(controlled.name, each) for each in (settled.error, largest))
     since = _time_text(settled.start)
     return f"the {controlled.words} follows its reference: RMS error {error}{since}, {allowed} allowed"
 

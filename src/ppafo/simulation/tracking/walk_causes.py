@@ -60,10 +60,11 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
 
 def _valve_of_walk(case: Case) -> TrackingCause | None:
     """Cause: the valve of a walk is often fully open, too small for the speed of the joint."""
-    if case.oscillates or case.only_switches or case.fully_open <= _OFTEN:
+    fully_open = float(np.mean(case.is_fully_open))
+    if case.oscillates or case.only_switches or fully_open <= _OFTEN:
         return None
     text = (
-        f"its valve is fully open for {100.0 * case.fully_open:.0f} % of the time: it is too small for how quickly the "
+        f"its valve is fully open for {100.0 * fully_open:.0f} % of the time: it is too small for how quickly the "
         "gait turns the joint"
     )
     return TrackingCause(text, sized_valves(case.scenario, (2.0, 4.0, 8.0)), "take a larger valve")

@@ -7,7 +7,7 @@ import numpy as np
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import BLACK, VERMILION
-from ppafo.walking.walk import SHOWN, Population
+from ppafo.walking.population import SHOWN, Population
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -19,10 +19,10 @@ from ppafo.control.torque_loop import PROPORTIONAL_GAIN
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part, rated_pressure
 from ppafo.signals.recording import Floats
+from ppafo.simulation.default_gains import loop_terms
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.law_signals import IN_SCENARIO
 from ppafo.simulation.numbers import number_at
-from ppafo.simulation.torque_loop import loop_terms
 from ppafo.simulation.tracking import REVERSALS
 from ppafo.studies.draws import seeds_of_noise
 from ppafo.studies.sampling import NOISE

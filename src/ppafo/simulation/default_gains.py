@@ -1,0 +1,175 @@
+"""Default controller gains of a device: rules of ``control.torque_loop`` and ``angle_loop`` for its loop and joint."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from ppafo.control import angle_loop, torque_loop
+from ppafo.control.angle_loop import Joint
+from ppafo.control.kind import ControllerKind
+from ppafo.control.torque_loop import TorqueLoop
+from ppafo.model.actuators.kind import Range
+from ppafo.model.binding import made_of
+from ppafo.model.catalog import VALVES
+from ppafo.model.controlled import ANGLE, TORQUE
+from ppafo.model.declaration import PlainFunction
+from ppafo.parameters.device import Device
+from ppafo.parameters.graph import LinkFunction
+from ppafo.simulation.mean_chambers import Surroundings
+from ppafo.simulation.motion_kind import LawSignals
+from ppafo.simulation.nominal import VALVE, in_its_form
+from ppafo.simulation.torque_loop import FlowNumbers, JointGainParts, LoopFunctions, loop_functions
+
+RATE, DEAD_TIME = "torque rate at full opening", "dead time of the torque loop"
+"""Names of the loop parameters from which gains are computed."""
+
+_OF_LOOP: dict[str, Callable[[TorqueLoop], float]] = {
+    torque_loop.PROPORTIONAL_GAIN: torque_loop.proportional_gain,
+    torque_loop.INTEGRAL_RATE: torque_loop.integral_rate,
+    torque_loop.BOUNDARY: torque_loop.boundary_layer,
+    torque_loop.CONVERGENCE: torque_loop.convergence_rate,
+    torque_loop.LEAD: torque_loop.lead,
+    RATE: torque_loop.torque_rate,
+    DEAD_TIME: torque_loop.dead_time,
+}
+"""Rule for each number that depends on the torque loop alone."""
+_OF_REACH: dict[str, Callable[[float], float]] = {
+    torque_loop.DEAD_ZONE: torque_loop.dead_zone,
+    torque_loop.RELEASE: torque_loop.release,
+    torque_loop.REACH: torque_loop.whole_reach,
+}
+"""Rule for each number that depends on the torque reach of a device."""
+_OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
+    angle_loop.ANGLE_STIFFNESS: angle_loop.angle_stiffness,
+    angle_loop.ANGLE_DAMPING: angle_loop.angle_damping,
+    angle_loop.RATE_FILTER: angle_loop.rate_filter,
+    angle_loop.INNER_GAIN: angle_loop.inner_gain,
+    angle_loop.GRAVITY: angle_loop.gravity,
+    angle_loop.INERTIA: angle_loop.inertia,
+    angle_loop.FRICTION: angle_loop.friction,
+    angle_loop.STATIC_FRICTION: angle_loop.static_friction,
+    angle_loop.LOAD_TIME: angle_loop.load_time,
+    angle_loop.TORQUE_LAG: angle_loop.torque_lag,
+    angle_loop.TOLERANCE: angle_loop.tolerance,
+    angle_loop.REST_DISTANCE: angle_loop.rest_distance,
+}
+"""Rule for each number that depends on torque loop and joint."""
+
+
+class GainParts(NamedTuple):
+    """Functions for a gain: torque loop or reach of a device, and rule of ``control.torque_loop``."""
+
+    number_of: Callable[..., Any]
+    rule: Callable[..., float]
+
+
+def gain_of_device(
+    settings: Any,
+    stops: Range,
+    around: Surroundings,
+    numbers: FlowNumbers,
+    valve: Any,
+    signals: Any,
+    *,
+    parts: GainParts,
+) -> float:
+    """Gain from ``parts.rule`` for the torque loop or the reach of a device."""
+    return parts.rule(parts.number_of(settings, stops, around, numbers, valve, signals))
+
+
+def gain_with_setting(
+    settings: Any,
+    stops: Range,
+    around: Surroundings,
+    numbers: FlowNumbers,
+    valve: Any,
+    signals: Any,
+    setting: float,
+    *,
+    parts: GainParts,
+) -> float:
+    """Gain from ``parts.rule`` for the torque loop of a device and another setting of the controller."""
+    return parts.rule(parts.number_of(settings, stops, around, numbers, valve, signals), setting)
+
+
+def opening_beyond_band(
+    settings: Any,
+    stops: Range,
+    around: Surroundings,
+    numbers: FlowNumbers,
+    valve: Any,
+    signals: Any,
+    setting: float,
+    *,
+    parts: GainParts,
+) -> float:
+    """Command [-] for the valve opening from ``parts.rule``, for a valve with a dead band."""
+    opening = parts.rule(parts.number_of(settings, stops, around, numbers, valve, signals), setting)
+    return float(valve.dead_band + (1.0 - valve.dead_band) * opening)
+
+
+def gain_of_joint(
+    settings: Any,
+    stops: Range,
+    around: Surroundings,
+    numbers: FlowNumbers,
+    valve: Any,
+    signals: Any,
+    travel: float,
+    *,
+    parts: JointGainParts,
+) -> float:
+    """Gain from ``parts.rule`` for the torque loop and the joint of a device, with ``travel`` [rad] per move."""
+    loop = parts.torque_loop_of(settings, stops, around, numbers, valve, signals)
+    return float(parts.rule(loop, parts.joint_of(settings, stops, around, signals, travel)))
+
+
+def loop_terms(
+    device: Device, law: ControllerKind, seen: LawSignals, controlled: str = TORQUE
+) -> dict[str, LinkFunction]:
+    """Return the functions for default gains, by the names of ``control.torque_loop`` and ``angle_loop``.
+
+    ``controlled`` is the controlled quantity, ``seen`` the signals of the controller.
+    """
+    controls_torque = TORQUE in law.controls
+
+    def of_loop(loops: LoopFunctions, rule: PlainFunction) -> GainParts:
+        # A law of the angle alone has the torque loop inside it.
+        return GainParts(loops.loop if controls_torque else loops.torque_loop, rule)
+
+    def of_reach(loops: LoopFunctions, rule: PlainFunction) -> GainParts:
+        return GainParts(loops.reach, rule)
+
+    def of_joint(loops: LoopFunctions, rule: PlainFunction) -> JointGainParts:
+        assert loops.joint is not None, "a law of the angle knows its joint"
+        return JointGainParts(loops.torque_loop, loops.joint, rule)
+
+    loops_in_forms = [loop_functions(device, seen, controlled, sonic) for sonic in (False, True)]
+
+    def term(gain: PlainFunction, parts_of: Callable[..., Any], rule: PlainFunction, *settings: str) -> LinkFunction:
+        of_area, of_sonic = (
+            LinkFunction(
+                (*loops.sources, *settings),
+                made_of(gain, f"{rule.__name__}_of_device", parts_of(loops, rule)),
+                loops.rows,
+            )
+            for loops in loops_in_forms
+        )
+        return in_its_form(device, VALVE, of_area, of_sonic)
+
+    terms = {name: term(gain_of_device, of_loop, rule) for name, rule in _OF_LOOP.items()}
+    if not controls_torque:
+        terms |= {
+            name: term(gain_of_joint, of_joint, rule, "controller.error_limit") for name, rule in _OF_JOINT.items()
+        }
+    # The reach in an angle is not known: the dead zone of a law of the angle is to be given.
+    if controlled != ANGLE:
+        terms |= {name: term(gain_of_device, of_reach, rule) for name, rule in _OF_REACH.items()}
+    has_dead_band = any(quantity.name == "dead_band" for quantity in VALVES[device.valve.kind].quantities)
+    opening = opening_beyond_band if has_dead_band else gain_with_setting
+    terms[torque_loop.OPENING] = term(opening, of_loop, torque_loop.dead_zone_opening, "controller.dead_zone")
+    # An integral, and what is learnt, go with the proportional gain, also where that one is given.
+    gain = next((quantity.name for quantity in law.quantities if torque_loop.PROPORTIONAL_GAIN in quantity.follows), "")
+    path = f"controller.{gain}"
+    terms[torque_loop.INTEGRAL_GAIN] = term(gain_with_setting, of_loop, torque_loop.integral_gain, path)
+    terms[torque_loop.LEARNING_GAIN] = LinkFunction((path,), torque_loop.learning_gain)
+    return terms

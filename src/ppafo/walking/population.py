@@ -1,0 +1,197 @@
+"""Walks of many randomly drawn wearers, and the distribution of their outcomes."""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ppafo.arguments import Count, Minutes, Seed, checked
+from ppafo.control.walking.fault_flags import FAULT_FLAGS
+from ppafo.engine.lane_rows import LANES
+from ppafo.engine.lanes import Batch, Floats, run_batch
+from ppafo.engine.rows import row_numbers
+from ppafo.engine.run import NEVER_FAILED
+from ppafo.errors import ScenarioError
+from ppafo.metrics.strides import PER_STRIDE
+from ppafo.model.helping import STOPPED
+from ppafo.simulation.scenario import Scenario
+from ppafo.walking.loading import load_walk
+from ppafo.walking.motion import walk_of, with_duration
+from ppafo.walking.person import crowd_of, draw_people
+from ppafo.walking.planning import plan_walks, task_sequence_of_walk, unrecorded
+from ppafo.walking.result import REMEDY
+from ppafo.walking.safety_events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
+from ppafo.walking.task_sequence import turns_walked
+from ppafo.walking.walk import Progress, lasting, silent
+
+MAXIMUM_WEARERS = 1_000_000
+"""Largest number of wearers of a population."""
+
+STEPS_AT_ONCE = 1.0e8
+"""Total number of steps of a group of wearers that is simulated at once, a few seconds of computing time."""
+
+SHOWN = {
+    "gas": ("Gas per stride", "gas mass", 3),
+    "positive_push_off_work": ("Positive work on the wearer in push-off", "energy", 2),
+    "net_push_off_work": ("Net work on the wearer in push-off", "energy", 2),
+    "toe_clearance": ("Lowest toe height in mid-swing, relative to healthy", "body length", 1),
+    "toe_landing": ("Strides that begin on the toes", "fraction", 0),
+    "body_mass": ("Body mass", "mass", 1),
+    "shank_length": ("Shank", "body length", 1),
+    "stride_time": ("Stride time", "time", 3),
+    "stance_share": ("Stance", "fraction", 1),
+}
+"""Title, kind of quantity and number of decimals of the quantities shown for every wearer."""
+
+
+OUTCOMES = {
+    name: (quantity.unit, f"{quantity.summary}, mean over all strides of a wearer")
+    for name, quantity in PER_STRIDE.items()
+}
+TRAITS = {
+    "body_mass": ("kg", "mass of the body"),
+    "shank_length": ("m", "knee to ankle"),
+    "stride_time": ("s", "from one heel strike to the next"),
+    "stance_share": ("-", "fraction of the stride until toe-off"),
+}
+"""Unit and meaning of each outcome and trait of a wearer."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Population:
+    """Wearers and the outcomes of their walks, each an array (wearers,) by name, in SI units.
+
+    - ``scenario``: walk of the first wearer
+    - ``minutes``: duration of each walk [min]
+    - ``seed``: random seed of the wearers
+    - ``traits``, ``outcomes``: traits of the wearers, and outcomes of their walks, without wearers whose simulation
+      diverged
+    - ``diverged``: number of wearers whose simulation diverged
+    - ``vented``: number of wearers whose controller stopped permanently
+    - ``paused``: number of other wearers with reduced assistance for a while
+    - ``fault_flags``: number of vented and paused wearers by their last fault flag, the most frequent first
+    """
+
+    scenario: Scenario
+    minutes: float
+    seed: int
+    traits: Mapping[str, Floats]
+    outcomes: Mapping[str, Floats]
+    diverged: int
+    vented: int
+    paused: int
+    fault_flags: Mapping[str, int]
+
+    @property
+    def count(self) -> int:
+        """Number of wearers whose walk was completed."""
+        return int(self.outcomes["gas"].size)
+
+    @property
+    def message(self) -> str:
+        """Description of the end of the walks."""
+        if not self.diverged:
+            return "completed"
+        return f"{self.diverged} of {self.diverged + self.count} wearers diverged and are left out; {REMEDY}"
+
+    def __repr__(self) -> str:
+        return f"Population of {self.count} wearers, {self.scenario.name}, {self.minutes:g} min: {self.message}"
+
+
+@checked
+def walk_population(
+    scenario: Scenario | str | Path,
+    *,
+    wearers: Count,
+    minutes: Minutes | None = None,
+    seed: Seed = 1,
+    progress: Progress = silent,
+) -> Population:
+    """Simulate the walks of many randomly drawn wearers; the first is the wearer of the configuration.
+
+    Arguments:
+        scenario: a walk, its name or its file
+        wearers: number of wearers
+        minutes: duration of each walk [min]; default: the length that the walk states
+        seed: random seed of the wearers
+        progress: called with the number of wearers that have walked and the number of all
+
+    Returns:
+        Population with one value of every outcome for each wearer [SI]
+
+    Raises:
+        ScenarioError: a walk or a number of wearers that cannot be used
+
+    >>> import ppafo
+    >>> population = ppafo.walk_population("solenoid", wearers=2, minutes=0.1)
+    >>> [f"{clearance:.3f} m" for clearance in population.outcomes["toe_clearance"]]
+    ['-0.035 m', '-0.033 m']
+    """
+    if not 1 <= wearers <= MAXIMUM_WEARERS:
+        raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")
+    configuration = scenario if isinstance(scenario, Scenario) else load_walk(scenario)
+    if walk_of(configuration).bottle is not None:
+        raise ScenarioError(
+            "several wearers walk at a constant supply pressure: omit the bottle, or the number of wearers"
+        )
+    if walk_of(configuration).person:
+        raise ScenarioError(
+            "several wearers are drawn at random around one: omit wearer.person, or the number of wearers"
+        )
+    motion = walk_of(configuration)
+    people = draw_people(motion.gait, wearers, np.random.default_rng(seed))
+    crowd = crowd_of(configuration, people)
+    planned = task_sequence_of_walk(crowd)
+    if minutes is None and planned is not None:
+        minutes = float(np.max(planned.duration)) / 60.0
+    seconds = lasting(configuration, minutes).run.duration
+    run, _ = plan_walks(with_duration(crowd, seconds))
+    batch = unrecorded(run, wearers)
+
+    # Groups small enough for an interrupt to be seen and for progress to be reported.
+    size = max(1, int(STEPS_AT_ONCE / batch.clock.step_count / LANES)) * LANES
+    groups = []
+    for start in range(0, wearers, size):
+        group = slice(start, start + size)
+        groups.append(
+            run_batch(Batch(batch.program, batch.clock, batch.parameters[:, group], batch.states[:, group])).states
+        )
+        progress(float(min(start + size, wearers)), float(wearers))
+    states = np.concatenate(groups, axis=1)
+    is_finished = np.isfinite(states).all(axis=0)
+    rows = {path: states[row] for path, row in row_numbers(batch.program.state_rows()).items()}
+    is_finished &= rows["result.failure_time"] >= NEVER_FAILED
+
+    # Outcomes are totals divided by the strides walked, parts of one included, or by the heel strikes.
+    walked = run.step * run.step_count
+    strides = walked * people.timing.frequency if planned is None else turns_walked(planned.timed, walked)
+    # Who never strikes must not divide by zero.
+    strikes = np.maximum(rows["walk.strides"], 1.0)
+    counts = {"toe_clearance": strikes, "toe_landing": strikes}
+    outcomes = {name: rows[quantity.total] / counts.get(name, strides) for name, quantity in PER_STRIDE.items()}
+    traits = {
+        "body_mass": motion.wearer.body_mass * np.asarray(people.mass),
+        "shank_length": motion.wearer.shank_length * np.asarray(people.stature),
+        "stride_time": np.asarray(people.stride_time),
+        "stance_share": np.asarray(people.timing.toe_off),
+    }
+
+    vented, paused, flags = 0, 0, Counter[str]()
+    if SAFE_ROW in rows:
+        is_stopped, is_reduced = rows[SAFE_ROW][is_finished] == STOPPED, rows[VENTINGS_ROW][is_finished] > 0.0
+        vented, paused = int(is_stopped.sum()), int((~is_stopped & is_reduced).sum())
+        last_flags = rows[f"{FINDING_ROW}.fault_flag"][is_finished][is_reduced]
+        flags.update(FAULT_FLAGS[flag].name for flag in last_flags.tolist())
+    return Population(
+        scenario=configuration,
+        minutes=seconds / 60.0,
+        seed=seed,
+        traits={name: values[is_finished] for name, values in traits.items()},
+        outcomes={name: values[is_finished] for name, values in outcomes.items()},
+        diverged=int((~is_finished).sum()),
+        vented=vented,
+        paused=paused,
+        fault_flags=dict(flags.most_common()),
+    )
