@@ -9,7 +9,8 @@ from functools import lru_cache
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
-from ppafo.engine.plain_python import PARSING, check_flow, check_grammar, parse_module, place, refusal
+from ppafo.engine.entries import PARSING
+from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
 from ppafo.errors import ProgramError
 
 Adaptation = Callable[[FunctionType, ast.FunctionDef], ast.FunctionDef]
