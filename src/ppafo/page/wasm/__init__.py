@@ -40,11 +40,12 @@ import importlib.util
 import json
 import re
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 from ppafo.engine.cache.texts import kept_bytes
 from ppafo.engine.package_key import COMPOSED, Key, package_key
@@ -60,6 +61,9 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.storage.files import temporary_folder
 from ppafo.translation.compiling import asked, complaint
 from ppafo.version import __version__
+
+if TYPE_CHECKING:
+    from ppafo.exports.c_library.program import ComposedLibrary
 
 LANES = 8
 """Number of runs computed together; with more, their numbers would not fit the registers used by current browsers."""
@@ -85,7 +89,8 @@ _WRITERS = ("exports", "gait", "page", "parameters", "simulation", "translation"
 """Package folders that contribute to the C text of a module, in addition to the folders of a program."""
 WRITTEN_BY = (*COMPOSED, *_WRITERS)
 SHIPPED_KEYS = "shipped.json"
-"""File with the program digest of each bundled scenario and walk, and the package files for which it is valid."""
+"""File with the program digest of each bundled scenario and walk, by its description and by the outline of its text,
+and the package files for which these are valid."""
 _OF_THE_COMPUTER = "ppafo.translation.native"
 """Module whose values depend on the compilers and processor of this computer and enter no C text."""
 
@@ -96,16 +101,17 @@ def program_of(library: Library, scenario: Scenario) -> bytes:
     C text and module are cached on disk.
     """
     key = package_key(scenario, WRITTEN_BY)
+    shipped = {} if key is None else _shipped_digests(key)
     if key is None:
-        digest = _known_digest(library)
-    elif not (digest := _shipped_digest(key)):
+        digest = _known_digest(library, shipped)
+    elif not (digest := shipped.get(short_digest(key.described), "")):
         words = "\n".join([__version__, *FLAGS, key.words])
-        digest = kept_bytes("module", words, lambda: _known_digest(library).encode()).decode()
+        digest = kept_bytes("module", words, lambda: _known_digest(library, shipped).encode()).decode()
     prebuilt = prebuilt_programs().get(digest)
     if prebuilt is not None:
         return _PROGRAMS.joinpath(prebuilt).read_bytes()
     check_can_build()
-    return kept_bytes("wasm", f"{digest} {compiler_version()}", lambda: build(source_of(library)))
+    return kept_bytes("wasm", f"{digest} {compiler_version()}", lambda: build(source_of(library, compose(library))))
 
 
 @cache
@@ -115,43 +121,61 @@ def _shipped_keys() -> dict[str, Any]:
     return keys
 
 
-def _shipped_digest(key: Key) -> str:
-    """Return the stored digest of a bundled scenario's C text; empty for others, and after any change of code."""
+def _shipped_digests(key: Key) -> Mapping[str, str]:
+    """Return the stored digests of C texts by scenario description and by outline; empty after any change of code."""
     shipped = _shipped_keys()
     is_as_shipped = key.files == shipped["files"] and all(
         shipped["values"].get(module) == value for module, value in key.values.items() if module != _OF_THE_COMPUTER
     )
-    return str(shipped["digests"].get(short_digest(key.described), "")) if is_as_shipped else ""
+    digests: Mapping[str, str] = shipped["digests"] if is_as_shipped else {}
+    return digests
 
 
 def short_digest(described: str) -> str:
-    """Return a short hash of a scenario description."""
+    """Return a short hash of a scenario description or of an outline."""
     return hashlib.sha256(described.encode()).hexdigest()[:16]
 
 
-def _known_digest(library: Library) -> str:
-    """Return the digest of a library's C text, which does not depend on the values of its settings."""
-    from ppafo.exports.c_library.program import outline_of  # most digests are kept
+def _known_digest(library: Library, shipped: Mapping[str, str]) -> str:
+    """Return the digest of a library's C text, which does not depend on the values of its settings.
 
+    ``shipped`` has digests by outline that are valid for the package as it is.
+    """
+    composed = compose(library)
+    outline = outline_of_unit(library, composed)
+    if digest := shipped.get(short_digest(outline)):
+        return digest
     # What decides the translation unit: what its functions are made from, and what translates them.
-    names = [setting.name for setting in library.settings]
-    outline = _unit(library, outline_of(library.program, names, library.further, LANES))
     translators = [*(files("ppafo.translation").iterdir()), *(files("ppafo.exports.c_library").iterdir()), __file__]
     contents = {Path(str(file)).name: Path(str(file)).read_bytes() for file in translators if Path(str(file)).is_file()}
     hashes = [f"{name} {hashlib.sha256(content).hexdigest()}" for name, content in sorted(contents.items())]
     return kept_bytes(
         "digest",
         "\n".join([__version__, *hashes, *FLAGS, template(__name__, "math.h"), outline]),
-        lambda: digest_of(source_of(library)).encode(),
+        lambda: digest_of(source_of(library, composed)).encode(),
     ).decode()
 
 
-def source_of(library: Library) -> str:
-    """Return the C translation unit of a library, which does not contain the values of settings."""
+def compose(library: Library) -> "ComposedLibrary":
+    """Return the functions of a library, composed from their Python sources."""
+    from ppafo.exports.c_library.program import composed_library  # most digests are kept
+
+    return composed_library(library.program, library.further, LANES)
+
+
+def outline_of_unit(library: Library, composed: "ComposedLibrary") -> str:
+    """Return the translation unit of a library with its functions still untranslated, which determines its C text."""
+    from ppafo.exports.c_library.program import outline_of
+
+    return _unit(library, outline_of(library.program, composed, [setting.name for setting in library.settings]))
+
+
+def source_of(library: Library, composed: "ComposedLibrary") -> str:
+    """Return the C translation unit of a composed library, which does not contain the values of settings."""
     from ppafo.exports.c_library.program import c_text
 
     names = [setting.name for setting in library.settings]
-    return _unit(library, c_text(library.program, _TITLE, names, library.further, LANES))
+    return _unit(library, c_text(library.program, composed, _TITLE, names))
 
 
 def _unit(library: Library, functions: str) -> str:
