@@ -15,8 +15,9 @@ from ppafo.analyses.sweep.statistic_kind import Statistic, mean_of, quantile_of
 from ppafo.analyses.sweep.stopping import StoppingRule
 from ppafo.errors import StudyError
 from ppafo.report.kind import ConfidenceInterval
-from ppafo.studies.distributions import Floats, NormalAround, noise_interval
+from ppafo.studies.distributions import Floats, NormalAround
 from ppafo.studies.draws import Uncertainty, uncertainty_of
+from ppafo.studies.intervals import noise_interval
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import NOISE, other_noise, with_noise
 from ppafo.studies.study import RandomValue

@@ -20,8 +20,8 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding
 from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
-from ppafo.studies.distributions import floored_interval, noise_interval
 from ppafo.studies.draws import REPLICATES, Columns, Uncertainty, drawn_in
+from ppafo.studies.intervals import floored_interval, noise_interval
 from ppafo.studies.limits import atmosphere_of, check_metrics
 from ppafo.studies.sampling import with_new_noise
 from ppafo.studies.study import Study

@@ -25,7 +25,8 @@ from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
 from ppafo.simulation.tracking.metered import shortfall
-from ppafo.studies.distributions import Floats, noise_interval
+from ppafo.studies.distributions import Floats
+from ppafo.studies.intervals import noise_interval
 from ppafo.studies.sampling import NOISE_DRAWS, with_new_noise
 from ppafo.studies.study import with_overrides
 from ppafo.study.runs import (

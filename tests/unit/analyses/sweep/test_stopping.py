@@ -11,8 +11,9 @@ from ppafo.analyses.sweep.statistic import draw_until, estimate
 from ppafo.analyses.sweep.statistic_kind import Statistic, mean_of, parse_statistic, probability_of, quantile_of
 from ppafo.analyses.sweep.stopping import StatisticEstimate, StoppingRule, stopping_rule
 from ppafo.errors import StudyError
-from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, UniformBetween, replicates_interval
+from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, UniformBetween
 from ppafo.studies.draws import REPLICATES, Uncertainty
+from ppafo.studies.intervals import replicates_interval
 from ppafo.studies.study import RandomValue
 from ppafo.study.runs import Runs
 
