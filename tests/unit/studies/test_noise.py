@@ -22,7 +22,7 @@ from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import NOISE, other_noise, with_noise
 from ppafo.studies.study import RandomValue
 from ppafo.study.blocks import drawn_values
-from ppafo.study.runs import Runs
+from tests.model_runs import model_runs
 
 NOISY = ["run.duration=0.3 s", "sensors.pressure_noise=5 kPa_d"]
 DOCUMENT: dict[str, Any] = {
@@ -142,7 +142,7 @@ def test_a_statistic_says_how_much_is_noise(statistic: Statistic) -> None:
         return {"rms_error": columns["x"] + 0.5 * noise}
 
     def share_in(uncertainty: Uncertainty) -> ConfidenceInterval | None:
-        runs = Runs.of_model(model, ["rms_error"])
+        runs = model_runs(model, ["rms_error"])
         return draw_until(runs, uncertainty, "rms_error", statistic, rule, 1).found.share_of_noise
 
     drawn = (RandomValue("x", NormalAround(0.0, 1.0)),)

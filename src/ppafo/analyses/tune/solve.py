@@ -34,6 +34,7 @@ from ppafo.study.runs import (
     RunCounter,
     Runs,
     oscillating,
+    scenario_runs,
     settled,
     tracking_violation,
     with_companions,
@@ -59,7 +60,9 @@ def solve_tuning(problem: Problem, threads: int | None, progress: Report | None)
     """Return the result of a tuning: search, and evaluation of the gains before and after."""
     spread = problem.spread
     metrics = with_companions(problem.metrics, problem.scenario)
-    runs = Runs(problem.scenario, metrics, RunCounter(_largest_runs(problem), progress), problem.gauge, threads)
+    runs = scenario_runs(
+        problem.scenario, metrics, RunCounter(_largest_runs(problem), progress), problem.gauge, threads
+    )
     draws = {} if spread is None else spread.uncertainty.random_columns(0, spread.draws, spread.seed)
     scales = _scales(problem, _metrics_of_gains(runs, problem, problem.before, draws))
 
