@@ -67,7 +67,7 @@ def bottle(
     from ppafo.analyses.endurance.solve import BETWEEN_RESTS, STRIDE_TIME, endurance_of_walk_gas, follow_bottle
     from ppafo.analyses.endurance.walk_gas import WALK_FILE, read_walk_gas, walk_gas
     from ppafo.arguments.door import argument_text
-    from ppafo.arguments.words import units_given
+    from ppafo.arguments.reading import units_given
     from ppafo.errors import ParameterError
     from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
     from ppafo.report.stored_figure import stated_units
