@@ -1,10 +1,12 @@
 """How a run ends and why, rests, and gas uses from recordings."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import ppafo
 from ppafo.analyses.endurance.answer import Endurance, Endurances
 from ppafo.analyses.endurance.gas_demand import demand_of_numbers, demand_of_recording
 from ppafo.analyses.endurance.question import bottle as endurance
