@@ -29,6 +29,21 @@ from ppafo.units import percentage
 from ppafo.units.shown import counted_from, in_units
 from ppafo.wording import count_of
 
+_FAR = 2.0
+"""Number of standard deviations above which a tolerance counts as contradicted."""
+_SHOWN = 0.05
+"""Smallest share of a variance that is shown."""
+_MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
+"""Range of the number of digits; more than the minimum only for narrow intervals."""
+_FAR_FROM_SET = 5.0
+"""Ratio to the previous value above which a wrong unit is suspected: 6.89 is psi read as kPa, 8.85 N m as lbf in."""
+_KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
+_CHANNELS = {
+    "angle": (Kind("Vane angle", "rad", "angle"), ACTUAL),
+    "pressure_1": (Kind("Pressure in chamber 1", "Pa_a", "pressure"), CHAMBER_1),
+    "pressure_2": (Kind("Pressure in chamber 2", "Pa_a", "pressure"), CHAMBER_2),
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Identification:
@@ -94,14 +109,6 @@ class Identification:
         }
 
 
-_KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
-_CHANNELS = {
-    "angle": (Kind("Vane angle", "rad", "angle"), ACTUAL),
-    "pressure_1": (Kind("Pressure in chamber 1", "Pa_a", "pressure"), CHAMBER_1),
-    "pressure_2": (Kind("Pressure in chamber 2", "Pa_a", "pressure"), CHAMBER_2),
-}
-
-
 def trajectory_panels(measurement: Recording, model: Recording) -> list[Panel]:
     """Return samples, model and residuals of one experiment over time, two panels for each fitted channel.
 
@@ -125,14 +132,6 @@ def trajectory_panels(measurement: Recording, model: Recording) -> list[Panel]:
         )
         panels += course_panels(course, "circles", "" if panels else "above")
     return panels
-
-
-_FAR = 2.0
-"""Number of standard deviations above which a tolerance counts as contradicted."""
-_SHOWN = 0.05
-"""Smallest share of a variance that is shown."""
-_MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
-"""Range of the number of digits; more than the minimum only for narrow intervals."""
 
 
 @in_units(lambda found: counted_from(found.before.shown, atmospheric_pressure(found.before)))
@@ -168,23 +167,14 @@ def finding_of(identification: Identification) -> Finding[Identification]:
         found=identification,
         passed=identification.is_good,
         kind=identification.kind,
-        files={f"{name}.toml": partial(_toml_bytes, new_set.parameter_set)},
+        files={f"{name}.toml": lambda: parameter_set_toml(new_set.parameter_set).encode()},
     )
-
-
-def _toml_bytes(parameter_set: ParameterSet) -> bytes:
-    """Return a parameter set as the content of a TOML file."""
-    return parameter_set_toml(parameter_set).encode()
 
 
 def _table(heading: str, estimates: Iterable[Estimate], before: ParameterSet, remarks: Sequence[str]) -> Section:
     """Return a table with a row for each estimate in the units of the previous set, with remarks below."""
     rows = (estimate_row(estimate, before) for estimate in estimates)
     return Section(heading, columns_of(("",) * 4, rows), remarks=tuple(remarks))
-
-
-_FAR_FROM_SET = 5.0
-"""Ratio to the previous value above which a wrong unit is suspected: 6.89 is psi read as kPa, 8.85 N m as lbf in."""
 
 
 def _far_from(before: ParameterSet, estimates: Iterable[Estimate]) -> Iterator[str]:

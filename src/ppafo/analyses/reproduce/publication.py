@@ -133,7 +133,7 @@ COMPUTATIONS: dict[str, _Computation] = {
 
 
 @dataclass(frozen=True, slots=True)
-class PublishedClaim:
+class _PublishedClaim:
     """Claim with a known computation; ``arguments`` in SI."""
 
     entry: ClaimEntry
@@ -149,7 +149,7 @@ class Publication:
     name: str
     title: str
     citation: str
-    claims: tuple[PublishedClaim, ...]
+    claims: tuple[_PublishedClaim, ...]
 
 
 def load_publication(name_or_path: str | Path) -> Publication:
@@ -162,13 +162,13 @@ def load_publication(name_or_path: str | Path) -> Publication:
     return Publication(document.name, document.title, document.citation, claims)
 
 
-def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
+def _checked(entry: ClaimEntry, citation: str, file: str) -> _PublishedClaim:
     where = f"{file}: claims.{entry.id}"
     source = f"{entry.source or citation}, {entry.where}"
     if bool(entry.computation) == bool(entry.not_testable):
         raise ScenarioError(f"{where}: give either computation or not_testable, which says why there is none")
     if entry.not_testable:
-        return PublishedClaim(entry, None, {}, source)
+        return _PublishedClaim(entry, None, {}, source)
     if entry.computation not in COMPUTATIONS:
         hint = nearest_name(entry.computation, COMPUTATIONS)
         known = ", ".join(COMPUTATIONS)
@@ -190,7 +190,7 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
     with refused_as(ScenarioError, f"{where}.unit", UnitError):
         # Only for what it raises: here the place in the file is known.
         from_si(1.0, entry.unit, computation.unit)
-    return PublishedClaim(entry, computation, _arguments(entry, computation, where), source)
+    return _PublishedClaim(entry, computation, _arguments(entry, computation, where), source)
 
 
 def _arguments(entry: ClaimEntry, computation: _Computation, where: str) -> dict[str, str | float]:
@@ -221,7 +221,7 @@ SEED, ALL = PAPER, "all"
 class JudgedClaim:
     """Claim of a publication with the verdict and our value in its unit; None if nothing is computed."""
 
-    claim: PublishedClaim
+    claim: _PublishedClaim
     value: float | None
     verdict: Verdict
 
@@ -302,7 +302,7 @@ def run_studies(study: str, report: Report) -> tuple[tuple[Publication, tuple[Ju
     return tuple(studies)
 
 
-def judge(claim: PublishedClaim) -> JudgedClaim:
+def judge(claim: _PublishedClaim) -> JudgedClaim:
     """Return a claim with our value and the verdict; SimulationError if a walk fails."""
     entry, computation = claim.entry, claim.computation
     if computation is None:

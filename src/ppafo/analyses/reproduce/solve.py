@@ -9,7 +9,7 @@ import numpy as np
 from ppafo.analyses.reproduce.answer import PROPORTIONAL, SOLENOID, STEP, Reproduction
 from ppafo.analyses.reproduce.bench import AssumedValue, assumed_values, synthetic_evidence
 from ppafo.analyses.reproduce.claim import Claim, Observation, Verdict, claim_on_text, observation, stated_claim
-from ppafo.analyses.reproduce.decision_phases import PhasedRuns, phased_runs
+from ppafo.analyses.reproduce.decision_phases import phased_runs
 from ppafo.analyses.reproduce.meaning_of_u import readings_of_u
 from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED_CLAIM, arithmetic_claims, load_reported
 from ppafo.analyses.reproduce.step_response import SupplyLevels, step_events, step_observations
@@ -35,22 +35,25 @@ FEWEST_REVERSALS = paper_entries()["solenoid_oscillates_on_ramp"].at_least or 0.
 """Smallest number of torque reversals on the ramp that counts as the oscillation of the text."""
 
 
-def torque_task_claims(runs: PhasedRuns, proportional: Result, rests_on: tuple[str, ...]) -> list[Claim]:
+def torque_task_claims(
+    pair_errors: Floats, pair_gas: Floats, proportional: Result, rests_on: tuple[str, ...]
+) -> list[Claim]:
     """Return the claims on tracking error and supplied gas, over all phases of the solenoid pair's decisions.
 
-    ``rests_on`` are the assumptions of the task beyond the paper.
+    ``pair_errors`` [N m] and ``pair_gas`` [g] are the result of ``phased_runs``, ``rests_on`` the assumptions of the
+    task beyond the paper.
     """
     error = proportional.metrics["rms_error"].value
     gas = GRAMS_PER_KILOGRAM * proportional.metrics["gas_supplied"].value
-    over = f"Median and range of {runs.errors.size} runs over the unknown phase of the decisions, either valve first."
+    over = f"Median and range of {pair_errors.size} runs over the unknown phase of the decisions, either valve first."
     # Where the pair makes no error, or takes no gas, there is nothing to save from.
     with np.errstate(divide="ignore", invalid="ignore"):
-        better, saved = 100.0 * (1.0 - error / runs.errors), 100.0 * (1.0 - gas / runs.gas)
+        better, saved = 100.0 * (1.0 - error / pair_errors), 100.0 * (1.0 - gas / pair_gas)
     claim = partial(_claim_over_phases, rests_on=rests_on)
     # No decimals of what varies by several percent over the phases.
     return [
         claim("torque_rms_improvement", better, 0, over),
-        claim("co2_solenoid", runs.gas, 1, over),
+        claim("co2_solenoid", pair_gas, 1, over),
         claim("co2_proportional", np.array([gas]), 2, "Decided every millisecond, so that no phase matters."),
         claim("co2_saving", saved, 0, f"{over} It follows from the two amounts: no evidence of its own."),
     ]
@@ -151,14 +154,14 @@ FASTER = ("controller.rate=100 Hz", "valve.switching_interval=10 ms")
 _RESTS_ON = ("the torque task as completed here",)
 
 
-def control_claims(solenoid: Result, proportional: Result, runs: PhasedRuns) -> list[Claim]:
+def control_claims(solenoid: Result, proportional: Result, pair_errors: Floats) -> list[Claim]:
     """Return the claims on switching rate, gains, dead zone and improved control, all of them undetermined here.
 
-    ``runs`` are the solenoid pair's runs over the unknown phase of its decisions.
+    ``pair_errors`` are the RMS errors [N m] of the solenoid pair over the unknown phase of its decisions.
     """
     beyond = paper_entries()["beyond_improved_control"]
     return [
-        _limited_by_switching(solenoid, runs),
+        _limited_by_switching(solenoid, pair_errors),
         _undetermined("gains_minimise_error", proportional, TUNED),
         _undetermined("dead_zone_amplifies_delay", solenoid, DEAD_ZONE),
         stated_claim(beyond.id, None, "undetermined", beyond.not_testable),
@@ -175,12 +178,12 @@ def _error_with(run: Result, overrides: tuple[str, ...]) -> float | str:
         return str(error)
 
 
-def _limited_by_switching(solenoid: Result, runs: PhasedRuns) -> Claim:
+def _limited_by_switching(solenoid: Result, pair_errors: Floats) -> Claim:
     """Return the claim on the error reduction of the same control law at five times the switching rate."""
     entry, faster = paper_entries()["limited_by_switching"], _error_with(solenoid, FASTER)
     if isinstance(faster, str):
         return stated_claim(entry.id, None, "undetermined", f"{entry.note} {faster}.")
-    less = 100.0 * (1.0 - faster / runs.errors)
+    less = 100.0 * (1.0 - faster / pair_errors)
     median, low, high = float(np.median(less)), float(less.min()), float(less.max())
     sentence = f"{median:.0f} % less error at 100 Hz" + (f" ({low:.0f} to {high:.0f})" if high > low else "")
     claim = stated_claim(entry.id, median, "undetermined", entry.note, _RESTS_ON, None, sentence)
@@ -249,7 +252,7 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     step_observed = tuple(step_observations(step.recording, levels, events))
     torque_observed = tuple(torque_task_observations(solenoid, proportional))
     report(Progress(f"simulating {SOLENOID} over the phase of its decisions"))
-    phased, of_tasks = phased_runs(solenoid), _used_by(assumed, SOLENOID, PROPORTIONAL)
+    (pair_errors, pair_gas), of_tasks = phased_runs(solenoid), _used_by(assumed, SOLENOID, PROPORTIONAL)
     claims = (
         *arithmetic_claims(reported),
         claim_on_text(
@@ -258,14 +261,14 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
             step_observed,
             _used_by(assumed, STEP),
         ),
-        *torque_task_claims(phased, proportional, of_tasks),
+        *torque_task_claims(pair_errors, pair_gas, proportional, of_tasks),
         claim_on_text(
             "oscillation_words",
             "Statements of the text on the oscillation with both valves.",
             torque_observed,
             of_tasks,
         ),
-        *control_claims(solenoid, proportional, phased),
+        *control_claims(solenoid, proportional, pair_errors),
         NOT_PUBLISHED_CLAIM,
     )
     return Reproduction(

@@ -234,8 +234,8 @@ def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floa
     each scramble, and twice the difference from the change with the nearer half of these runs, as the error of the
     parabola.
     """
-    own = np.unique(evaluated.blocks % SCRAMBLES, return_inverse=True)[1]
-    part = np.repeat(own, evaluated.values.size // evaluated.blocks.size)
+    part_of_block = np.unique(evaluated.blocks % SCRAMBLES, return_inverse=True)[1]
+    part = np.repeat(part_of_block, evaluated.values.size // evaluated.blocks.size)
     # About the mean, because the sums of the lines below cancel.
     values = evaluated.values - np.mean(evaluated.values)
     whole, half = (
@@ -247,9 +247,7 @@ def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floa
         )
         for nearest in (_NEAREST, 0.5 * _NEAREST)
     )
-    reach, of_bend = (
-        jackknife_reach(one[:, 1:].T, level) for one, level in ((whole, confidence), (whole - half, _ONE))
-    )
+    reach, of_bend = jackknife_reach(whole[:, 1:].T, confidence), jackknife_reach((whole - half)[:, 1:].T, _ONE)
     # Of the square of the difference, what is chance on average is no bend.
     bend = np.sqrt(np.maximum((whole - half)[:, 0] ** 2 - of_bend**2, 0.0))
     return whole[:, 0], reach + 2.0 * bend
@@ -263,18 +261,17 @@ def _levels(values: Floats, inputs: Floats, end: float, part: NDArray[np.intp], 
     count = int(part.max()) + 1
     if math.isnan(end):
         return np.full(count + 1, math.nan)
-    away = np.abs(inputs - end)
-    place = int(nearest * away.size)
-    near = away <= np.partition(away, place)[place]
-    along = (inputs[near] - end) / (np.max(away[near]) or 1.0)
-    powers = np.stack([along**power for power in range(5)])
+    distance = np.abs(inputs - end)
+    rank = int(nearest * distance.size)
+    near = distance <= np.partition(distance, rank)[rank]
+    scaled = (inputs[near] - end) / (np.max(distance[near]) or 1.0)
+    powers = np.stack([scaled**power for power in range(5)])
     moments = np.stack([np.bincount(part[near], power, count) for power in powers])
     mixed = np.stack([np.bincount(part[near], power * values[near], count) for power in powers[:3]])
-    moments, mixed = (
-        np.concatenate([whole, whole - sums], axis=1)
-        for sums in (moments, mixed)
-        for whole in (np.sum(sums, axis=1, keepdims=True),)
-    )
+    # All parts, and all but one in turn.
+    total, mixed_total = np.sum(moments, axis=1, keepdims=True), np.sum(mixed, axis=1, keepdims=True)
+    moments = np.concatenate([total, total - moments], axis=1)
+    mixed = np.concatenate([mixed_total, mixed_total - mixed], axis=1)
     # A value of one or two levels needs no parabola: the pseudo-inverse leaves at 0 what they do not tell.
     normal = np.stack([moments[row : row + 3] for row in range(3)]).transpose(2, 0, 1)
     solved = np.linalg.pinv(normal, rcond=1.0e-9, hermitian=True) @ mixed.T[:, :, None]

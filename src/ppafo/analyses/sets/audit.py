@@ -101,27 +101,28 @@ def audited(names: Sequence[str], parent: str | None, is_whole: bool, overrides:
 
 
 def _finding_of(sets: Sequence[AuditedSet], is_whole: bool) -> Finding[Any]:
-    first, is_one = sets[0], len(sets) == 1
-    if is_one:
+    first, is_single = sets[0], len(sets) == 1
+    if is_single:
         compares = first.parent is not None or bool(first.overrides)
         changed = changed_paths(first.parameter_set, first.parent) if compares and not is_whole else None
         parts = _parts(first, changed)
     else:
         verdicts = [
-            {finding.id: "accepted" if finding.accepted else finding.severity for finding in each} for each in sets
+            {finding.id: "accepted" if finding.accepted else finding.severity for finding in audited_set}
+            for audited_set in sets
         ]
-        head = ["finding", *(each.parameter_set.name for each in sets)]
+        head = ["finding", *(audited_set.parameter_set.name for audited_set in sets)]
         ids = dict.fromkeys(name for verdict in verdicts for name in verdict)
         rows = ([name, *(verdict.get(name) for verdict in verdicts)] for name in ids)
         parts = [Section(columns=columns_of(head, rows))]
     return Finding(
-        name=f"audit-{first.parameter_set.name}" if is_one else "audit",
+        name=f"audit-{first.parameter_set.name}" if is_single else "audit",
         kicker="Audit",
-        title=", ".join(each.parameter_set.name for each in sets),
+        title=", ".join(audited_set.parameter_set.name for audited_set in sets),
         said=(),
         parts=parts,
-        found=first if is_one else {"sets": [each.json_document() for each in sets]},
-        passed=not any(each.counts["error"] for each in sets),
+        found=first if is_single else {"sets": [audited_set.json_document() for audited_set in sets]},
+        passed=not any(audited_set.counts["error"] for audited_set in sets),
         kind="measured",
         command="sets audit",
     )
@@ -140,8 +141,8 @@ def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Sect
             for change in changes(audited_set.parameter_set, parent)
         ]
         count = count_of(len(rows), "value") if rows else "nothing"
-        said = f"{name} changes {count} of its parent {parent.name}"
-        parts.append(Section(said=[said], columns=columns_of(("value", parent.name, name, "origin"), rows), left=4))
+        sentence = f"{name} changes {count} of its parent {parent.name}"
+        parts.append(Section(said=[sentence], columns=columns_of(("value", parent.name, name, "origin"), rows), left=4))
     shown = [
         finding
         for finding in findings
@@ -151,10 +152,10 @@ def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Sect
         or any(value.path in changed for value in finding.values)
     ]
     summary = ", ".join(count_of(count, severity) for severity, count in audited_set.counts.items())
-    left = len(findings) - len(shown)
-    if left:
-        concern = "concerns" if left == 1 else "concern"
-        summary += f"; {left} of them {concern} no changed value: --all"
+    hidden = len(findings) - len(shown)
+    if hidden:
+        concern = "concerns" if hidden == 1 else "concern"
+        summary += f"; {hidden} of them {concern} no changed value: --all"
     return [*parts, *(Section(said=_lines(finding)) for finding in shown), Section(said=[f"{name}: {summary}"])]
 
 

@@ -59,12 +59,12 @@ def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]
         metric for metric in all_metrics if any(described[metric]["count"] for described in results.metrics.values())
     ]
     metrics = (with_values or all_metrics)[:MOST_METRICS]
-    # As many as colours that can be told apart.
+    # No more configurations than distinguishable colours.
     names = results.configurations[:MOST_CONFIGURATIONS]
-    # The size of a seed says nothing.
+    # The value of a seed has no meaning.
     varied = [path for path in results.varied if path != NOISE]
     grid = [number["path"] for number in study.get("vary", ()) if number["kind"] in _GRIDDED]
-    # Over two paths each metric of a configuration is a panel, a map of a grid or points; else one a metric.
+    # Over two paths each configuration has a panel of each metric, a map or points; else all share one panel.
     is_mapped = 2 in (len(grid), len(varied))
     title = f"{results.name}, {results.summary['completed']:,} runs"
     if not is_mapped and len(varied) > 1:

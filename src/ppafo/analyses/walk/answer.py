@@ -42,8 +42,6 @@ from ppafo.walking.safety_events import event_lines, failure_times
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import WalkComparison
 
-# What is said of a walk's safety: what is fitted, pressures far above the supply, less help over time.
-
 _OVER_TIME = (
     "Gas, toes and phases over the whole walk. The strip at the bottom shows where the controller helps, only lifts "
     "the foot, pauses or has stopped. A solid line is where there is less help, a dashed one where something fails."
@@ -93,7 +91,7 @@ def safety_remarks(worn: WalkResult) -> list[str]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WalkPair:
+class _WalkPair:
     """Result of a walk with the device and of the same walk without it, as printed and saved.
 
     ``tracking`` is the verdict on a torque that does not follow the controller's request, with the remedies tried; None
@@ -169,7 +167,7 @@ _LIMITS = (
 
 
 @in_units(lambda comparison: comparison.with_device.scenario.device.shown)
-def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
+def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
     """Return the report of a walk with and without the device.
 
     A walk that diverged has numbers but no figures, and the report has not passed.
@@ -208,7 +206,7 @@ def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
                 "What is assumed" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True
             ),
         ),
-        found=WalkPair(comparison, verdict),
+        found=_WalkPair(comparison, verdict),
         passed=comparison.is_completed and worn.is_helped,
         files={
             "recording.nc": partial(netcdf_bytes, worn.recording, None),
@@ -251,22 +249,21 @@ def _pictures(comparison: WalkComparison) -> Sequence[Section]:
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is not None:
         return task_sequence_pictures(comparison)
-    figures: list[tuple[str, str, str, Callable[[], Any]]] = []
+    figures: list[Section] = []
+
+    def add(heading: str, name: str, caption: str, draw: Callable[[], Any]) -> None:
+        figures.append(Section(heading, name=name, caption=caption, draw=draw, is_detail=True))
+
     # A figure of an even walk over time shows nothing that the mean stride does not.
     if worn.events or failure_times(worn.scenario):
-        figures.append(("The walk over time", "over-time", _OVER_TIME, partial(whole_walk_figure, worn)))
-    walks = {"with the device": worn, "without": bare}
-    of_mean_stride = (
-        ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
-        ("", "legs-moving", _MOVING, partial(animation, comparison)),
-        ("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn)),
-        ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
-    )
-    figures += of_mean_stride if worn.averages and bare.averages else ()
-    return [
-        Section(heading, name=name, caption=caption, draw=draw, is_detail=True)
-        for heading, name, caption, draw in figures
-    ]
+        add("The walk over time", "over-time", _OVER_TIME, partial(whole_walk_figure, worn))
+    if worn.averages and bare.averages:
+        walks = {"with the device": worn, "without": bare}
+        add("The leg", "legs", _LEGS, partial(frames_figure, comparison))
+        add("", "legs-moving", _MOVING, partial(animation, comparison))
+        add("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn))
+        add("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks))
+    return figures
 
 
 def comparison_table(comparison: WalkComparison) -> list[Column]:

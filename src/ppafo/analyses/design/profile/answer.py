@@ -362,7 +362,7 @@ def _tables(sizing: Sizing) -> tuple[finding.Section, finding.Section]:
     chosen = () if sizing.suggested is None else (sizing.suggested,)
     return (
         finding.Section("Valves", columns_of(_HEAD, rows), marked=chosen),
-        finding.Section("SizingMargins" if margins else "", columns_of(head, margins), marked=marked),
+        finding.Section("Margins" if margins else "", columns_of(head, margins), marked=marked),
     )
 
 
