@@ -6,12 +6,12 @@ from functools import partial
 
 import numpy as np
 
-from ppafo.analyses.reproduce.answer import PROPORTIONAL, SOLENOID, STEP, Reproduction
 from ppafo.analyses.reproduce.bench import AssumedValue, assumed_values, synthetic_evidence
 from ppafo.analyses.reproduce.claim import Claim, Observation, Verdict, claim_on_text, observation, stated_claim
 from ppafo.analyses.reproduce.decision_phases import phased_runs
 from ppafo.analyses.reproduce.meaning_of_u import readings_of_u
 from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED_CLAIM, arithmetic_claims, load_reported
+from ppafo.analyses.reproduce.result import PROPORTIONAL, SOLENOID, STEP, Reproduction
 from ppafo.analyses.reproduce.step_response import SupplyLevels, step_events, step_observations
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
