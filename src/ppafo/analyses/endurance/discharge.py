@@ -84,24 +84,24 @@ def ending(bottle: Bottle, draw: GasDemand, mass: float, content: BottleContent,
     otherwise.
     """
     usable = max(0.0, mass - smallest_mass_when_warm(bottle, draw))
-    left = f"{mass * GRAMS_PER_KILOGRAM:.3g} g are left"
+    remaining = f"{mass * GRAMS_PER_KILOGRAM:.3g} g are left"
     warm = f"{usable * GRAMS_PER_KILOGRAM:.3g} g of this would be usable at room temperature"
     if stopped_by == "time":
         return DischargeEnd(
-            TIME_IS_UP, f"the supply pressure was maintained for the whole requested time; {left}", mass, usable
+            TIME_IS_UP, f"the supply pressure was maintained for the whole requested time; {remaining}", mass, usable
         )
     if stopped_by == "frozen":
         cold = "the liquid begins to freeze (dry ice)" if has_liquid(bottle.fluid.table) else "the gas is too cold"
-        return DischargeEnd("frozen", f"{cold}, and the property table ends here; {left}, {warm}", mass, usable)
-    of_pressure, of_flow = reserves(bottle, draw, content.pressure, content.temperature)
+        return DischargeEnd("frozen", f"{cold}, and the property table ends here; {remaining}, {warm}", mass, usable)
+    pressure_margin, flow_margin = reserves(bottle, draw, content.pressure, content.temperature)
     # Both are fractions, so that the smaller one says what went short first.
-    is_pressure = of_pressure <= of_flow
+    is_pressure = pressure_margin <= flow_margin
     short = "maintain the supply pressure" if is_pressure else "drive the largest flow through the regulator"
     why = f"its pressure is too low to {short}"
     # What a warm bottle would still give decides between the two: cold is mended by waiting, empty is not.
     if usable > _NEXT_TO_NOTHING * bottle.mass:
-        return DischargeEnd("too cold", f"the bottle is too cold: {why}; {left}, {warm}", mass, usable)
-    return DischargeEnd("empty", f"the bottle is empty: {why}, and would be also when warm; {left}", mass, usable)
+        return DischargeEnd("too cold", f"the bottle is too cold: {why}; {remaining}, {warm}", mass, usable)
+    return DischargeEnd("empty", f"the bottle is empty: {why}, and would be also when warm; {remaining}", mass, usable)
 
 
 MAXIMUM_INTERVALS = 2000

@@ -189,8 +189,8 @@ def _panel(outcome: FindResult, kind: Kind) -> Panel:
     tried, condition = outcome.tried, outcome.condition
     values, metrics, judged = tried["value"], tried["metric"], tried["judged"]
     dots, dashes = {"linestyle": "", "marker": "o", "markersize": 3}, {"linestyle": "--", "linewidth": 1.0}
-    of_grid = tried[tried["is_of_grid"]]
-    marks = [Mark("line", values, metrics), Mark("line", of_grid["value"], of_grid["metric"], style=dots)]
+    grid_samples = tried[tried["is_of_grid"]]
+    marks = [Mark("line", values, metrics), Mark("line", grid_samples["value"], grid_samples["metric"], style=dots)]
     # The RMS error on the hold where that is larger, and what the condition is asked of.
     larger = np.where(judged > metrics, judged, np.nan)
     if np.isfinite(larger).any():
@@ -204,7 +204,7 @@ def _panel(outcome: FindResult, kind: Kind) -> Panel:
     ]
     index, _ = outcome.found
     if index is not None:
-        found = float(values[index])
-        text = f"found: {kind.number(found, '.4g')} {kind.axis_unit}".rstrip()
-        marks.append(Mark("at", found, label=text, colour=VERMILION))
+        value = float(values[index])
+        text = f"found: {kind.number(value, '.4g')} {kind.axis_unit}".rstrip()
+        marks.append(Mark("at", value, label=text, colour=VERMILION))
     return Panel(kind, of_metric(condition.metric), tuple(marks))

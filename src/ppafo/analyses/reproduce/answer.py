@@ -62,9 +62,9 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
             stated = f"{entry.statement} ({claim.claim.source})"
             agrees = _agrees(entry.at_least, entry.at_most, entry.unit)
             stated_claims.append((entry.id, stated, agrees, "; ".join(entry.assumed) or None, claim.note or None))
-        heading, said = f"{publication.name}: {publication.title}", (publication.citation,)
+        heading, sentences = f"{publication.name}: {publication.title}", (publication.citation,)
         columns = columns_of(_DETAILS_HEAD, stated_claims)
-        details.append(Section(heading, columns, said, left=len(_DETAILS_HEAD), is_detail=True))
+        details.append(Section(heading, columns, sentences, left=len(_DETAILS_HEAD), is_detail=True))
     name = solved.studies[0][0].name
     return Finding(
         name="claims",

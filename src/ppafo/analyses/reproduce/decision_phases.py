@@ -64,22 +64,23 @@ def _runs_with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[flo
     slope = ramp["level"] / ramp["ramp_time"]
     # A constant reference just off 0 calls one valve at once and holds it on.
     constant = with_reference(scenario, start_level=tie, level=tie)
-    held = simulate(replace(constant, run=replace(scenario.run, duration=period))).recording
+    start = simulate(replace(constant, run=replace(scenario.run, duration=period))).recording
     for number in range(1, PHASES + 1):
         phase = period * number / PHASES
         last = round(phase / _STEP)
         onward = with_reference(scenario, start_level=slope * phase, ramp_time=ramp["ramp_time"] - phase)
-        rest = simulate(
+        continued = simulate(
             replace(
                 onward,
                 run=replace(scenario.run, duration=duration - phase),
-                initial=Initial(float(held["pressure_1"][last]), float(held["pressure_2"][last])),
+                initial=Initial(float(start["pressure_1"][last]), float(start["pressure_2"][last])),
             )
         )
-        error_before = slope * held.time[: last + 1] - held["torque"][: last + 1]
+        error_before = slope * start.time[: last + 1] - start["torque"][: last + 1]
         # Mean squares of both parts, each with its time.
-        square = phase * float(np.mean(error_before**2)) + (duration - phase) * rest.metrics["rms_error"].value ** 2
-        gas = float(held["supplied_mass"][last]) + rest.metrics["gas_supplied"].value
+        error_after = continued.metrics["rms_error"].value
+        square = phase * float(np.mean(error_before**2)) + (duration - phase) * error_after**2
+        gas = float(start["supplied_mass"][last]) + continued.metrics["gas_supplied"].value
         yield float(np.sqrt(square / duration)), GRAMS_PER_KILOGRAM * gas
 
 

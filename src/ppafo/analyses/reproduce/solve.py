@@ -96,16 +96,16 @@ def torque_task_observations(solenoid: Result, proportional: Result) -> list[Obs
     ]
 
 
-def _reversals(result: Result, part: str) -> int | None:
+def _reversals(result: Result, phase: str) -> int | None:
     """Return the number of torque reversals on the ramp or the hold; None if the reference has no such part."""
-    metric = result.metrics.get(f"oscillations_{part}")
+    metric = result.metrics.get(f"oscillations_{phase}")
     return None if metric is None else round(metric.value)
 
 
-def _reversals_text(reversals: int | None, part: str) -> str:
+def _reversals_text(reversals: int | None, phase: str) -> str:
     if reversals is None:
-        return f"this reference has no {part}"
-    return f"{count_of(reversals, 'torque reversal')} on the {part}"
+        return f"this reference has no {phase}"
+    return f"{count_of(reversals, 'torque reversal')} on the {phase}"
 
 
 def _tracks_better_on_ramp(solenoid: Result, proportional: Result) -> Observation:
@@ -171,9 +171,9 @@ def control_claims(solenoid: Result, proportional: Result, pair_errors: Floats) 
 def _error_with(run: Result, overrides: tuple[str, ...]) -> float | str:
     """Return the RMS torque error [N m] of a run's task with overrides, or the error message if the run fails."""
     # Another law takes nothing that was set for this one.
-    kept = [override for override in run.scenario.origin.overrides if not override.startswith("controller.")]
+    remaining = [override for override in run.scenario.origin.overrides if not override.startswith("controller.")]
     try:
-        return simulate(load_scenario(run.scenario.name, [*kept, *overrides])).metrics["rms_error"].value
+        return simulate(load_scenario(run.scenario.name, [*remaining, *overrides])).metrics["rms_error"].value
     except (ParameterError, ScenarioError, SimulationError) as error:
         return str(error)
 
@@ -192,12 +192,13 @@ def _limited_by_switching(solenoid: Result, pair_errors: Floats) -> Claim:
 
 def _undetermined(identifier: str, run: Result, overrides: tuple[str, ...]) -> Claim:
     """Return a claim that depends on unreported settings, with the error of the task under other settings."""
-    entry, error, other = paper_entries()[identifier], run.metrics["rms_error"].value, _error_with(run, overrides)
-    if isinstance(other, str):
-        return stated_claim(identifier, None, "undetermined", f"{entry.note} {other}.")
-    change = 100.0 * (other / error - 1.0)
+    entry, error = paper_entries()[identifier], run.metrics["rms_error"].value
+    changed_error = _error_with(run, overrides)
+    if isinstance(changed_error, str):
+        return stated_claim(identifier, None, "undetermined", f"{entry.note} {changed_error}.")
+    change = 100.0 * (changed_error / error - 1.0)
     sentence = f"{abs(change):.0f} % {'more' if change > 0.0 else 'less'} error"
-    note = f"{entry.note} In this task {other:.3f} instead of {error:.3f} N m."
+    note = f"{entry.note} In this task {changed_error:.3f} instead of {error:.3f} N m."
     return stated_claim(identifier, change, "undetermined", note, _RESTS_ON, None, sentence)
 
 
@@ -252,7 +253,7 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     step_observed = tuple(step_observations(step.recording, levels, events))
     torque_observed = tuple(torque_task_observations(solenoid, proportional))
     report(Progress(f"simulating {SOLENOID} over the phase of its decisions"))
-    (pair_errors, pair_gas), of_tasks = phased_runs(solenoid), _used_by(assumed, SOLENOID, PROPORTIONAL)
+    (pair_errors, pair_gas), task_assumptions = phased_runs(solenoid), _used_by(assumed, SOLENOID, PROPORTIONAL)
     claims = (
         *arithmetic_claims(reported),
         claim_on_text(
@@ -261,12 +262,12 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
             step_observed,
             _used_by(assumed, STEP),
         ),
-        *torque_task_claims(pair_errors, pair_gas, proportional, of_tasks),
+        *torque_task_claims(pair_errors, pair_gas, proportional, task_assumptions),
         claim_on_text(
             "oscillation_words",
             "Statements of the text on the oscillation with both valves.",
             torque_observed,
-            of_tasks,
+            task_assumptions,
         ),
         *control_claims(solenoid, proportional, pair_errors),
         NOT_PUBLISHED_CLAIM,

@@ -86,14 +86,14 @@ def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
         raise StudyError(f"samples = {blocks}: Sobol indices need a power of 2, such as {1 << blocks.bit_length()}")
     from scipy.stats import qmc
 
-    dimensions, each = len(uncertainty.drawn), blocks // SCRAMBLES
-    design = np.empty((each, SCRAMBLES, dimensions + 2, dimensions))
+    dimensions, points_of_scramble = len(uncertainty.drawn), blocks // SCRAMBLES
+    design = np.empty((points_of_scramble, SCRAMBLES, dimensions + 2, dimensions))
     exchanged = np.arange(dimensions)
     for number in range(SCRAMBLES):
-        own = replicate_seed(seed, number) % 2**32
+        scramble_seed = replicate_seed(seed, number) % 2**32
         # Saltelli (2002): a point A, its copies in which value i comes from B, and B. `seed`, not `rng`: the points of
         # earlier studies.
-        points = qmc.Sobol(2 * dimensions, scramble=True, seed=own).random(each)
+        points = qmc.Sobol(2 * dimensions, scramble=True, seed=scramble_seed).random(points_of_scramble)
         design[:, number] = points[:, None, :dimensions]
         design[:, number, -1] = points[:, dimensions:]
         design[:, number, 1 + exchanged, exchanged] = points[:, dimensions:]
@@ -106,7 +106,7 @@ def _sobol_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
     table = evaluated.values.reshape(evaluated.blocks.size, -1)
     scramble = evaluated.blocks % SCRAMBLES
     parts = [scramble != number for number in np.unique(scramble)]
-    left_out = np.array([_sobol_total_and_first(table[rest]) for rest in parts])
+    left_out = np.array([_sobol_total_and_first(table[members]) for members in parts])
     reach = jackknife_reach(left_out, confidence)
     total, first = _sobol_total_and_first(table)
     return Indices({"total": total, "first": first}, {"total": reach[0], "first": reach[1]})
@@ -183,16 +183,16 @@ def _shapley_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
 
     blocks, count = evaluated.blocks.size, evaluated.fractions.shape[1]
     table = evaluated.values.reshape(blocks, count - 1, _INNER)
-    whole = np.mean((table - np.mean(table)) ** 2, axis=(1, 2))
-    left = np.var(table, axis=2, ddof=1)
-    ends = np.zeros((blocks, 1)), whole[:, None]
-    gains = np.diff(np.concatenate([ends[0], left, ends[1]], axis=1), axis=1)
+    variances = np.mean((table - np.mean(table)) ** 2, axis=(1, 2))
+    conditional = np.var(table, axis=2, ddof=1)
+    ends = np.zeros((blocks, 1)), variances[:, None]
+    gains = np.diff(np.concatenate([ends[0], conditional, ends[1]], axis=1), axis=1)
     orders = _orders(count, int(evaluated.blocks.max()) + 1, evaluated.seed)[evaluated.blocks]
     effects = np.take_along_axis(gains, np.argsort(orders, axis=1), axis=1)
-    variance = float(np.mean(whole))
+    variance = float(np.mean(variances))
     fractions = np.mean(effects, axis=0) / variance
-    away = (effects - fractions * whole[:, None]) / variance
-    reach = float(stdtrit(blocks - 1, 0.5 + 0.5 * confidence)) * np.std(away, axis=0, ddof=1) / math.sqrt(blocks)
+    deviations = (effects - fractions * variances[:, None]) / variance
+    reach = float(stdtrit(blocks - 1, 0.5 + 0.5 * confidence)) * np.std(deviations, axis=0, ddof=1) / math.sqrt(blocks)
     return Indices({"shapley": fractions}, {"shapley": reach})
 
 
@@ -238,7 +238,7 @@ def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floa
     part = np.repeat(part_of_block, evaluated.values.size // evaluated.blocks.size)
     # About the mean, because the sums of the lines below cancel.
     values = evaluated.values - np.mean(evaluated.values)
-    whole, half = (
+    whole, nearer = (
         np.array(
             [
                 np.subtract(*(_levels(values, inputs, end, part, nearest) for end in ends[::-1]))
@@ -247,10 +247,10 @@ def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floa
         )
         for nearest in (_NEAREST, 0.5 * _NEAREST)
     )
-    reach, of_bend = jackknife_reach(whole[:, 1:].T, confidence), jackknife_reach((whole - half)[:, 1:].T, _ONE)
+    spread, bend_spread = jackknife_reach(whole[:, 1:].T, confidence), jackknife_reach((whole - nearer)[:, 1:].T, _ONE)
     # Of the square of the difference, what is chance on average is no bend.
-    bend = np.sqrt(np.maximum((whole - half)[:, 0] ** 2 - of_bend**2, 0.0))
-    return whole[:, 0], reach + 2.0 * bend
+    bend = np.sqrt(np.maximum((whole - nearer)[:, 0] ** 2 - bend_spread**2, 0.0))
+    return whole[:, 0], spread + 2.0 * bend
 
 
 def _levels(values: Floats, inputs: Floats, end: float, part: NDArray[np.intp], nearest: float) -> Floats:

@@ -81,8 +81,8 @@ def audit(
     loaded = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
     # An argument, or the key of the set.
     with at_fault("parent"):
-        of_parent = set_or_load(loaded.parent or None if parent is None else parent)
-    return _finding_of([AuditedSet(loaded, of_parent, tuple(findings_of(loaded, of_parent)))], True)
+        parent_set = set_or_load(loaded.parent or None if parent is None else parent)
+    return _finding_of([AuditedSet(loaded, parent_set, tuple(findings_of(loaded, parent_set)))], True)
 
 
 def audited(names: Sequence[str], parent: str | None, is_whole: bool, overrides: Sequence[str]) -> Finding[Any]:
@@ -95,8 +95,8 @@ def audited(names: Sequence[str], parent: str | None, is_whole: bool, overrides:
     for name in names:
         loaded = apply_overrides(load_parameter_set(name), overrides)
         with refused_as(ParameterError, "--parent" if parent else f"{loaded.file}: parent", ParameterError):
-            of_parent = set_or_load(parent or loaded.parent or None)
-        sets.append(AuditedSet(loaded, of_parent, tuple(findings_of(loaded, of_parent)), tuple(overrides)))
+            parent_set = set_or_load(parent or loaded.parent or None)
+        sets.append(AuditedSet(loaded, parent_set, tuple(findings_of(loaded, parent_set)), tuple(overrides)))
     return _finding_of(sets, is_whole)
 
 
@@ -143,7 +143,7 @@ def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Sect
         count = count_of(len(rows), "value") if rows else "nothing"
         sentence = f"{name} changes {count} of its parent {parent.name}"
         parts.append(Section(said=[sentence], columns=columns_of(("value", parent.name, name, "origin"), rows), left=4))
-    shown = [
+    listed = [
         finding
         for finding in findings
         if changed is None
@@ -152,11 +152,11 @@ def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Sect
         or any(value.path in changed for value in finding.values)
     ]
     summary = ", ".join(count_of(count, severity) for severity, count in audited_set.counts.items())
-    hidden = len(findings) - len(shown)
+    hidden = len(findings) - len(listed)
     if hidden:
         concern = "concerns" if hidden == 1 else "concern"
         summary += f"; {hidden} of them {concern} no changed value: --all"
-    return [*parts, *(Section(said=_lines(finding)) for finding in shown), Section(said=[f"{name}: {summary}"])]
+    return [*parts, *(Section(said=_lines(finding)) for finding in listed), Section(said=[f"{name}: {summary}"])]
 
 
 def _lines(finding: AuditFinding) -> list[str]:

@@ -243,12 +243,12 @@ def _band(results: StudyResults, channel: str, names: Sequence[str]) -> Panel:
     pairs = [(low, high) for low, high in zip(fractions, reversed(fractions), strict=True) if low < high]
     marks = []
     for name, colour in zip(names, COLOURS, strict=False):
-        own = (table["configuration"] == name) & (table["channel"] == channel)
+        rows = (table["configuration"] == name) & (table["channel"] == channel)
         for pair, opacity in zip(pairs, _OPACITIES, strict=False):
-            ends = np.stack([table[f"q{fraction:g}"][own] for fraction in pair])
-            marks.append(Mark("band", table["time"][own], ends, colour=colour, style={"alpha": opacity}))
+            ends = np.stack([table[f"q{fraction:g}"][rows] for fraction in pair])
+            marks.append(Mark("band", table["time"][rows], ends, colour=colour, style={"alpha": opacity}))
         if _MEDIAN in fractions:
-            marks.append(Mark("line", table["time"][own], table["q0.5"][own], label=name, colour=colour))
+            marks.append(Mark("line", table["time"][rows], table["q0.5"][rows], label=name, colour=colour))
     kind = of_channel(channel, CHANNELS[channel].unit)
     percentages = ", ".join(f"{100.0 * fraction:g}" for fraction in fractions)
     title = f"{percentages} % of runs below"

@@ -152,9 +152,9 @@ def _band(
     """
     column, at_once = trace_column(channel), max(1, MAXIMUM_IN_MEMORY // study.runs_of_configuration)
     counts, levels = [], []
-    for first in range(0, samples, at_once):
+    for start in range(0, samples, at_once):
         parts = results.chunks([column], configuration)
-        values = np.concatenate([matrix_of(part.column(column))[:, first : first + at_once] for part in parts])
+        values = np.concatenate([matrix_of(part.column(column))[:, start : start + at_once] for part in parts])
         counts.append(np.count_nonzero(np.isfinite(values), axis=0))
         levels.append(sorted_quantiles(np.sort(values, axis=0), counts[-1], study.outputs.quantiles))
     return np.concatenate(counts), np.concatenate(levels, axis=1)

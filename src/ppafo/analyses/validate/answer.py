@@ -70,12 +70,12 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement) ->
     assert measurement is not None, "a channel that is compared was measured"
     is_short, is_chamber = measured.duration < _SHORT, name in (PRESSURE_1, PRESSURE_2)
     time, scale = (Kind("Time", "ms"), MILLISECONDS) if is_short else (TIME, 1.0)
-    shown, limit = COMPARED[name], channel.limit * channel.full_range
+    quantity, limit = COMPARED[name], channel.limit * channel.full_range
     is_first = channel is agreement.channels[0]
-    course = FittedCurve(
+    curve = FittedCurve(
         time=time,
-        level=Kind(shown.title, "", "pressure" if is_chamber else shown.quantity),
-        change=Kind(f"Measured - model, RMS {100 * channel.fraction:.2g} %", "", shown.quantity),
+        level=Kind(quantity.title, "", "pressure" if is_chamber else quantity.quantity),
+        change=Kind(f"Measured - model, RMS {100 * channel.fraction:.2g} %", "", quantity.quantity),
         times=scale * measured.time,
         samples=measurement,
         # The measurement is late by the delay, so the model is read that much earlier.
@@ -83,8 +83,8 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement) ->
         names=(KIND_WORDS[measured.kind], "model on the recorded inputs") if is_first else ("", ""),
         colour=_LOOKS.get(name, ACTUAL).colour,
     )
-    is_near = float(np.abs(course.model - measurement).max()) >= _NEAR_LIMIT * limit
-    return course_panels(course, "dots", "figure" if is_first else "", (-limit, limit) if is_near else ())
+    is_near = float(np.abs(curve.model - measurement).max()) >= _NEAR_LIMIT * limit
+    return course_panels(curve, "dots", "figure" if is_first else "", (-limit, limit) if is_near else ())
 
 
 @in_units(lambda validation: validation.device.shown)

@@ -67,21 +67,23 @@ def safety_remarks(worn: WalkResult) -> list[str]:
     limit = settings.get("largest_torque", math.inf)
     cut = [f"controller.{name} = {_TORQUE.text(settings[name])}" for name in PEAKS if settings.get(name, 0.0) > limit]
     if cut:
-        shown = _TORQUE.text(limit)
+        limit_text = _TORQUE.text(limit)
         # The default limit is the largest torque of the device.
         is_given = "controller.largest_torque" not in scenario.links
         advice = "raise that too" if is_given else "the actuator gives no more at this supply"
-        remarks.append(f"{', '.join(cut)}: the request is limited by controller.largest_torque = {shown}; {advice}")
+        remarks.append(
+            f"{', '.join(cut)}: the request is limited by controller.largest_torque = {limit_text}; {advice}"
+        )
     # Where the foot drives the vane to its end, it compresses a chamber far above its supply.
-    for channel, words, given in (
+    for channel, words, set_pressure in (
         ("pressure_1", "chamber 1", supply.pressure),
         ("pressure_2", "chamber 2", supply.dorsiflexion_pressure),
     ):
         largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
-        if largest > _FAR_ABOVE * given:
-            reached, fed = (quantity_text(value, "pressure") for value in (largest, given))
+        if largest > _FAR_ABOVE * set_pressure:
+            reached, supply_text = (quantity_text(value, "pressure") for value in (largest, set_pressure))
             remarks.append(
-                f"the pressure in {words} reaches {reached}, and its supply is set to {fed}: "
+                f"the pressure in {words} reaches {reached}, and its supply is set to {supply_text}: "
                 "actuator, valves and tubing must withstand that"
             )
     if not worn.events:

@@ -162,12 +162,12 @@ def trust_remark(configuration: Scenario) -> str:
     ratios = [0.5 * cadence * gait.stride_time for cadence in _given(sequence, "cadence")]
     speeds = [*_given(sequence, "speed"), *((gait.walking_speed or 0.0) * ratio * ratio for ratio in ratios)]
     # A speed at the edge, written in another unit, is not beyond it.
-    beyond = [speed for speed in speeds if not low - _SAME_SPEED <= speed <= high + _SAME_SPEED]
-    if not beyond:
+    outside = [speed for speed in speeds if not low - _SAME_SPEED <= speed <= high + _SAME_SPEED]
+    if not outside:
         return ""
-    shown = ", ".join(sorted({f"{speed:.2g}" for speed in beyond}))
+    listed = ", ".join(sorted({f"{speed:.2g}" for speed in outside}))
     return (
-        f"gait '{gait.name}' is scaled to {shown} m/s: beyond {low:.3g} to {high:.3g} m/s, where its angles "
+        f"gait '{gait.name}' is scaled to {listed} m/s: beyond {low:.3g} to {high:.3g} m/s, where its angles "
         "and forces are assumed and not measured"
     )
 

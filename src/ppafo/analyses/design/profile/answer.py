@@ -307,9 +307,9 @@ def _remarks(sizing: Sizing) -> tuple[str, ...]:
 
 def _method(problem: SizingProblem) -> tuple[str, ...]:
     """Return sentences on the method of the sizing study."""
-    others = f" with {', '.join(part.title for part in problem.carried)}" if problem.carried else ""
+    carried = f" with {', '.join(part.title for part in problem.carried)}" if problem.carried else ""
     return (
-        f"The mass counts valve and full bottle{others}.",
+        f"The mass counts valve and full bottle{carried}.",
         f"{problem.simulated} repetitions of the profile were simulated from the initial state of the scenario; "
         "error and gas cover all of them, including the first filling of the chambers. Friction, leak, dead volumes "
         "and sensors are the scenario's; what the data sheet of a valve does not state is taken as ideal.",

@@ -175,8 +175,8 @@ def try_pressures(trials: Trials, valve: Part) -> Trial:
     if np.isnan(tried["error"]).all():
         reason = next(iter(trials.failures), "no reason was given")
         raise StudyError(f"{problem.file}: every run with '{valve.name}' failed; the first: {reason}")
-    while first := first_of(works_in(problem, tried)):
-        lower, upper = tried["pressure"][first - 1 : first + 1]
+    while lowest := first_of(works_in(problem, tried)):
+        lower, upper = tried["pressure"][lowest - 1 : lowest + 1]
         if upper - lower <= FINENESS:
             break
         # Without both ends, which were tried before.

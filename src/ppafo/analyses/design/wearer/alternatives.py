@@ -105,8 +105,8 @@ def _at_more_pressure(requirements: DesignRequirements, tried: Sequence[WalkedDe
     """
     best: list[WalkedDevice] = []
     for kind in dict.fromkeys(pair.valve.kind for pair in tried):
-        of_kind = [pair for pair in tried if pair.valve.kind == kind]
-        strongest, highest = max(of_kind, key=lambda pair: pair.torque), max(of_kind, key=lambda pair: pair.toes)
+        pairs = [pair for pair in tried if pair.valve.kind == kind]
+        strongest, highest = max(pairs, key=lambda pair: pair.torque), max(pairs, key=lambda pair: pair.toes)
         best += {(pair.valve.name, pair.actuator.name): pair for pair in (strongest, highest)}.values()
     for factor in _MORE_PRESSURE:
         higher = requirements.at_gauge(factor)
