@@ -131,7 +131,7 @@ class _Interval:
     stopped_by: Stop | None
 
 
-class Balance(NamedTuple):
+class _Balance(NamedTuple):
     """Mass and energy balance of bottle and wall over a run.
 
     Across the boundary: gas drawn [kg], its enthalpy [J], heat from the room [J]. Changes inside: mass of the content
@@ -154,7 +154,7 @@ class Discharge:
     total_time: float
     strides: float
     ending: DischargeEnd
-    balance: Balance | SupplyBalance
+    balance: _Balance | SupplyBalance
     record: Callable[[], Recording] = field(repr=False, compare=False)
 
     @cached_property
@@ -207,7 +207,7 @@ def discharge(bottle: Bottle, draw: GasDemand, schedule: Schedule) -> Discharge:
     last = intervals[-1].last
     walked = sum(interval.end - interval.start for interval in intervals if interval.draw > 0.0)
     change = last - start
-    balance = Balance(
+    balance = _Balance(
         drawn_mass=float(last[3]),
         outflow_energy=float(last[4]),
         room_heat=float(last[5]),

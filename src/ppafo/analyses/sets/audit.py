@@ -164,8 +164,7 @@ def _lines(finding: AuditFinding) -> list[str]:
     for value in finding.values:
         text = value.value if isinstance(value.value, str) else f"{value.value:.6g} {value.unit}".rstrip()
         lines.append(f"{_INDENT}{value.path} = {text} ({value.origin})")
-    lines += textwrap.wrap(finding.paragraph, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
-    if finding.accepted:
-        accepted = f"Accepted by the set: {finding.accepted}"
-        lines += textwrap.wrap(accepted, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
+    accepted = [f"Accepted by the set: {finding.accepted}"] if finding.accepted else []
+    for paragraph in (finding.paragraph, *accepted):
+        lines += textwrap.wrap(paragraph, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
     return lines
