@@ -15,7 +15,9 @@ from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
 from ppafo.report.kind import Kind
 from ppafo.report.stored_figure import stated_units
 from ppafo.signals import Recording
-from ppafo.storage.result_folder import RUN_FILE, read_json, read_recording
+from ppafo.storage.owned_folder import read_json
+from ppafo.storage.reading import read_recording
+from ppafo.storage.result_folder import RUN_FILE
 from ppafo.walking import WalkResult
 from ppafo.walking.bottle.coupling import Schedule
 from ppafo.walking.loading import on_bottle
