@@ -17,8 +17,7 @@ from ppafo.parameters.overrides import read_overrides
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import loading as of_vanes
 from ppafo.simulation import schema
-from ppafo.simulation.building import ScenarioRequest
-from ppafo.simulation.document import kind_at
+from ppafo.simulation.document import ScenarioRequest, kind_at
 from ppafo.simulation.motion_kind import is_walk
 from ppafo.simulation.overrides import over_layer
 from ppafo.simulation.scenario import Scenario

@@ -23,7 +23,7 @@ from ppafo.documents.models import SchemaVersion, StrictTable, make_schema, read
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.catalog import VALVES
-from ppafo.model.declaration import Quantity, range_rule
+from ppafo.model.declaration import Quantity
 from ppafo.model.effects import stribeck
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.effects.seal_friction import SealFriction
@@ -32,7 +32,7 @@ from ppafo.model.gas import heat_capacity_at_constant_volume
 from ppafo.model.orifice import ExactOrifice, area_conductance
 from ppafo.model.plant import PlantParameters
 from ppafo.model.sensors import quantise
-from ppafo.parameters.declaration import is_within
+from ppafo.parameters.declaration import is_within, range_rule
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.effects import switches_of
 from ppafo.parameters.overrides import override_set, read_overrides
@@ -170,8 +170,7 @@ class Preset:
         if quantity is None:
             raise ParameterError(f"preset '{self.name}' has no value '{path}'{nearest_name(path, PATHS)}")
         if not (math.isfinite(value) and is_within(value, quantity)):
-            limits = f"from {quantity.minimum:g} to {quantity.maximum:g} {quantity.unit}".rstrip()
-            raise ParameterError(f"preset '{self.name}': {path} = {value:g}: {range_rule(quantity, limits)}")
+            raise ParameterError(f"preset '{self.name}': {path} = {value:g}: {range_rule(quantity, quantity.unit)}")
         return replace(self, values={**self.values, path: value}, reasons={**self.reasons, path: reason})
 
 

@@ -10,7 +10,7 @@ from ppafo.analyses.endurance.gas_demand import GasDemand, demand_of_numbers, la
 from ppafo.errors import DataError, PpafoError, ScenarioError, refused_as
 from ppafo.parameters.overrides import read_overrides
 from ppafo.signals import Recording
-from ppafo.simulation.building import ScenarioRequest
+from ppafo.simulation.document import ScenarioRequest
 from ppafo.simulation.loading import scenario_of
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.result_folder import read_json, read_recording

@@ -28,7 +28,7 @@ from ppafo.report.kind import Kind
 from ppafo.report.live_parts import live_part
 from ppafo.running import tried
 from ppafo.simulation.gains import gains_of
-from ppafo.simulation.tracking import Tracking, following_text
+from ppafo.simulation.tracking import Tracking
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
@@ -89,13 +89,7 @@ def safety_remarks(worn: WalkResult) -> list[str]:
     if not worn.events:
         return remarks
     remarks += event_lines(worn.events)
-    return [*remarks, _helped_text(worn)] if worn.helped.size else remarks
-
-
-def _helped_text(worn: WalkResult) -> str:
-    """Return the number of strides with help, and whether it is too small."""
-    enough = "" if worn.is_helped else ": fewer than half"
-    return f"help in {int(worn.helped.sum())} of {worn.helped.size} strides{enough}"
+    return [*remarks, worn.help_text] if worn.helped.size else remarks
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -188,11 +182,7 @@ def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
     verdict = tried(configuration, worn.tracking)
     # How the torque follows what is requested, and the gains in force with their origin.
     in_force = gains_of(configuration, law_of(configuration))
-    if worn.is_helped:
-        follows = following_text(worn) if verdict is None and "strides" in worn.metrics else ""
-    else:
-        follows = _helped_text(worn)
-    first_lines = [follows if verdict is None else verdict.sentence, "" if in_force is None else in_force.sentence]
+    first_lines = [*worn.verdict_lines(verdict), "" if in_force is None else in_force.sentence]
     gait, overrides = motion.gait, configuration.origin.overrides
     title = f" ({gait.title})" if gait.title else ""
     set_up = (

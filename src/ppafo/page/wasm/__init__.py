@@ -90,10 +90,10 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
 from ppafo.parameters.overrides import one_path, read_overrides
 from ppafo.parameters.parameter_set import SOURCE, atmospheric_pressure, entry_in_si
 from ppafo.report.display_units import display_unit
-from ppafo.simulation.building import parameter_set_of
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.declaration import LOCKED_ANGLE, SEED
 from ppafo.simulation.document import value_at
+from ppafo.simulation.hardware import parameter_set_of
 from ppafo.simulation.motion_kind import VANE, WALK
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario

@@ -13,19 +13,15 @@ from ppafo.engine.lanes import Batch
 from ppafo.engine.run import Members, Run, batches_of
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.columns import Problem, at
-from ppafo.model.declaration import range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
-from ppafo.parameters.declaration import limits_text
+from ppafo.parameters.declaration import is_within, range_rule
 from ppafo.parameters.effects import switches_of
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import ScenarioColumns
 from ppafo.simulation.motion_kind import RunTimes
-from ppafo.simulation.numbers import declared_numbers, with_numbers
+from ppafo.simulation.numbers import WHOLE_NUMBERS, declared_numbers, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_text
-
-# Numbers that name one of many: there is nothing between two of them.
-_WHOLE = ("sensors.seed", "wearer.person")
 
 
 @dataclass(slots=True)
@@ -107,13 +103,14 @@ def _out_of_range(columns: ScenarioColumns, path: str) -> Problem:
         said = f"{path} = {values[run]:.9g} {unit}".rstrip()
         if not np.isfinite(values[run]):
             return f"{said}: is not a finite number"
-        if path in _WHOLE and values[run] != np.floor(values[run]):
+        if path in WHOLE_NUMBERS and values[run] != np.floor(values[run]):
             return f"{said}: must be a whole number"
-        return f"{said}: {range_rule(quantity, limits_text(quantity, unit))}"
+        return f"{said}: {range_rule(quantity, unit)}"
 
-    above = values >= quantity.minimum if quantity.minimum_allowed else values > quantity.minimum
-    is_good = np.isfinite(values) & above & (values <= quantity.maximum)
-    return ~(is_good & (values == np.floor(values)) if path in _WHOLE else is_good), line
+    is_good = np.isfinite(values) & is_within(values, quantity)
+    if path in WHOLE_NUMBERS:
+        is_good &= values == np.floor(values)
+    return ~is_good, line
 
 
 @dataclass(frozen=True, slots=True)
