@@ -24,11 +24,12 @@ from ppafo.simulation.recorded.usual_errors import (
     usual_errors,
 )
 from ppafo.units.shown import shown_in, shown_unit, shown_value
-from ppafo.validation.agreement import ReplaySettings, replay_of
+from ppafo.validation.agreement import replay_of
 from ppafo.validation.change import SENSORS, CandidateCause, ModelChange, SensorModel
 from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
 from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.replay import replayed_scenario
+from ppafo.validation.settings import ReplaySettings
 
 
 def _sensed(names: Iterable[str], kind: str, about: float, size: float) -> ModelChange:

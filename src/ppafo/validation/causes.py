@@ -20,13 +20,14 @@ from ppafo.progress import Report, report_nothing
 from ppafo.simulation.recorded.clock import usual_interval
 from ppafo.simulation.recorded.rest import samples_at_rest
 from ppafo.simulation.recorded.usual_errors import usual_errors
-from ppafo.validation.agreement import RecordingAgreement, ReplaySettings, compare_recording
+from ppafo.validation.agreement import RecordingAgreement, compare_recording
 from ppafo.validation.candidates import effects, exchanges, numbers, sizes
 from ppafo.validation.change import SENSORS, CandidateCause, ModelChange
 from ppafo.validation.compared import ANGLE, EXPLAINED_FRACTION
 from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.record import Left, Record, at_rate, record_of
 from ppafo.validation.search import CauseSearch, SizedCause
+from ppafo.validation.settings import ReplaySettings
 
 _TIMES = {
     "milliseconds read as seconds": (1.0e3, "ms"),

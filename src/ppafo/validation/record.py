@@ -20,7 +20,6 @@ from ppafo.validation.agreement import (
     ENGINE_ERROR,
     ChannelAgreement,
     RecordingAgreement,
-    ReplaySettings,
     measured_values,
     noise_in,
     replay_of,
@@ -29,6 +28,7 @@ from ppafo.validation.change import SENSORS, SWAPPED, ModelChange, SensorModel
 from ppafo.validation.compared import ANGLE
 from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.replay import Replay, Replayed, replay_together
+from ppafo.validation.settings import ReplaySettings
 
 Flags = NDArray[np.bool_]
 

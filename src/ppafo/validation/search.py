@@ -22,10 +22,11 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.recorded.channels import COMMAND
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
-from ppafo.validation.agreement import ReplaySettings, replay_of
+from ppafo.validation.agreement import replay_of
 from ppafo.validation.change import SWAPPED, CandidateCause, ModelChange, joined
 from ppafo.validation.record import ONLY_NOISE, STEPS, Left, Record, at_rate, left_of, starts_without_wrong
 from ppafo.validation.replay import Replay, Replayed, replay_together, replayed_scenario
+from ppafo.validation.settings import ReplaySettings
 
 _TOGETHER = 32
 """Number of changes replayed in one batch; limits memory and lets progress be shown."""
