@@ -72,7 +72,7 @@ _HOMES = {
     "ppafo.simulation.loading": ("list_scenarios",),
     "ppafo.simulation.scenario": ("Scenario",),
     "ppafo.simulation.simulate": ("Result", "Status"),
-    "ppafo.storage": ("read_recording",),
+    "ppafo.storage.reading": ("read_recording",),
     "ppafo.studies.loading": ("list_studies", "load_study"),
     "ppafo.report.finding": ("Finding",),
     "ppafo.report.stored_figure": ("read_result",),

@@ -66,7 +66,7 @@ from ppafo.simulation.loading import list_scenarios as list_scenarios
 from ppafo.simulation.scenario import Scenario as Scenario
 from ppafo.simulation.simulate import Result as Result
 from ppafo.simulation.simulate import Status as Status
-from ppafo.storage import read_recording as read_recording
+from ppafo.storage.reading import read_recording as read_recording
 from ppafo.studies.loading import list_studies as list_studies
 from ppafo.studies.loading import load_study as load_study
 from ppafo.version import __version__ as __version__

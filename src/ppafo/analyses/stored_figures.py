@@ -9,8 +9,9 @@ from ppafo.errors import DataError
 from ppafo.report.recording_figure import recording_figure
 from ppafo.report.stored_figure import draw_stored_walk, read_result, stated_units
 from ppafo.rig.experiments import RIG_FILE
-from ppafo.storage import read_recording
-from ppafo.storage.result_folder import MARK, NETCDF_FILE, RUN_FILE, marking_command, read_json
+from ppafo.storage.owned_folder import MARK, marking_command, read_json
+from ppafo.storage.reading import read_recording
+from ppafo.storage.result_folder import NETCDF_FILE, RUN_FILE
 from ppafo.study.manifest import MANIFEST
 from ppafo.units.shown import shown_in
 from ppafo.wording import reason

@@ -35,7 +35,7 @@ def add_json_argument(parser: argparse.ArgumentParser) -> None:
 def check_output(out: Path | None, command: str) -> None:
     """Refuse, before anything runs, an ``--out`` folder unless it is new, empty, or a result of this command."""
     if out is not None:
-        from ppafo.storage.result_folder import check_owned_folder, marked_folder
+        from ppafo.storage.owned_folder import check_owned_folder, marked_folder
 
         with blame_out_option():
             check_owned_folder(out, marked_folder(command))
@@ -172,7 +172,7 @@ def _drop_output() -> None:
 
 def write_files(out: Path, contents: Mapping[str, bytes], command: str) -> None:
     """Replace the content of the ``--out`` folder by these files and the mark of the command: all of them or none."""
-    from ppafo.storage.result_folder import write_marked_folder
+    from ppafo.storage.owned_folder import write_marked_folder
 
     with blame_out_option():
         write_marked_folder(out, contents, command)

@@ -57,7 +57,7 @@ from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.files import LEFT_ASIDE, add_files, check_files_can_be_added
-from ppafo.storage.result_folder import read_json
+from ppafo.storage.owned_folder import read_json
 from ppafo.version import __version__
 from ppafo.wording import nearest_name, one_line, reason
 

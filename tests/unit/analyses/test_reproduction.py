@@ -7,18 +7,11 @@ import pytest
 from ppafo.analyses.reproduce import solve as study
 from ppafo.analyses.reproduce.answer import PROPORTIONAL, SOLENOID, STEP, Reproduction
 from ppafo.analyses.reproduce.bench import SyntheticEvidence
-from ppafo.analyses.reproduce.claim import (
-    NOT_PUBLISHED,
-    Claim,
-    ReportedSet,
-    arithmetic_claims,
-    count_sentence,
-    load_reported,
-    verdict_counts,
-)
+from ppafo.analyses.reproduce.claim import Claim, count_sentence, verdict_counts
 from ppafo.analyses.reproduce.decision_phases import phased_runs
 from ppafo.analyses.reproduce.meaning_of_u import readings_of_u
 from ppafo.analyses.reproduce.question import reproduce
+from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED, ReportedSet, arithmetic_claims, load_reported
 from ppafo.analyses.reproduce.solve import EXPERIMENTS, reproduce_paper, torque_task_observations
 from ppafo.errors import PpafoError, SimulationError
 from ppafo.parameters.audit.evidence import Evidence

@@ -29,7 +29,7 @@ from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv
-from ppafo.storage.result_folder import read_recording
+from ppafo.storage.reading import read_recording
 from ppafo.units import to_si
 from tests.unit.identification import planted
 

@@ -9,7 +9,8 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording
-from ppafo.storage import check_result_folder, files, read_recording, read_stored, write_result
+from ppafo.storage import check_result_folder, files, read_stored, write_result
+from ppafo.storage.reading import read_recording
 
 DOCUMENT = {"status": {"kind": "completed"}, "scenario": {"name": "task"}}
 

@@ -20,7 +20,7 @@ from ppafo.parameters.overrides import check_valve, read_overrides, with_overrid
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, number_in_si
 from ppafo.progress import Report, report_nothing
 from ppafo.storage.foreign import read_trials
-from ppafo.storage.result_folder import read_recording
+from ppafo.storage.reading import read_recording
 from ppafo.units.shown import counted_from, shown_in
 
 

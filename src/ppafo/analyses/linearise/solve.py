@@ -46,16 +46,16 @@ def sides_of(run: Run, point: Point, joint: JointNames) -> dict[str, str]:
         "source to chamber 2": (at["dorsiflexion_pressure"], second, openings.source_2),
         "chamber 2 to atmosphere": (second, room, openings.vent_2),
     }
-    said = {name: _regime(plant.valve_curve, *values) for name, values in paths.items()}
-    said["leak over the vane"] = _regime(plant.leak_curve, first, second, 1.0)
+    regimes = {name: _regime(plant.valve_curve, *values) for name, values in paths.items()}
+    regimes["leak over the vane"] = _regime(plant.leak_curve, first, second, 1.0)
     motion = {
         None: "prescribed",
         0.0: "at rest",
         1.0: f"slides in {joint.positive}",
         -1.0: f"slides in {joint.negative}",
     }
-    vane = motion[point.way]
-    if point.way == 0.0:
+    vane = motion[point.direction]
+    if point.direction == 0.0:
         is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max
         vane = "against a stop" if is_at_stop else "sticks: friction holds it"
     valve = "closed"
@@ -63,7 +63,7 @@ def sides_of(run: Run, point: Point, joint: JointNames) -> dict[str, str]:
         chamber = 1 if openings.source_1 > 0.0 else 2
         is_vacuum = min(at["supply_pressure"], at["dorsiflexion_pressure"]) < room
         valve = f"{'evacuates' if is_vacuum else 'feeds'} chamber {chamber}, open by {max(openings):.4g}"
-    return {"valve": valve, joint.name: vane, **said}
+    return {"valve": valve, joint.name: vane, **regimes}
 
 
 def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: float) -> str:
@@ -108,7 +108,7 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
 
 def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     """Return the linear model at an operating point, with one-sided slopes on the sides given by ``side_of``."""
-    values, plant = dict(point.values), plant_of(run, point.way, point.values, point.time or 0.0)
+    values, plant = dict(point.values), plant_of(run, point.direction, point.values, point.time or 0.0)
     here = plant.at(values)
     slopes = {name: _both_slopes(plant, values, name) for name in (*here.rates, *plant.inputs)}
     # What the valve takes from its command at once is no state: nothing but the output that shows it asks for it.
@@ -142,7 +142,7 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
         d=d,
         rates=np.array([here.rates[name] for name in states]),
         sides=sides,
-        edges=tuple(SlopeKink(name, side_of(name, values, point.way) > 0.0) for name in kinks),
+        edges=tuple(SlopeKink(name, side_of(name, values, point.direction) > 0.0) for name in kinks),
         delays=OmittedDelays(run.command_delay, run.signal_delay, run.period),
     )
 
@@ -153,10 +153,11 @@ def _both_slopes(plant: LinearisedPlant, values: Mapping[str, float], name: str)
     The first are the slopes on the side of ``side_of``, the second on the other side, the third the error estimates.
     """
 
-    def moved(value: float) -> Floats:
-        found = plant.at({**values, name: value})
-        return np.array([*found.rates.values(), *found.outputs.values()])
+    def rates_and_outputs(value: float) -> Floats:
+        state = plant.at({**values, name: value})
+        return np.array([*state.rates.values(), *state.outputs.values()])
 
-    side, size = side_of(name, values, plant.way), size_of(name)
-    (taken, error), (beyond, other) = (one_sided_slopes(moved, values[name], way, size) for way in (side, -side))
-    return taken, beyond, error + other
+    side, size = side_of(name, values, plant.direction), size_of(name)
+    slopes, error = one_sided_slopes(rates_and_outputs, values[name], side, size)
+    slopes_beyond, error_beyond = one_sided_slopes(rates_and_outputs, values[name], -side, size)
+    return slopes, slopes_beyond, error + error_beyond

@@ -15,22 +15,20 @@ from ppafo.analyses.reproduce.bench import (
 )
 from ppafo.analyses.reproduce.claim import (
     MEANINGS,
-    NOT_PUBLISHED,
     VERDICTS,
     Claim,
     Observation,
     Verdict,
     count_sentence,
-    load_reported,
     verdict_counts,
 )
 from ppafo.analyses.reproduce.drawing import device_figure
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.analyses.reproduce.meaning_of_u import WITHIN_REACH, InterpretationOfU
 from ppafo.analyses.reproduce.publication import ALL, SEED, JudgedClaim, Publication
+from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED, load_reported
 from ppafo.analyses.reproduce.step_response import StepEvents, SupplyLevels
 from ppafo.identification.bench.result import figure_3
-from ppafo.metrics import Metric
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import AuditFinding
 from ppafo.parameters.publications.publication import paper_entries
@@ -99,17 +97,17 @@ class Studies:
     @property
     def verdicts(self) -> list[Verdict]:
         """Verdicts of all claims, starting with the paper's."""
-        own = [] if self.reproduction is None else [claim.verdict for claim in self.reproduction.claims]
-        return own + [claim.verdict for _, claims in self.studies for claim in claims]
+        of_paper = () if self.reproduction is None else self.reproduction.claims
+        return [claim.verdict for claim in of_paper] + [claim.verdict for _, claims in self.studies for claim in claims]
 
     def json_document(self) -> dict[str, Any]:
         """Return claims with verdicts, and the number of claims for each verdict, as plain data in SI."""
-        own = () if self.reproduction is None else self.reproduction.claims
+        of_paper = () if self.reproduction is None else self.reproduction.claims
         return {
             "study": self.studies[0][0].name if self.reproduction is None else ALL,
             "counts": {verdict: self.verdicts.count(verdict) for verdict in VERDICTS},
             "claims": [
-                *({"study": SEED, **claim.document()} for claim in own),
+                *({"study": SEED, **claim.document()} for claim in of_paper),
                 *(claim.document(publication.name) for publication, claims in self.studies for claim in claims),
             ],
             "versions": {"ppafo": __version__},
@@ -117,6 +115,24 @@ class Studies:
 
 
 TEMPLATE = "reproduction.html.jinja"
+DEVICE_FIGURE = "device"
+IDENTIFICATION_FIGURE = "figure-3-identification"
+STEP_FIGURE = "figure-7-step-response"
+TORQUE_FIGURE = "figure-8-torque-task"
+_HEAD = ("claim", "paper", "ours", "verdict")
+_PAPER = "'ppafo reproduce' without --study makes the page of these claims, with sources, figures and assumptions."
+_STUDIES_HEAD = ("study", "claim", "published", "ours", "verdict")
+_DETAILS_HEAD = ("claim", "statement and source", "agrees", "rests on", "note")
+_RULE = (
+    "'Ours' is computed anew whenever this is run. "
+    + " ".join(f"{VERDICTS[verdict].capitalize()}: {meaning}." for verdict, meaning in MEANINGS.items())
+    + " Nothing here was measured."
+)
+NOTHING_CONFIRMED = "No experimental result is confirmed independently of fitted settings."
+NOT_READ = (
+    "Not read, and likely to settle what is open: the dissertations of K. A. Shorter (2011) and Y. Li (2013), the "
+    "journal article of 2012 in Mechatronics, the volume table of the maker of the vane."
+)
 _EXPERIMENTS = {STEP: "step response", SOLENOID: "torque task, solenoid", PROPORTIONAL: "torque task, proportional"}
 _SYMBOLS: dict[Verdict, str] = {
     "consistent": "✓",
@@ -170,7 +186,13 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
         "result_on_u": result_on_u(readings) if readings else (),
         "within_reach": f"{WITHIN_REACH:g}",
         "task_rows": [
-            (solenoid.metrics[name].summary, *(_metric_text(run.metrics[name]) for run in (solenoid, proportional)))
+            (
+                solenoid.metrics[name].summary,
+                *(
+                    quantity(*metric_level(run.metrics[name].value, run.metrics[name].unit), 3)
+                    for run in (solenoid, proportional)
+                ),
+            )
             for name in _TASK_METRICS
             if name in solenoid.metrics and name in proportional.metrics
         ],
@@ -218,10 +240,6 @@ def _reading_rows(rows: Sequence[InterpretationOfU]) -> list[tuple[str, str, str
     return [(row.name, f"{row.error:.0f} %", f"{row.gas:.0f} %", f"{row.error_within_reach:.0f} %") for row in rows]
 
 
-def _metric_text(metric: Metric) -> str:
-    return quantity(*metric_level(metric.value, metric.unit), 3)
-
-
 def _synthetic(evidence: SyntheticEvidence | str, figure: bytes | None) -> dict[str, Any]:
     """Return template values on the synthetic measurements, or the reason why there are none."""
     if isinstance(evidence, str):
@@ -239,26 +257,6 @@ def _synthetic(evidence: SyntheticEvidence | str, figure: bytes | None) -> dict[
             "reported_slope": f"{reported.entry('reported.velocity_over_acceleration').value:g}",
         },
     }
-
-
-DEVICE_FIGURE = "device"
-IDENTIFICATION_FIGURE = "figure-3-identification"
-STEP_FIGURE = "figure-7-step-response"
-TORQUE_FIGURE = "figure-8-torque-task"
-_HEAD = ("claim", "paper", "ours", "verdict")
-_PAPER = "'ppafo reproduce' without --study makes the page of these claims, with sources, figures and assumptions."
-_STUDIES_HEAD = ("study", "claim", "published", "ours", "verdict")
-_DETAILS_HEAD = ("claim", "statement and source", "agrees", "rests on", "note")
-_RULE = (
-    "'Ours' is computed anew whenever this is run. "
-    + " ".join(f"{VERDICTS[verdict].capitalize()}: {meaning}." for verdict, meaning in MEANINGS.items())
-    + " Nothing here was measured."
-)
-NOTHING_CONFIRMED = "No experimental result is confirmed independently of fitted settings."
-NOT_READ = (
-    "Not read, and likely to settle what is open: the dissertations of K. A. Shorter (2011) and Y. Li (2013), the "
-    "journal article of 2012 in Mechatronics, the volume table of the maker of the vane."
-)
 
 
 def finding_of_studies(solved: Studies) -> Finding[Studies]:
@@ -335,10 +333,10 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
     It has not passed if a value is outside its window although no value was overridden. Figure 3 needs the simulated
     test bench.
     """
-    said, missed, rows = [NOTHING_CONFIRMED], reproduction.missed, reproduction.readings_of_u
+    sentences, missed, rows = [NOTHING_CONFIRMED], reproduction.missed, reproduction.readings_of_u
     if reproduction.overrides:
         words = f"not the paper's device: values changed with --set {', '.join(reproduction.overrides)}"
-        said.append(f"{words}; the verdicts compare it with the paper all the same")
+        sentences.append(f"{words}; the verdicts compare it with the paper all the same")
     # On the page a claim has its window in its note; at the command line only what misses it is said.
     remarks = [
         f"missed: {claim.id} is outside {claim.window[0]:g} to {claim.window[1]:g} {claim.unit}"
@@ -357,7 +355,7 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
         name="claims",
         kicker="Reproduction",
         title="The paper's claims",
-        said=said,
+        said=sentences,
         parts=(claims, *of_u, *_figures(reproduction)),
         found=reproduction,
         # A changed device may leave the windows of the paper: that is a result, no failure.

@@ -36,7 +36,7 @@ Values = Mapping[str, str | float]
 
 
 @dataclass(frozen=True, slots=True)
-class Computation:
+class _Computation:
     """Computation of a value: SI unit, arguments with their SI units, and function."""
 
     unit: str
@@ -58,8 +58,8 @@ def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
 
 
 def _nondisabled(name: str, values: Values) -> WalkResult:
-    held = (f"valve.holding_time={values['holding_time']!r} s",) if name == RECYCLING else ()
-    return _walked(name, (KEEPS_GAIT, *held))
+    holding = (f"valve.holding_time={values['holding_time']!r} s",) if name == RECYCLING else ()
+    return _walked(name, (KEEPS_GAIT, *holding))
 
 
 def held_torque(values: Values) -> float:
@@ -120,15 +120,15 @@ def event_reduction(wearer: str, _values: Values) -> float:
 
 
 _OF_PRESSURE, _OF_RECYCLING = {"pressure": "Pa_a"}, {"holding_time": "s"}
-COMPUTATIONS: dict[str, Computation] = {
-    "held_torque": Computation("N m", _OF_PRESSURE, held_torque),
-    "share_of_healthy_moment": Computation("1", _OF_PRESSURE, share_of_healthy_moment),
-    "walking_torque": Computation("N m", _OF_PRESSURE, walking_torque),
-    "dorsiflexor_share": Computation("1", {}, dorsiflexor_share),
-    "recycling_saving": Computation("1", _OF_RECYCLING, recycling_saving),
-    "recycling_work": Computation("1", _OF_RECYCLING, recycling_work),
-    "healthy_event_reduction": Computation("1", {}, partial(event_reduction, "healthy")),
-    "impaired_event_reduction": Computation("1", {}, partial(event_reduction, "impaired")),
+COMPUTATIONS: dict[str, _Computation] = {
+    "held_torque": _Computation("N m", _OF_PRESSURE, held_torque),
+    "share_of_healthy_moment": _Computation("1", _OF_PRESSURE, share_of_healthy_moment),
+    "walking_torque": _Computation("N m", _OF_PRESSURE, walking_torque),
+    "dorsiflexor_share": _Computation("1", {}, dorsiflexor_share),
+    "recycling_saving": _Computation("1", _OF_RECYCLING, recycling_saving),
+    "recycling_work": _Computation("1", _OF_RECYCLING, recycling_work),
+    "healthy_event_reduction": _Computation("1", {}, partial(event_reduction, "healthy")),
+    "impaired_event_reduction": _Computation("1", {}, partial(event_reduction, "impaired")),
 }
 
 
@@ -137,7 +137,7 @@ class PublishedClaim:
     """Claim with a known computation; ``arguments`` in SI."""
 
     entry: ClaimEntry
-    computation: Computation | None
+    computation: _Computation | None
     arguments: Mapping[str, str | float]
     source: str
 
@@ -157,9 +157,9 @@ def load_publication(name_or_path: str | Path) -> Publication:
 
     Raises ScenarioError for an invalid file.
     """
-    read, file = read_publication(name_or_path)
-    claims = tuple(_checked(entry, read.citation, file) for entry in read.claims)
-    return Publication(read.name, read.title, read.citation, claims)
+    document, file = read_publication(name_or_path)
+    claims = tuple(_checked(entry, document.citation, file) for entry in document.claims)
+    return Publication(document.name, document.title, document.citation, claims)
 
 
 def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
@@ -193,17 +193,17 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
     return PublishedClaim(entry, computation, _arguments(entry, computation, where), source)
 
 
-def _arguments(entry: ClaimEntry, computation: Computation, where: str) -> dict[str, str | float]:
+def _arguments(entry: ClaimEntry, computation: _Computation, where: str) -> dict[str, str | float]:
     """Return the arguments of a claim in SI, checked against the arguments of its computation."""
-    wanted = ", ".join(computation.arguments)
+    known = ", ".join(computation.arguments)
     for name in entry.arguments:
         if name not in computation.arguments:
             hint = nearest_name(name, computation.arguments)
-            raise ScenarioError(f"{where}.arguments: '{name}' is unknown{hint}; {entry.computation} takes {wanted}")
+            raise ScenarioError(f"{where}.arguments: '{name}' is unknown{hint}; {entry.computation} takes {known}")
     values: dict[str, str | float] = {}
     for name, unit in computation.arguments.items():
         if name not in entry.arguments:
-            raise ScenarioError(f"{where}.arguments: '{name}' is missing; {entry.computation} takes {wanted}")
+            raise ScenarioError(f"{where}.arguments: '{name}' is missing; {entry.computation} takes {known}")
         key, text = f"{where}.arguments.{name}", entry.arguments[name]
         with refused_as(ScenarioError, key, UnitError):
             value = values[name] = parse_quantity(text, unit)
@@ -308,9 +308,9 @@ def judge(claim: PublishedClaim) -> JudgedClaim:
     if computation is None:
         return JudgedClaim(claim, None, "not_testable")
     value = from_si(computation.compute(claim.arguments), entry.unit, computation.unit)
-    low = entry.at_least is None or value >= entry.at_least
-    high = entry.at_most is None or value <= entry.at_most
+    low = -math.inf if entry.at_least is None else entry.at_least
+    high = math.inf if entry.at_most is None else entry.at_most
     # A model with assumptions that does not agree is no evidence against what was measured.
-    holds: Verdict = "plausible" if entry.assumed else "consistent"
-    parts: Verdict = "undetermined" if entry.assumed else "inconsistent_as_reported"
-    return JudgedClaim(claim, value, holds if low and high else parts)
+    agrees: Verdict = "plausible" if entry.assumed else "consistent"
+    disagrees: Verdict = "undetermined" if entry.assumed else "inconsistent_as_reported"
+    return JudgedClaim(claim, value, agrees if low <= value <= high else disagrees)

@@ -8,19 +8,10 @@ import numpy as np
 
 from ppafo.analyses.reproduce.answer import PROPORTIONAL, SOLENOID, STEP, Reproduction
 from ppafo.analyses.reproduce.bench import AssumedValue, assumed_values, synthetic_evidence
-from ppafo.analyses.reproduce.claim import (
-    NOT_PUBLISHED_CLAIM,
-    Claim,
-    Observation,
-    Verdict,
-    arithmetic_claims,
-    claim_on_text,
-    load_reported,
-    observation,
-    stated_claim,
-)
+from ppafo.analyses.reproduce.claim import Claim, Observation, Verdict, claim_on_text, observation, stated_claim
 from ppafo.analyses.reproduce.decision_phases import PhasedRuns, phased_runs
 from ppafo.analyses.reproduce.meaning_of_u import readings_of_u
+from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED_CLAIM, arithmetic_claims, load_reported
 from ppafo.analyses.reproduce.step_response import SupplyLevels, step_events, step_observations
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
@@ -38,7 +29,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
 from ppafo.wording import count_of
 
-# The torque task: what the paper claims of tracking error and gas, and what its text tells of both valves.
+# Torque task: the paper's claims on tracking error and gas, and statements of its text on both valves.
 
 FEWEST_REVERSALS = paper_entries()["solenoid_oscillates_on_ramp"].at_least or 0.0
 """Smallest number of torque reversals on the ramp that counts as the oscillation of the text."""
@@ -135,7 +126,7 @@ def _tracks_better_on_ramp(solenoid: Result, proportional: Result) -> Observatio
     )
 
 
-# What the paper says of switching rate, gains, dead zone and improved control, against runs with such settings.
+# Statements of the paper on switching rate, gains, dead zone and improved control, against runs with such settings.
 
 TUNED = (
     "controller.kind=pid",
@@ -246,8 +237,9 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     step, solenoid, proportional = runs
     report(Progress("measuring on the simulated test bench (synthetic)"))
     # The rig records with the overrides of the simulations.
-    own = {name: scenario.origin.overrides for name, scenario in scenarios.items()}
-    synthetic = synthetic_evidence({"solenoid": own[SOLENOID], "proportional": own[PROPORTIONAL]}, own[STEP])
+    changes = {name: scenario.origin.overrides for name, scenario in scenarios.items()}
+    tasks = {"solenoid": changes[SOLENOID], "proportional": changes[PROPORTIONAL]}
+    synthetic = synthetic_evidence(tasks, changes[STEP])
     report(Progress("checking the paper's own numbers"))
     reported = load_reported()
     completed = load_parameter_set(step.scenario.origin.parameter_set)
@@ -262,14 +254,14 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
         *arithmetic_claims(reported),
         claim_on_text(
             "figure_7_words",
-            "What the text tells of the pressures and the angle of the step response.",
+            "Statements of the text on pressures and angle of the step response.",
             step_observed,
             _used_by(assumed, STEP),
         ),
         *torque_task_claims(phased, proportional, of_tasks),
         claim_on_text(
             "oscillation_words",
-            "What the text tells of the oscillation with both valves.",
+            "Statements of the text on the oscillation with both valves.",
             torque_observed,
             of_tasks,
         ),
@@ -302,25 +294,25 @@ def _used_by(assumed: Iterable[AssumedValue], *experiments: str) -> tuple[str, .
 
 def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
     """Return the experiments, each with the applicable overrides."""
-    meant: dict[str, list[Override]] = {name: [] for name in EXPERIMENTS}
-    given = override_set(read_overrides(overrides, ScenarioError), ScenarioError)
+    applied: dict[str, list[Override]] = {name: [] for name in EXPERIMENTS}
+    by_path = override_set(read_overrides(overrides, ScenarioError), ScenarioError)
     # Kinds come first, outer ones before inner ones: they decide which numbers there are.
-    kinds = [path for path in given if path.endswith(".kind")]
-    for path in sorted(given, key=lambda path: (path not in kinds, path.count("."), path)):
+    kinds = [path for path in by_path if path.endswith(".kind")]
+    for path in sorted(by_path, key=lambda path: (path not in kinds, path.count("."), path)):
         documents = {
             name: apply_overrides(load_scenario(name).origin.content, earlier, name).document
-            for name, earlier in meant.items()
+            for name, earlier in applied.items()
         }
         known = tuple(dict.fromkeys(known for document in documents.values() for known in OF_A_VANE.paths(document)))
         if path not in known and not is_of_device(path) and not chosen_by(path, kinds):
-            raise unknown_value(given[path], known, f"{', '.join(EXPERIMENTS)} have")
+            raise unknown_value(by_path[path], known, f"{', '.join(EXPERIMENTS)} have")
         # A scenario that has a section for the value; the device is in all of them.
         section = path.rpartition(".")[0]
-        having = [
+        with_section = [
             name
             for name, document in documents.items()
             if (not section or value_at(document, section) is not None) and path in OF_A_VANE.paths(document)
         ]
-        for name in having or EXPERIMENTS:
-            meant[name].append(given[path])
-    return {name: load_scenario(name, map(str, chosen)) for name, chosen in meant.items()}
+        for name in with_section or EXPERIMENTS:
+            applied[name].append(by_path[path])
+    return {name: load_scenario(name, map(str, changes)) for name, changes in applied.items()}

@@ -80,9 +80,9 @@ def rig_record(
     # What a bench did cannot be recorded a second time.
     with output.blame_out_option():
         check_files_can_be_added(out.parent, [out.name])
-    from ppafo.exports.hil.loop import stop_by_interrupt
+    from ppafo.exports.hil.ports import open_port
     from ppafo.exports.hil.recording import kept_aside, record
-    from ppafo.exports.hil.wire import open_port
+    from ppafo.interrupts import stop_by_interrupt
     from ppafo.storage.comma_separated import write_csv
 
     wire = open_port(port, baud, listens=True)

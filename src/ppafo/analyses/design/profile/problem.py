@@ -21,7 +21,7 @@ from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
-from ppafo.storage.result_folder import read_recording
+from ppafo.storage.reading import read_recording
 from ppafo.units import parse_quantity, split_quantity
 
 _TORQUE = "N m"
