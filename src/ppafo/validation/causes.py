@@ -33,7 +33,7 @@ _TIMES = {
     "milliseconds read as seconds": (1.0e3, "ms"),
     "seconds read as milliseconds": (1.0e-3, "s"),
 }
-"""Clock rate [-] by which misread times are corrected, and the correct unit, for cause mistake."""
+"""Clock rate [-] by which misread times are corrected, and the correct unit, for each mistake."""
 
 _LESS = 0.5
 """Fraction of an error above its limit [-] that may remain if times in another unit explain the error."""
@@ -57,7 +57,7 @@ class ResidualCause:
 
     ``in_words`` describes the cause in a message. ``gain`` is its gain G [-] in explained error (see ``search.py``).
     ``left`` is the largest RMS error of any channel divided by its noise [-] under the cause. ``numbers`` has the
-    changed parameters by path, cause a value with its SI unit. ``is_usual`` is true if the error is within the usual
+    changed parameters by path, each a value with its SI unit. ``is_usual`` is true if the error is within the usual
     error of sensors. ``is_of_samples`` is true for faulty samples, which are visible without a model. ``same`` are
     other causes that the recordings cannot distinguish from this one.
     """
@@ -150,7 +150,7 @@ def causes_of(
 def _units_of_moving(
     read: Sequence[MeasuredRecording], agreements: Sequence[RecordingAgreement], device: Device
 ) -> dict[str, set[str]]:
-    """Return the units that files declare for cause moving channel (an empty text if undeclared).
+    """Return the units that files declare for each moving channel (an empty text if undeclared).
 
     A channel moves if it departs, measured or modelled, from atmospheric pressure by more than the usual zero error.
     """
