@@ -49,8 +49,8 @@ def check_flow(evidence: Evidence) -> Iterator[AuditFinding]:
                     f"{evidence.in_set_unit(area_path, flow.area)}, reported is {reported}: a factor "
                     f"{flow.predicted / flow.measured:.3g}. Would be consistent with Cd A = "
                     f"{1e6 * consistent:.4g} mm^2, that is Cd = {consistent / flow.area:.3g} with the reported "
-                    f"area, or {evidence.in_set_unit(area_path, consistent / flow.coefficient)} with the reported Cd; or with "
-                    f"{evidence.in_set_unit(flow_path, flow.predicted)} as the flow."
+                    f"area, or {evidence.in_set_unit(area_path, consistent / flow.coefficient)} with the reported "
+                    f"Cd; or with {evidence.in_set_unit(flow_path, flow.predicted)} as the flow."
                 ),
             )
     yield from _check_shared_coefficient(evidence, flows)
