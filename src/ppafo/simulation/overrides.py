@@ -45,9 +45,9 @@ def apply_overrides(
     """Return a changed copy of a document; ``file`` is the document's name in messages.
 
     Naming another kind of motion, controller, timing or profile drops the settings of the document that only the old
-    kind has; giving a rate drops its period, and vice versa. A gain on the torque may omit its unit. Raises
-    ScenarioError for a path that is neither ``declared`` nor of the device, and for an override that another one makes
-    useless.
+    kind has; giving a rate drops its period, and vice versa. A gain on the torque, or one of 0, may omit its unit.
+    Raises ScenarioError for a path that is neither ``declared`` nor of the device, and for an override that another one
+    makes useless.
     """
     override_at = override_set(overrides, ScenarioError, declared.same)
     if _VALVE in override_at:
@@ -208,10 +208,12 @@ def _set(document: dict[str, Any], path: str, text: str, file: str, declared: De
         except ValueError as error:
             raise ScenarioError(f"override '{path}={text}': must be a whole number") from error
         return
-    # Papers print gains on the torque without units, so one without gets its SI unit.
+    # Papers print gains on the torque without units, so one without gets its SI unit; 0 is the same in any unit.
     quantity = declared.quantities(document).get(path)
-    is_gain = quantity is not None and path.startswith("controller.") and "(N m" in quantity.unit
-    table[name] = f"{text} {quantity.unit}" if quantity is not None and is_gain and _NUMBER.fullmatch(text) else text
+    is_bare = quantity is not None and path.startswith("controller.") and _NUMBER.fullmatch(text)
+    if quantity is not None and is_bare and ("(N m" in quantity.unit or ("/" in quantity.unit and float(text) == 0.0)):
+        text = f"{text} {quantity.unit}"
+    table[name] = text
 
 
 def _setting_names(document: dict[str, Any], section: str, declared: DeclaredContent) -> frozenset[str]:
