@@ -95,10 +95,9 @@ def rig_record(
         is_broken = bool(link.failure)
     finally:
         link.close()
-    code = (
-        output.EXIT_INTERRUPTED if collected.is_stopped else output.EXIT_CHECK_FAILED if is_broken else output.EXIT_GOOD
-    )
-    aside = f"stopped; {out} is whole" if collected.is_stopped else ""
+    code, aside = output.EXIT_CHECK_FAILED if is_broken else output.EXIT_GOOD, ""
+    if collected.is_stopped:
+        code, aside = output.EXIT_INTERRUPTED, f"stopped; {out} is whole"
     document = {"file": str(out), **collected.document()}
     return output.CommandOutput(f"{collected.text()}\nwritten: {out}", document, exit_code=code, aside=aside)
 
