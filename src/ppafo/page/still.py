@@ -64,11 +64,8 @@ def still_of(
     # The colours that the page gives to configurations: to a valve its own, once, to others what is left.
     looks = [program["look"] for program in programs]
     unused = [number for number in range(1, len(PAGE_COLOURS) + 1) if number not in looks]
-    has_own_colour = [look and looks.index(look) == index for index, look in enumerate(looks)]
-    colours = [
-        PAGE_COLOURS[(look if is_own else unused.pop(0)) - 1]
-        for look, is_own in zip(looks, has_own_colour, strict=True)
-    ]
+    numbers = [look if look and looks.index(look) == index else unused.pop(0) for index, look in enumerate(looks)]
+    colours = [PAGE_COLOURS[number - 1] for number in numbers]
     label = f"{_NAMES[channel]} ({axis_unit(quantity)})"
     parts = _frame(axes, label)
     parts += [
