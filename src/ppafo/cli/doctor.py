@@ -25,7 +25,7 @@ FORMATS: dict[str, str] = {
     "rig": "ppafo.rig.preset",
     "gait": "ppafo.gait.document",
     "gait-map": "ppafo.gait.recorded.mapping",
-    "bottle": "ppafo.parameters.bottles.bottle",
+    "bottle": "ppafo.parameters.bottles.declaration",
     "publication": "ppafo.parameters.publications.publication",
 }
 """Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""

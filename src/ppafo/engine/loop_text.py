@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import FunctionType
 from typing import Any, get_type_hints
 
-from ppafo.engine.composer import RewrittenNames
+from ppafo.engine.composer import Composer, FunctionNames
 from ppafo.engine.entries import ARRAY_2D, ARRAY_3D, FLOAT, HEADER, INT, entry_text, indent, parse_expression
 from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, VECTOR
@@ -43,7 +43,7 @@ class LoopText:
         assert isinstance(function, FunctionType), "it is no other callable"
         self.reduction = Reduction(self.step, function, known or {})
         local = frozenset({*function.__code__.co_varnames, *HISTORIES, "record", *self.rows.arrays})
-        self.composer = self.step.composer(function, RewrittenNames(local, self.step.kept, {"now": Now}))
+        self.composer = Composer(function, self.step, FunctionNames(local, local, self.step.kept, {"now": Now}))
         self.other = LoopText(dict(others), function) if others else None
 
     def lines(self) -> list[ast.stmt]:

@@ -97,8 +97,8 @@ class FunctionCollector(Protocol):
     def handed_to(self, name: str) -> tuple[str, ...]:
         """Return the names passed to a function of the module before its own arguments."""
 
-    def note_read(self, scope: Mapping[str, Any], name: str) -> None:
-        """Record that a name was looked up."""
+    def note_read(self, scope: Mapping[str, Any], name: str, value: Any) -> None:
+        """Record a name that was looked up, and its value."""
 
 
 _COMPREHENSIONS = ast.GeneratorExp | ast.ListComp | ast.SetComp | ast.DictComp
@@ -243,11 +243,11 @@ class Reduction:
         """Record the outside names in an expression, including module attributes; the text depends on their values."""
         for inner in ast.walk(node):
             if isinstance(inner, ast.Name) and inner.id in self.scope and inner.id not in self.known:
-                self.collector.note_read(self.scope, inner.id)
+                self.collector.note_read(self.scope, inner.id, self.scope[inner.id])
             if isinstance(inner, ast.Attribute) and isinstance(inner.value, ast.Name):
                 owner = self.scope.get(inner.value.id)
                 if isinstance(owner, types.ModuleType) and hasattr(owner, inner.attr):
-                    self.collector.note_read(vars(owner), inner.attr)
+                    self.collector.note_read(vars(owner), inner.attr, getattr(owner, inner.attr))
 
     def written(self, value: Any) -> ast.expr:
         """Return an expression for a known value."""

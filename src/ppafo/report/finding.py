@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ppafo.documents.json_text import json_text, plain
+from ppafo.errors import ArgumentError
 from ppafo.report.kind import PLAIN, ConfidenceInterval, Kind
 from ppafo.report.notebook import shown
 from ppafo.report.panels import Panel, draw_panels
@@ -236,12 +237,16 @@ class Finding(Generic[T_co]):
 
     @in_units(_units_of)
     def plot(self, name: str | None = None) -> "matplotlib.figure.Figure":
-        """Return a figure of the report by name, by default the first; raises LookupError for an unknown name."""
+        """Return a figure of the report by name, by default the first; raises ArgumentError if there is none."""
         figures = self.figures
         chosen = figures.get(name or next(iter(figures), ""))
         drawn = None if chosen is None else chosen.drawn(self.kind)
         if drawn is None or isinstance(drawn, bytes):
-            raise LookupError(f"there is no figure '{name or ''}'; available: {', '.join(figures) or 'none'}")
+            named = f"no figure '{name}'" if name else "no figure"
+            available = (
+                f": available are {', '.join(figures)}" if figures else ": print it, or save() its text and page"
+            )
+            raise ArgumentError(f"a result of '{self.name}' has {named}{available}")
         return shown(drawn)
 
     def save(self, folder: str | Path) -> None:

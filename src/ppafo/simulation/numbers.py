@@ -5,8 +5,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import fields, replace
 from typing import Any
 
+from ppafo.arguments.conversion import taken_number
 from ppafo.arguments.values import shown
-from ppafo.arguments.words import taken_number
 from ppafo.errors import ScenarioError
 from ppafo.model.catalog import VALVES, device_effects
 from ppafo.model.controlled import CONTROLLED

@@ -19,6 +19,7 @@ from ppafo.storage.owned_folder import (
     FolderKind,
     check_owned_folder,
     hashes_of,
+    marking_command,
     read_json,
     write_owned_folder,
 )
@@ -92,6 +93,12 @@ def read_stored(folder: str | Path) -> StoredResult:
     folder_path = Path(folder)
     if not folder_path.is_dir():
         raise DataError(f"{folder}: is not a folder")
+    if not (folder_path / RUN_FILE).is_file() and (folder_path / MARK).is_file():
+        command = marking_command(folder_path)
+        raise DataError(
+            f"{folder}: is a result of 'ppafo {command}', not of a run; 'ppafo export figure' draws what has a figure, "
+            "read_recording reads a file of it, and its JSON file has the numbers"
+        )
     document = read_document(folder_path)
     if sha256(read_bytes(folder_path / NETCDF_FILE)).hexdigest() != document["recording"].get("sha256"):
         # Refused before it is opened: the HDF5 library can hang on a damaged one.

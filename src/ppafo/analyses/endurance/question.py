@@ -72,7 +72,7 @@ def bottle(
         named_gas_uses,
     )
     from ppafo.arguments.door import argument_text
-    from ppafo.arguments.words import units_given
+    from ppafo.arguments.reading import units_given
     from ppafo.errors import ParameterError
     from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
     from ppafo.signals import Recording

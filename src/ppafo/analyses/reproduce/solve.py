@@ -24,7 +24,7 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import OF_A_VANE
 from ppafo.simulation.document import value_at
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.overrides import apply_overrides, chosen_by, is_of_device, unknown_value
+from ppafo.simulation.overrides import apply_overrides, deciding_kinds, is_of_device, unknown_value
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
 from ppafo.wording import count_of
@@ -304,7 +304,7 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
             for name, earlier in applied.items()
         }
         known = tuple(dict.fromkeys(known for document in documents.values() for known in OF_A_VANE.paths(document)))
-        if path not in known and not is_of_device(path) and not chosen_by(path, kinds):
+        if path not in known and not is_of_device(path) and not deciding_kinds(path, kinds):
             raise unknown_value(by_path[path], known, f"{', '.join(EXPERIMENTS)} have")
         # A scenario that has a section for the value; the device is in all of them.
         section = path.rpartition(".")[0]

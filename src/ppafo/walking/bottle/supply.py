@@ -10,7 +10,8 @@ from ppafo.errors import ParameterError, ScenarioError, refused_as
 from ppafo.model.cold_gas import Isobar, SupplyNow, SupplyState, following_rates, isobar, supply_now
 from ppafo.model.declaration import Quantity
 from ppafo.model.source import content_energy, densest_gas, has_liquid, liquid_density
-from ppafo.parameters.bottles.bottle import PATHS, Bottle, is_of_catalogue, load_bottle
+from ppafo.parameters.bottles.bottle import Bottle, is_of_catalogue, load_bottle
+from ppafo.parameters.bottles.declaration import PATHS
 from ppafo.parameters.device import Device
 from ppafo.parameters.parameter_set import Entry
 from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL
