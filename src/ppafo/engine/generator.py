@@ -60,7 +60,7 @@ class StepText:
     parameters: dict[str, Any] = field(init=False)
     of_step: dict[str, Any] = field(init=False)
     composed: dict[FunctionType, ComposedFunction] = field(default_factory=dict)
-    kept: dict[str, Any] = field(default_factory=dict)
+    placeholders: dict[str, Any] = field(default_factory=dict)
     given: set[str] = field(default_factory=set)
     """Groups of a step set by any phase so far, in the order of the loop."""
 
@@ -166,7 +166,7 @@ class StepText:
         for function, tree in reduced:
             check_grammar(tree, function.__code__.co_filename)
             names = frozenset([*local, *takes])
-            composer = Composer(function, self, FunctionNames(names, names, self.kept, {}))
+            composer = Composer(function, self, FunctionNames(names, names, self.placeholders, {}))
             found += [composer.visit(statement) for statement in tree.body]
         return found
 
@@ -190,7 +190,7 @@ class StepText:
             results: list[ast.expr] = [ast.Name(name, ast.Load()) for name in effects.results]
             value: ast.expr = results[0] if len(results) == 1 else ast.Tuple(results, ast.Load())
             if len(results) > 1:
-                value = ast.Call(reduction.kept(self._result_row(function, tuple(effects.results))), results, [])
+                value = ast.Call(reduction.placeholder(self._result_row(function, tuple(effects.results))), results, [])
             tree.body = [*tree.body, ast.copy_location(ast.Return(value), tree)]
         elif effects.results:
             raise reduction.refuse(tree, f"'{function.__name__}' gives a value and sets groups of its lane")
@@ -219,7 +219,7 @@ class StepText:
         # A local name may be that of a group which this function does not ask for.
         rows = {name: kind for name, kind in self.rows.items() if name in groups}
         names = frozenset(local)
-        composer = Composer(function, self, FunctionNames(names, names, self.kept, rows))
+        composer = Composer(function, self, FunctionNames(names, names, self.placeholders, rows))
         tree.returns, tree.decorator_list = None, []
         tree.body = [composer.visit(statement) for statement in tree.body]
         ast.fix_missing_locations(tree)

@@ -178,14 +178,15 @@ def start_meters(parts: Program, lane: Lane, elapsed: float, index: int, interva
 
 
 def update_meters(parts: Program, lane: Lane, elapsed: float, index: int, interval: float) -> None:
-    """Update every meter with one more sample; meters of motion are skipped for a locked vane."""
+    """Update every meter with one more sample; meters of motion keep their first state for a locked vane."""
     sample_with_summary(parts, lane, elapsed, index, interval)
-    for group, kind in parts.moving_meters.items():
-        lane[group] = kind.update(lane[group], lane.course, lane.sample)
+    for group, kind in parts.meter_groups.items():
+        if not (parts.is_locked and kind.of_motion):
+            lane[group] = kind.update(lane[group], lane.course, lane.sample)
 
 
 def store_trace(parts: Program, lane: Lane, elapsed: float, index: int, interval: float, slot: int) -> None:
     """Write the traced channels of the present sample to ``slot`` of the ring buffer of traces."""
     make_sample(parts, lane, elapsed, index, interval)
-    for row, path in parts.traced_paths.items():
-        lane.trace[slot, row] = lane[path]
+    for row, name in enumerate(parts.traced):
+        lane.trace[slot, row] = lane[parts.traces.get(name, name)]
