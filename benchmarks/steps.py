@@ -78,11 +78,11 @@ def steps_of_run(scenario: str, folder: Path) -> list[dict[str, Any]]:
     step("run", lambda: sys.modules["ppafo.simulation.simulate"].simulate(state["scenario"]))
     result = state["run"]
     step("imports to draw", importlib.import_module("ppafo.report.drawing").load_drawing)
-    step("figure", lambda: load("ppafo.report.recording_figure")[0].figure_files(result.plot()))
-    answer = command._answer(result, None)
-    drawn = {command.FIGURE: state["figure"][f"{command.FIGURE}.svg"]}
-    step("page, the part that simulates included", lambda: load("ppafo.report.writing")[0].page_of(answer, drawn))
-    step("files", lambda: result.save(folder, {**state["figure"], "report.html": state[found[-1]["step"]]}))
+    finding = command.finding_of(command.assessed(result, False))
+    step(
+        "figure and page, the part that simulates included", lambda: load("ppafo.report.finding")[0].page_files(finding)
+    )
+    step("files", lambda: result.save(folder, state[found[-1]["step"]]))
     return found
 
 

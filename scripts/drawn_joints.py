@@ -284,7 +284,7 @@ def judge(result: Result, only_switches: bool) -> str:
 
 def printed_remedy(sentence: str) -> list[str]:
     """Overrides of the remedy that a sentence prints as tried; none where it prints none."""
-    found = re.search(r"; with (.*) it does, as a further run shows", sentence)
+    found = re.search(r"; with (.*) it follows, as a further run shows", sentence)
     return [] if found is None else [text.replace(" = ", "=", 1) for text in re.findall(r"`([^`]*)`", found[1])]
 
 

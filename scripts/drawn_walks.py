@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.control.walking import observer
-from ppafo.control.walking.observer import NominalDevice
+from ppafo.control.walking.nominal_device import NominalDevice, volumes
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.errors import ScenarioError
 from ppafo.model import contact as ground
@@ -284,7 +284,7 @@ def residual_peaks(result: WalkResult) -> tuple[np.ndarray, np.ndarray]:
     period = result.scenario.controller.period
     every = round(period / float(time[1] - time[0]))
     seen = list(zip(*(data[name][::every].tolist() for name in ("angle", "pressure_1", "pressure_2")), strict=True))
-    means = observer.volumes(nominal, 0.5 * (nominal.nominal_angle_min + nominal.nominal_angle_max))
+    means = volumes(nominal, 0.5 * (nominal.nominal_angle_min + nominal.nominal_angle_max))
     state, shares = observer.START, []
     feeds = (nominal.nominal_supply_pressure, nominal.nominal_dorsiflexion_pressure)
     for last, now, command in zip(seen, seen[1:], data["command"][::every].tolist(), strict=False):
@@ -295,17 +295,16 @@ def residual_peaks(result: WalkResult) -> tuple[np.ndarray, np.ndarray]:
         state = observer.next_observer(
             nominal, state._replace(command=command), last[0], last[1], last[2], now[0], now[1], now[2], period
         )
-        chambers, volumes = (state.chamber_1, state.chamber_2), observer.volumes(nominal, now[0])
-        shares.append(
-            [
-                observer.contradiction(
-                    nominal, chamber.passed, volume, mean, measured, chamber.pressure, is_fed, supply
-                )
-                for chamber, measured, volume, mean, supply, is_fed in zip(
-                    chambers, now[1:], volumes, means, feeds, fed, strict=True
-                )
-            ]
-        )
+        row = []
+        for number, (chamber, volume) in enumerate(
+            zip((state.chamber_1, state.chamber_2), volumes(nominal, now[0]), strict=True)
+        ):
+            supplying = observer.Supplying(0.0, 0.0, 1.0 if fed[number] else 0.0, feeds[number], feeds[number])
+            reading = observer.ChamberReading(
+                last[1 + number], now[1 + number], volume, volume, mean_volume=means[number]
+            )
+            row.append(observer.contradiction(nominal, chamber.passed, supplying, reading, chamber.pressure))
+        shares.append(row)
     lasts = np.lib.stride_tricks.sliding_window_view(np.array(shares), int(observer.ALARM_SAMPLES), axis=0).min(axis=2)
     begins = time[::every][1 : len(lasts) + 1]
     in_air = data["contact"] == ground.SWING

@@ -22,7 +22,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import ppafo
 from ppafo.cli.verbs.device import sets_audit
 from ppafo.errors import PpafoError
-from ppafo.storage import read_recording, read_stored
+from ppafo.storage import read_stored
+from ppafo.storage.reading import read_recording
 from tests.contract.test_files_run_no_code import STUDY, text_of
 from tests.contract.test_hostile_documents import LOADERS
 

@@ -37,7 +37,7 @@ from ppafo.gym.world import TARGETS
 from ppafo.loading import load_scenario
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.page.content import page_content, program_content
-from ppafo.page.wasm import description_of
+from ppafo.page.wasm.description import description_of
 from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import check_columns

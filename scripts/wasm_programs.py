@@ -57,7 +57,8 @@ def shipped_programs() -> dict[str, bytes]:
     """Files of the programs and of their index, built from the physics as it is now; two runs may share a program."""
     programs, contents = {}, {}
     for name in shipped():
-        text = wasm.source_of(library_of(load_scenario(name)))
+        library = library_of(load_scenario(name))
+        text = wasm.source_of(library, wasm.compose(library))
         digest = wasm.digest_of(text)
         if digest not in programs:
             programs[digest] = f"{name}.wasm"
@@ -82,13 +83,21 @@ def write(is_check: bool) -> int:
 
 
 def keys_of(names: Iterable[str]) -> dict[str, Any]:
-    """Digests of the texts of scenarios and walks, with the files and values of the loaded package as they are now."""
-    digests, key = {}, None
+    """Digests of the texts of scenarios and walks, with the files and values of the loaded package as they are now.
+
+    By description, which finds a shipped scenario at once, and by outline, which finds it with other settings.
+    """
+    digests: dict[str, str] = {}
+    key = None
     for name in names:
         scenario = load_scenario(name)
         key = package_key(scenario, wasm.WRITTEN_BY)
         assert key is not None, f"{name} is made of functions of the package alone"
-        digests[wasm.short_digest(key.described)] = wasm.digest_of(wasm.source_of(library_of(scenario)))
+        library = library_of(scenario)
+        composed = wasm.compose(library)
+        digest = wasm.digest_of(wasm.source_of(library, composed))
+        outline = wasm.outline_of_unit(library, composed)
+        digests |= dict.fromkeys(map(wasm.short_digest, (key.described, outline)), digest)
     assert key is not None, "there is a scenario"
     return {"files": key.files, "values": dict(sorted(key.values.items())), "digests": digests}
 

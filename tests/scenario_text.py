@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ppafo.errors import ScenarioError
 from ppafo.parameters.overrides import read_overrides
-from ppafo.simulation.building import ScenarioRequest
+from ppafo.simulation.document import ScenarioRequest
 from ppafo.simulation.loading import FILE, VANE, scenario_of
 from ppafo.simulation.scenario import Scenario
 

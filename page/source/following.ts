@@ -127,7 +127,7 @@ interface TorqueLoop {
   readonly late: number;
 }
 
-/** The torque loop of a vane, as `ppafo.simulation.torque_loop` has it. The order of operations is the package's. */
+/** The torque loop of a vane, as `ppafo.simulation.default_gains` has it. The order of operations is the package's. */
 function torqueLoop({ at, has }: Numbers): TorqueLoop {
   const [lowest, highest] = [at("actuator.angle_min"), at("actuator.angle_max")];
   const inside = Math.min(Math.max(RIGHT_ANGLE, lowest + INSIDE), highest - INSIDE);
@@ -151,15 +151,15 @@ const torqueInDeadTime = ({ rate, late }: TorqueLoop) => Math.max(rate * late, L
 
 /** Gains that follow the torque loop of a vane; of another actuator the page knows none, and they stay as they are. */
 const LOOP_RULES: Readonly<Record<string, (loop: TorqueLoop, numbers: Numbers) => number>> = {
-  "torque_loop.proportional_gain_of_device": (loop) => 0.5 / torqueInDeadTime(loop),
-  "torque_loop.integral_rate_of_device": ({ late }) => 0.125 / late,
-  "torque_loop.integral_gain_of_device": ({ late }, { setting }) => setting * (0.125 / late),
-  "torque_loop.boundary_layer_of_device": (loop) => 2 * torqueInDeadTime(loop),
-  "torque_loop.convergence_rate_of_device": ({ late }) => 0.5 / late,
-  "torque_loop.lead_of_device": ({ late }) => USUAL_LEAD + late,
-  "torque_loop.torque_rate_of_device": ({ rate }) => rate,
-  "torque_loop.dead_time_of_device": ({ late }) => late,
-  "torque_loop.dead_zone_opening_of_device": (loop, { at, has, setting }) => {
+  "default_gains.proportional_gain_of_device": (loop) => 0.5 / torqueInDeadTime(loop),
+  "default_gains.integral_rate_of_device": ({ late }) => 0.125 / late,
+  "default_gains.integral_gain_of_device": ({ late }, { setting }) => setting * (0.125 / late),
+  "default_gains.boundary_layer_of_device": (loop) => 2 * torqueInDeadTime(loop),
+  "default_gains.convergence_rate_of_device": ({ late }) => 0.5 / late,
+  "default_gains.lead_of_device": ({ late }) => USUAL_LEAD + late,
+  "default_gains.torque_rate_of_device": ({ rate }) => rate,
+  "default_gains.dead_time_of_device": ({ late }) => late,
+  "default_gains.dead_zone_opening_of_device": (loop, { at, has, setting }) => {
     const opening = Math.min(LARGEST_OPENING, setting / torqueInDeadTime(loop));
     return has("valve.dead_band") ? at("valve.dead_band") + (1 - at("valve.dead_band")) * opening : opening;
   },

@@ -14,8 +14,8 @@ from ppafo.analyses.linearise.model import LinearModel as LinearModel
 from ppafo.analyses.linearise.question import linearise as linearise
 from ppafo.analyses.parts.answer import Parts as Parts
 from ppafo.analyses.parts.question import parts as parts
-from ppafo.analyses.reproduce.answer import Reproduction as Reproduction
 from ppafo.analyses.reproduce.question import reproduce as reproduce
+from ppafo.analyses.reproduce.result import Reproduction as Reproduction
 from ppafo.analyses.sensitivity.question import sensitivity as sensitivity
 from ppafo.analyses.sets.audit import audit as audit
 from ppafo.analyses.sweep.answer import load_study_results as load_study_results
@@ -66,7 +66,7 @@ from ppafo.simulation.loading import list_scenarios as list_scenarios
 from ppafo.simulation.scenario import Scenario as Scenario
 from ppafo.simulation.simulate import Result as Result
 from ppafo.simulation.simulate import Status as Status
-from ppafo.storage import read_recording as read_recording
+from ppafo.storage.reading import read_recording as read_recording
 from ppafo.studies.loading import list_studies as list_studies
 from ppafo.studies.loading import load_study as load_study
 from ppafo.version import __version__ as __version__

@@ -17,8 +17,7 @@ from ppafo.parameters.overrides import read_overrides
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import loading as of_vanes
 from ppafo.simulation import schema
-from ppafo.simulation.building import ScenarioRequest
-from ppafo.simulation.document import kind_at
+from ppafo.simulation.document import ScenarioRequest, kind_at
 from ppafo.simulation.motion_kind import is_walk
 from ppafo.simulation.overrides import over_layer
 from ppafo.simulation.scenario import Scenario
@@ -153,24 +152,11 @@ def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a scenario file, for a vane alone or for a leg that walks."""
     from ppafo.walking import declaration as of_walks
 
-    forms = {"vane": schema.json_schema(), "walk": of_walks.json_schema()}
-    parts: dict[str, Any] = {}
-    for name, form in forms.items():
-        # Both have definitions of the same names: each gets the name of its form before it.
-        own = _with_references(form, f"{_DEFINITIONS}{name}.")
-        inner = own.pop("$defs")
-        parts |= {name: own} | {f"{name}.{part}": described for part, described in inner.items()}
-    return {"title": "ppafo scenario", "anyOf": [{"$ref": f"#/$defs/{name}"} for name in forms], "$defs": parts}
-
-
-_DEFINITIONS = "#/$defs/"
-
-
-def _with_references(node: Any, to: str) -> Any:
-    """Copy of a part of a JSON Schema whose references to definitions start with ``to``."""
-    if isinstance(node, dict):
-        return {key: _with_references(value, to) for key, value in node.items()}
-    if isinstance(node, list):
-        return [_with_references(value, to) for value in node]
-    is_reference = isinstance(node, str) and node.startswith(_DEFINITIONS)
-    return f"{to}{node.removeprefix(_DEFINITIONS)}" if is_reference else node
+    definitions: dict[str, Any] = {}
+    for form, describe in (("vane", schema.json_schema), ("walk", of_walks.json_schema)):
+        # Both forms have definitions of the same names: each name begins with that of its form.
+        described = describe(f"#/$defs/{form}.{{model}}")
+        definitions |= {f"{form}.{name}": definition for name, definition in described.pop("$defs").items()}
+        definitions[form] = described
+    forms = [{"$ref": "#/$defs/vane"}, {"$ref": "#/$defs/walk"}]
+    return {"title": "ppafo scenario", "anyOf": forms, "$defs": definitions}

@@ -7,8 +7,7 @@ from ppafo.arguments import checked
 from ppafo.metrics import Metric
 from ppafo.metrics import evaluate as of_recording
 from ppafo.signals import Recording
-from ppafo.storage import read_recording
-from ppafo.storage.result_folder import ColumnsLike
+from ppafo.storage.reading import ColumnsLike, read_recording
 
 if TYPE_CHECKING:
     from pandas import DataFrame  # type: ignore[import-untyped]

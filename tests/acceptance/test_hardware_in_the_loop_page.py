@@ -15,7 +15,7 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.storage import read_recording
+from ppafo.storage.reading import read_recording
 from tests.virtual_wire import free_port, sending_bench
 
 DOCS = Path(__file__).parents[2] / "docs"

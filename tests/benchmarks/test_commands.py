@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks import __main__ as speed
 from ppafo.cli.main import main as package
-from ppafo.storage.result_folder import MARK
+from ppafo.storage.owned_folder import MARK
 
 Command = Callable[[Sequence[str]], int]
 COMMANDS: dict[str, tuple[Command, list[str], str]] = {

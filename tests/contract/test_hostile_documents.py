@@ -22,11 +22,12 @@ from ppafo.identification.problem import load_problem
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parts import load_catalogue
-from ppafo.rig.experiments import check_rig_folder
+from ppafo.rig.folder import check_rig_folder
 from ppafo.rig.preset import load_preset
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.storage.column_map import load_column_map
-from ppafo.storage.result_folder import read_document, read_recording
+from ppafo.storage.reading import read_recording
+from ppafo.storage.result_folder import read_document
 from ppafo.studies.loading import load_study
 from ppafo.walking.loading import load_walk
 from ppafo.walking.task_sequence import load_task_sequence

@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import main
-from ppafo.storage.result_folder import MARK
+from ppafo.storage.owned_folder import MARK
 from tests.virtual_wire import free_port, sending_bench
 
 FOLDERS: dict[str, list[str]] = {

@@ -21,8 +21,9 @@ from ppafo.cli import output
 from ppafo.cli.command_line import Command, CommandGroup, option_of, parameters_of
 from ppafo.cli.commands import COMMANDS, OTHERS
 from ppafo.cli.main import build_parser, main
-from ppafo.exports.hil.wire import DEFAULT_BAUD, RATE
-from ppafo.validation.agreement import DEFAULT_LIMIT
+from ppafo.exports.hil.ports import DEFAULT_BAUD
+from ppafo.exports.hil.wire import RATE
+from ppafo.validation.settings import DEFAULT_LIMIT
 from tests.page_code import block_with, write_package
 
 VERBS: dict[str, Command] = {

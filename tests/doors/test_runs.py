@@ -15,7 +15,7 @@ from ppafo.measuring import evaluate
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.ensemble.running import offered
-from ppafo.storage import read_recording
+from ppafo.storage.reading import read_recording
 from tests.doors.of_python import (
     answer_of,
     assert_near_metrics,

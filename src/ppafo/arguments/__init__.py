@@ -1,6 +1,15 @@
 """Arguments: one signature defines both the command line and the checks of Python calls."""
 
 from ppafo.arguments.door import checked as checked
+from ppafo.arguments.reading import counting_number as counting_number
+from ppafo.arguments.reading import fraction as fraction
+from ppafo.arguments.reading import minutes as minutes
+from ppafo.arguments.reading import number as number
+from ppafo.arguments.reading import point as point
+from ppafo.arguments.reading import quantity as quantity
+from ppafo.arguments.reading import task as task
+from ppafo.arguments.reading import times as times
+from ppafo.arguments.reading import whole_number as whole_number
 from ppafo.arguments.words import Angle as Angle
 from ppafo.arguments.words import Confidence as Confidence
 from ppafo.arguments.words import Count as Count
@@ -35,12 +44,3 @@ from ppafo.arguments.words import Torque as Torque
 from ppafo.arguments.words import Volume as Volume
 from ppafo.arguments.words import Whole as Whole
 from ppafo.arguments.words import Word as Word
-from ppafo.arguments.words import counting_number as counting_number
-from ppafo.arguments.words import fraction as fraction
-from ppafo.arguments.words import minutes as minutes
-from ppafo.arguments.words import number as number
-from ppafo.arguments.words import point as point
-from ppafo.arguments.words import quantity as quantity
-from ppafo.arguments.words import task as task
-from ppafo.arguments.words import times as times
-from ppafo.arguments.words import whole_number as whole_number

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
 
-from ppafo.arguments.values import Taken, annotated_parameters, shown, taken
+from ppafo.arguments.values import AcceptedValues, accepted_values, annotated_parameters, shown
 from ppafo.errors import ArgumentError, PpafoError
 from ppafo.wording import nearest_name
 
@@ -27,7 +27,7 @@ class _Parameter(NamedTuple):
     """Parameter of a checked function: its default (``inspect.Parameter.empty`` for none) and its accepted values."""
 
     default: Any
-    taken: Taken
+    accepted: AcceptedValues
 
 
 _Reader = Literal["caller", "function", "command line"]
@@ -70,8 +70,8 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
         """Return the parameters by name, and the names of those that may be passed by position."""
         parameters = annotated_parameters(function)
         return (
-            {name: _Parameter(each.default, taken(each.annotation)) for name, each in parameters.items()},
-            tuple(name for name, each in parameters.items() if each.kind is each.POSITIONAL_OR_KEYWORD),
+            {name: _Parameter(item.default, accepted_values(item.annotation)) for name, item in parameters.items()},
+            tuple(name for name, item in parameters.items() if item.kind is item.POSITIONAL_OR_KEYWORD),
         )
 
     @functools.wraps(function)
@@ -95,44 +95,46 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 def _values(
     function: str,
     parameters: Mapping[str, _Parameter],
-    places: Sequence[str],
+    positional_names: Sequence[str],
     positional: Sequence[Any],
     by_name: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return the converted arguments of a call by name."""
-    if len(positional) > len(places):
-        left = [name for name in parameters if name not in places]
-        now = list(map(shown, positional[: len(places)]))
-        for value in positional[len(places) :]:
-            # The first of the names that are left whose parameter takes the value.
-            name = next((name for name in left if _takes(parameters[name], value)), left[0] if left else "...")
-            left = [other for other in left if other != name]
-            now.append(f"{name}={shown(value)}")
-        count = {1: "one argument"}.get(len(places), f"{len(places)} arguments")
-        raise ArgumentError(f"{function}() takes {count} by position: write {function}({', '.join(now)})")
-    given = dict(zip(places, positional, strict=False))
+    if len(positional) > len(positional_names):
+        raise _too_many_positional(function, parameters, positional_names, positional)
+    values = dict(zip(positional_names, positional, strict=False))
     for name, value in by_name.items():
         if name not in parameters:
             hint = nearest_name(name, parameters)
             raise ArgumentError(f"{function}() has no argument '{name}'{hint}; it has {', '.join(parameters)}")
-        if name in given:
+        if name in values:
             raise ArgumentError(f"{function}(): {name} is given twice, by position and by name")
-        given[name] = value
-    missing = [name for name, each in parameters.items() if each.default is _EMPTY and name not in given]
+        values[name] = value
+    missing = [name for name, item in parameters.items() if item.default is _EMPTY and name not in values]
     if missing:
-        takes = "; ".join(f"{name} is {parameters[name].taken.what}" for name in missing)
-        raise ArgumentError(f"{function}() needs {' and '.join(missing)}: {takes}")
-    for name, value in given.items():
-        own = parameters[name]
-        if value is not own.default and not (value is None and own.taken.allows_none):
-            given[name] = own.taken.take(name, value)
-    return given
+        descriptions = "; ".join(f"{name} is {parameters[name].accepted.what}" for name in missing)
+        raise ArgumentError(f"{function}() needs {' and '.join(missing)}: {descriptions}")
+    for name, value in values.items():
+        parameter = parameters[name]
+        if value is not parameter.default and not (value is None and parameter.accepted.allows_none):
+            values[name] = parameter.accepted.take(name, value)
+    return values
 
 
-def _takes(parameter: _Parameter, value: Any) -> bool:
-    """Return True if a parameter accepts a value."""
-    try:
-        parameter.taken.take("", value)
-    except ArgumentError:
-        return False
-    return True
+def _too_many_positional(
+    function: str, parameters: Mapping[str, _Parameter], positional_names: Sequence[str], positional: Sequence[Any]
+) -> ArgumentError:
+    """Return the error that writes the call with names: for each further value the first parameter that accepts it."""
+    others = [name for name in parameters if name not in positional_names]
+    arguments = list(map(shown, positional[: len(positional_names)]))
+    for value in positional[len(positional_names) :]:
+        name = others[0] if others else "..."
+        for other in others:
+            with contextlib.suppress(ArgumentError):
+                parameters[other].accepted.take("", value)
+                name = other
+                break
+        others = [other for other in others if other != name]
+        arguments.append(f"{name}={shown(value)}")
+    count = "one argument" if len(positional_names) == 1 else f"{len(positional_names)} arguments"
+    return ArgumentError(f"{function}() takes {count} by position: write {function}({', '.join(arguments)})")

@@ -12,7 +12,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-from ppafo.arguments.words import Word, taken_document, taken_flag, taken_number, taken_text, taken_whole
+from ppafo.arguments.conversion import taken_document, taken_flag, taken_number, taken_text, taken_whole
+from ppafo.arguments.words import Word
 from ppafo.errors import ArgumentError
 from ppafo.wording import one_line
 
@@ -48,10 +49,13 @@ def annotated_parameters(function: Callable[..., Any]) -> Mapping[str, inspect.P
 
     A parameter of a user function without annotation keeps the empty one of ``inspect``.
     """
-    said = _annotations(function)
-    # As the function was written: a reader of help may be shown another signature.
-    parameters = inspect.signature(inspect.unwrap(function)).parameters.values()
-    return {each.name: each.replace(annotation=said.get(each.name, each.annotation)) for each in parameters}
+    annotations = _annotations(function)
+    # Of the function as written, since help displays another signature.
+    parameters = inspect.signature(inspect.unwrap(function)).parameters
+    return {
+        name: parameter.replace(annotation=annotations.get(name, parameter.annotation))
+        for name, parameter in parameters.items()
+    }
 
 
 def _annotations(function: Callable[..., Any]) -> Mapping[str, Any]:
@@ -78,20 +82,22 @@ def show_plainly(value: Any) -> None:
     function = vars(value)["__init__"] if dataclasses.is_dataclass(value) else value
     if not inspect.isfunction(function):
         return
-    said = {name: _Shown(_type_text(annotation)) for name, annotation in _annotations(function).items()}
+    types_shown = {name: _Shown(_type_text(annotation)) for name, annotation in _annotations(function).items()}
     signature = inspect.signature(function)
+    parameters = []
+    for name, parameter in signature.parameters.items():
+        default = parameter.default
+        # A function, or the factory of a field, has no text of its own.
+        if default is not parameter.empty and repr(default).startswith("<"):
+            default = _Shown(getattr(default, "__name__", "..."))
+        parameters.append(parameter.replace(annotation=types_shown.get(name, parameter.annotation), default=default))
     function.__signature__ = signature.replace(  # type: ignore[attr-defined]  # of all functions, says inspect
-        parameters=[
-            each.replace(annotation=said.get(name, each.annotation))
-            # A function, and what a field makes anew, have no text of their own.
-            if each.default is each.empty or not repr(each.default).startswith("<")
-            else each.replace(
-                annotation=said.get(name, each.annotation), default=_Shown(getattr(each.default, "__name__", "..."))
-            )
-            for name, each in signature.parameters.items()
-        ],
-        return_annotation=said.get("return", signature.return_annotation),
+        parameters=parameters, return_annotation=types_shown.get("return", signature.return_annotation)
     )
+
+
+_NAMES: Mapping[Any, str] = {types.NoneType: "None", ...: "..."}
+"""Display names of annotations whose Python name differs."""
 
 
 def _type_text(annotation: Any) -> str:
@@ -100,23 +106,19 @@ def _type_text(annotation: Any) -> str:
     if origin is Annotated:
         return _type_text(inner[0])
     if origin in (typing.Union, types.UnionType):
-        texts = dict.fromkeys(_type_text(each) for each in inner if each is not types.NoneType)
+        texts = dict.fromkeys(_type_text(item) for item in inner if item is not types.NoneType)
         return " | ".join([*texts, "None"] if types.NoneType in inner else texts)
     if origin is Literal:
         return " | ".join(map(repr, inner))
     if isinstance(annotation, list):
         return f"[{', '.join(map(_type_text, annotation))}]"
-    # What an array is made of says nothing that its docstring does not.
-    parts = [] if origin is None or origin.__module__ == "numpy" else [_type_text(each) for each in inner]
+    # The type parameters of an array are not displayed.
+    parameters = [] if origin is None or origin.__module__ == "numpy" else [_type_text(item) for item in inner]
     name = _NAMES.get(annotation) or getattr(origin or annotation, "__name__", str(annotation))
-    return f"{name}[{', '.join(parts)}]" if parts else str(name)
+    return f"{name}[{', '.join(parameters)}]" if parameters else str(name)
 
 
-_NAMES: Mapping[Any, str] = {types.NoneType: "None", ...: "..."}
-"""Display names of annotations whose Python name differs."""
-
-
-class Taken(NamedTuple):
+class AcceptedValues(NamedTuple):
     """Accepted values of a parameter: their description in messages, and their conversion to the function's value.
 
     ``take`` is called with the name of the value in messages and the value; it raises ArgumentError if unsuitable.
@@ -135,129 +137,6 @@ def shown(value: Any) -> str:
     return f"<{type(value).__name__}>"
 
 
-def taken(annotation: Any) -> Taken:
-    """Return the accepted values of a parameter with an annotation."""
-    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
-    if origin is Annotated:
-        # Python flattens nested annotations with the outermost last: that one has the last word.
-        word = next((item for item in reversed(inner[1:]) if isinstance(item, Word) and item.take), None)
-        if word is None or word.take is None:
-            return taken(inner[0])
-        own = _one(word.what, word.take)
-        is_repeated = _is_iterable(typing.get_origin(inner[0]))
-        return own if word.takes_all or not is_repeated else _several(own)
-    if origin in (typing.Union, types.UnionType):
-        return _either([taken(item) for item in inner if item is not types.NoneType], types.NoneType in inner)
-    if origin is Literal:
-        return _one(
-            " or ".join(map(repr, inner)), lambda value: _that_is(taken_text(value) in inner, taken_text(value))
-        )
-    if annotation is Any:
-        return Taken("anything", lambda _, value: value)
-    return _one(*_PLAIN[annotation]) if annotation in _PLAIN else _of_class(origin or annotation, inner)
-
-
-def _of_class(kind: type, inner: tuple[Any, ...]) -> Taken:
-    if issubclass(kind, Mapping):
-        is_document = inner[1] is Any
-        return _one("a dictionary with texts as its keys", taken_document) if is_document else _mapping(taken(inner[1]))
-    if inner and _is_iterable(kind):
-        return _several(taken(inner[0]))
-    if kind is typing.get_origin(Callable[..., Any]):
-        return _one("a function", lambda value: _that_is(callable(value), value))
-    return _one(f"a {kind.__name__}", lambda value: _that_is(_is_instance(kind, value), value))
-
-
-def _is_iterable(kind: Any) -> bool:
-    return isinstance(kind, type) and issubclass(kind, Iterable) and not issubclass(kind, str | bytes)
-
-
-def _is_instance(kind: type, value: Any) -> bool:
-    """Return True if a value is an instance of a class, which may be a placeholder for one not imported."""
-    is_named = issubclass(kind, _NotLoaded) and any(base.__name__ == kind.__name__ for base in type(value).__mro__)
-    return is_named or isinstance(value, kind)
-
-
-def _that_is(is_taken: bool, value: Any) -> Any:
-    """Return the value if ``is_taken`` accepts it; ValueError otherwise."""
-    if not is_taken:
-        raise ValueError
-    return value
-
-
-def _one(what: str, take: Callable[[Any], Any]) -> Taken:
-    def named(name: str, value: Any) -> Any:
-        try:
-            return take(value)
-        except ArgumentError as error:
-            raise ArgumentError(f"{name}: {error}") from None
-        except (ValueError, TypeError, OverflowError):
-            raise ArgumentError(f"{name}={shown(value)}: must be {what}{_at_hand(what, value)}") from None
-
-    return Taken(what, named)
-
-
-def _several(element: Taken) -> Taken:
-    """Return the converter of one or several values to a tuple; a single value counts as a list of one."""
-
-    def take(name: str, value: Any) -> Any:
-        # A table of pandas or xarray has keys as a dictionary has: it would be gone through by names of columns.
-        if isinstance(value, str | bytes | os.PathLike) or hasattr(value, "keys") or not isinstance(value, Iterable):
-            return (element.take(name, value),)
-        return tuple(element.take(f"{name}[{index}]", each) for index, each in enumerate(value))
-
-    return Taken(f"{element.what}{_SEVERAL}", take)
-
-
-def _mapping(element: Taken) -> Taken:
-    """Return the converter of a dictionary with text keys; it returns a copy with each value converted."""
-
-    def take(name: str, value: Any) -> dict[str, Any]:
-        if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
-            raise ArgumentError(f"{name}={shown(value)}: must be a dictionary with texts as its keys")
-        return {key: element.take(f"{name}[{key!r}]", each) for key, each in value.items()}
-
-    return Taken("a dictionary", take)
-
-
-def _either(kinds: list[Taken], allows_none: bool) -> Taken:
-    """Return the converter that applies the first suitable one of several converters."""
-    if len(kinds) == 1:
-        return kinds[0]._replace(allows_none=allows_none)
-    alone = _in_words([kind.what for kind in kinds if not kind.what.endswith(_SEVERAL)])
-    several = _in_words([kind.what.removesuffix(_SEVERAL) for kind in kinds if kind.what.endswith(_SEVERAL)])
-    what = f"{alone}, or several: {several}" if alone and several else f"{several}{_SEVERAL}" if several else alone
-    if alone == several:
-        what = f"{alone}{_SEVERAL}"
-
-    def take(name: str, value: Any) -> Any:
-        refused: list[ArgumentError] = []
-        for kind in kinds:
-            try:
-                return kind.take(name, value)
-            except ArgumentError as error:
-                refused.append(error)
-        # What is wrong inside one of several is said of that one.
-        inside = [error for error in refused if str(error).startswith(f"{name}[")]
-        raise inside[-1] if inside else ArgumentError(f"{name}={shown(value)}: must be {what}{_at_hand(what, value)}")
-
-    return Taken(what, take, allows_none)
-
-
-def _at_hand(what: str, value: Any) -> str:
-    """Return a hint at the attribute of a value, such as a result, that the parameter accepts; empty if none."""
-    names = [name for name in ("recording", "scenario") if f"a {name.capitalize()}" in what and hasattr(value, name)]
-    return f"; its '.{names[0]}' is one" if names else ""
-
-
-def _in_words(kinds: list[str]) -> str:
-    """Return a list of value descriptions as text: ``a name, a path or a Recording``; empty for no descriptions."""
-    *others, last = dict.fromkeys(kinds) or [""]
-    what = f"{', '.join(others)} or {last}" if others else last
-    # A text and a path are one way to name something.
-    return what.replace("a text, a path", "a name, a path").replace("a text or a path", "a name or a path")
-
-
 def _taken_path(value: Any) -> Path:
     """Return a Path; a text is left to the converter of names, which precedes this one wherever both are accepted."""
     path = Path(taken_text(os.fspath(value)))
@@ -274,3 +153,129 @@ _PLAIN: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
     Path: ("a path", _taken_path),
 }
 """Description and converter of each type without a ``Word``."""
+
+
+def accepted_values(annotation: Any) -> AcceptedValues:
+    """Return the accepted values of a parameter with an annotation."""
+    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin is Annotated:
+        # Python flattens nested annotations with the outermost last: that one has priority.
+        word = next((item for item in reversed(inner[1:]) if isinstance(item, Word) and item.take), None)
+        if word is None or word.take is None:
+            return accepted_values(inner[0])
+        values = _single(word.what, word.take)
+        is_repeated = _is_iterable(typing.get_origin(inner[0]))
+        return values if word.takes_all or not is_repeated else _several(values)
+    if origin in (typing.Union, types.UnionType):
+        return _either([accepted_values(item) for item in inner if item is not types.NoneType], types.NoneType in inner)
+    if origin is Literal:
+        return _single(
+            " or ".join(map(repr, inner)), lambda value: _accepted(taken_text(value), taken_text(value) in inner)
+        )
+    if annotation is Any:
+        return AcceptedValues("anything", lambda _, value: value)
+    return _single(*_PLAIN[annotation]) if annotation in _PLAIN else _of_class(origin or annotation, inner)
+
+
+def _of_class(kind: type, inner: tuple[Any, ...]) -> AcceptedValues:
+    if issubclass(kind, Mapping):
+        if inner[1] is Any:
+            return _single("a dictionary with texts as its keys", taken_document)
+        return _mapping(accepted_values(inner[1]))
+    if inner and _is_iterable(kind):
+        return _several(accepted_values(inner[0]))
+    if kind is typing.get_origin(Callable[..., Any]):
+        return _single("a function", lambda value: _accepted(value, callable(value)))
+    return _single(f"a {kind.__name__}", lambda value: _accepted(value, _is_instance(kind, value)))
+
+
+def _is_iterable(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, Iterable) and not issubclass(kind, str | bytes)
+
+
+def _is_instance(kind: type, value: Any) -> bool:
+    """Return True if a value is an instance of a class, which may be a placeholder for one not imported."""
+    is_named = issubclass(kind, _NotLoaded) and any(base.__name__ == kind.__name__ for base in type(value).__mro__)
+    return is_named or isinstance(value, kind)
+
+
+def _accepted(value: Any, is_accepted: bool) -> Any:
+    """Return the value if it is accepted; ValueError otherwise."""
+    if not is_accepted:
+        raise ValueError
+    return value
+
+
+def _single(what: str, take: Callable[[Any], Any]) -> AcceptedValues:
+    def named(name: str, value: Any) -> Any:
+        try:
+            return take(value)
+        except ArgumentError as error:
+            raise ArgumentError(f"{name}: {error}") from None
+        except (ValueError, TypeError, OverflowError):
+            raise ArgumentError(f"{name}={shown(value)}: must be {what}{_at_hand(what, value)}") from None
+
+    return AcceptedValues(what, named)
+
+
+def _several(element: AcceptedValues) -> AcceptedValues:
+    """Return the converter of one or several values to a tuple; a single value counts as a list of one."""
+
+    def take(name: str, value: Any) -> Any:
+        # A table of pandas or xarray has keys like a dictionary; iterating over it yields the names of its columns.
+        if isinstance(value, str | bytes | os.PathLike) or hasattr(value, "keys") or not isinstance(value, Iterable):
+            return (element.take(name, value),)
+        return tuple(element.take(f"{name}[{index}]", item) for index, item in enumerate(value))
+
+    return AcceptedValues(f"{element.what}{_SEVERAL}", take)
+
+
+def _mapping(element: AcceptedValues) -> AcceptedValues:
+    """Return the converter of a dictionary with text keys; it returns a copy with each value converted."""
+
+    def take(name: str, value: Any) -> dict[str, Any]:
+        if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+            raise ArgumentError(f"{name}={shown(value)}: must be a dictionary with texts as its keys")
+        return {key: element.take(f"{name}[{key!r}]", item) for key, item in value.items()}
+
+    return AcceptedValues("a dictionary", take)
+
+
+def _either(kinds: list[AcceptedValues], allows_none: bool) -> AcceptedValues:
+    """Return the converter that applies the first suitable one of several converters."""
+    if len(kinds) == 1:
+        return kinds[0]._replace(allows_none=allows_none)
+    alone = _in_words([kind.what for kind in kinds if not kind.what.endswith(_SEVERAL)])
+    several = _in_words([kind.what.removesuffix(_SEVERAL) for kind in kinds if kind.what.endswith(_SEVERAL)])
+    what = f"{alone}, or several: {several}" if alone and several else f"{several}{_SEVERAL}" if several else alone
+    if alone == several:
+        what = f"{alone}{_SEVERAL}"
+
+    def take(name: str, value: Any) -> Any:
+        errors: list[ArgumentError] = []
+        for kind in kinds:
+            try:
+                return kind.take(name, value)
+            except ArgumentError as error:
+                errors.append(error)
+        # An error of one of several values names this value.
+        of_items = [error for error in errors if str(error).startswith(f"{name}[")]
+        raise (
+            of_items[-1] if of_items else ArgumentError(f"{name}={shown(value)}: must be {what}{_at_hand(what, value)}")
+        )
+
+    return AcceptedValues(what, take, allows_none)
+
+
+def _at_hand(what: str, value: Any) -> str:
+    """Return a hint at the attribute of a value, such as a result, that the parameter accepts; empty if none."""
+    names = [name for name in ("recording", "scenario") if f"a {name.capitalize()}" in what and hasattr(value, name)]
+    return f"; its '.{names[0]}' is one" if names else ""
+
+
+def _in_words(kinds: list[str]) -> str:
+    """Return a list of value descriptions as text: ``a name, a path or a Recording``; empty for no descriptions."""
+    *others, last = dict.fromkeys(kinds) or [""]
+    what = f"{', '.join(others)} or {last}" if others else last
+    # In a list with a path, a text is a name.
+    return what.replace("a text, a path", "a name, a path").replace("a text or a path", "a name or a path")

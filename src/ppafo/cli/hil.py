@@ -46,10 +46,11 @@ def hil(
     ...
     ppafo.errors.ScenarioError: no controller answered within 0.2 s; received: nothing
     """
-    from ppafo.exports.hil.loop import LockStep, RealTime, stop_by_interrupt
+    from ppafo.exports.hil.pacing import LockStep, RealTime
     from ppafo.exports.hil.plant import check_baud, plant_of
+    from ppafo.exports.hil.ports import open_port
     from ppafo.exports.hil.run import run_plant
-    from ppafo.exports.hil.wire import open_port
+    from ppafo.interrupts import stop_by_interrupt
     from ppafo.loading import load_scenario
     from ppafo.storage import check_result_folder
 
@@ -89,8 +90,8 @@ def _said(ran: "HardwareRun", port: str, folder: Path) -> CommandOutput:
     from ppafo.documents.json_text import plain
     from ppafo.report.display_units import metrics_lines
 
-    result, exchange = ran.result, ran.exchange
-    ended = "stopped" if exchange.is_stopped else "vented" if exchange.vented else result.status.kind
+    result, traffic = ran.result, ran.traffic
+    ended = "stopped" if traffic.is_stopped else "vented" if traffic.vent_reason else result.status.kind
     lines = [
         f"{result.scenario.name} at {port}: {ended}",
         "",
@@ -109,10 +110,10 @@ def _said(ran: "HardwareRun", port: str, folder: Path) -> CommandOutput:
         "metrics": {name: plain(metric) for name, metric in result.metrics.items()},
         "folder": str(folder),
     }
-    if exchange.is_stopped:
-        aside = f"stopped at {exchange.vented_at:.6g} s and vented; {folder} is whole"
+    if traffic.is_stopped:
+        aside = f"stopped at {traffic.vented_at:.6g} s and vented; {folder} is whole"
         return CommandOutput(text, document, exit_code=EXIT_INTERRUPTED, aside=aside)
     if ran.is_good:
         return CommandOutput(text, document)
-    aside = f"{result.scenario.name}: {exchange.vented or result.status.message}"
+    aside = f"{result.scenario.name}: {traffic.vent_reason or result.status.message}"
     return CommandOutput(text, document, exit_code=EXIT_CHECK_FAILED, aside=aside)

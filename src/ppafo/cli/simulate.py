@@ -1,6 +1,6 @@
 """``ppafo simulate SCENARIO``: runs a scenario and writes a result folder, with a report that simulates."""
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 from ppafo.arguments import Folder, Overrides, Scenario
 from ppafo.cli import output
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, CommandOutput
-from ppafo.documents.json_text import json_text
-from ppafo.units.shown import in_units
+from ppafo.documents.json_text import json_text, plain
+from ppafo.units.shown import in_units, shown_in
 
 if TYPE_CHECKING:
     from ppafo.report.finding import Finding
     from ppafo.simulation.check import Check, ErrorEstimate
-    from ppafo.simulation.scenario import Scenario as Configured
+    from ppafo.simulation.gains import Gains
     from ppafo.simulation.simulate import Result
+    from ppafo.simulation.tracking import Tracking
 
 DEFAULT_FOLDER = Path("out")
 CHECK_FILE = "check.json"
-FIGURE = "figure"
 
 
 def simulate(
@@ -38,66 +38,125 @@ def simulate(
     from ppafo.loading import load_scenario
     from ppafo.storage import check_result_folder
 
-    chosen = load_scenario(scenario, overrides)
-    folder = out if out is not None else DEFAULT_FOLDER / chosen.name
+    loaded = load_scenario(scenario, overrides)
+    folder = out if out is not None else DEFAULT_FOLDER / loaded.name
     # Before the run, which a folder that is refused must not cost.
     with output.blame_out_option():
         check_result_folder(folder)
-    return _run(chosen, folder, check)
 
-
-@in_units(lambda scenario, *_: scenario.device.shown)
-def _run(chosen: "Configured", folder: Path, check: bool) -> CommandOutput:
-    from ppafo.running import gains, tried
-    from ppafo.simulation.simulate import simulate
+    from ppafo.simulation.simulate import simulate as run_scenario
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 
-    warn_of_coarse_pairs([chosen])
-    result = simulate(chosen)
-    in_force, verdict = gains(chosen), tried(chosen, result.tracking)
-    # A run that diverged has no result to repeat; its exit code says so already.
-    checked = result.check() if check and result.status.is_completed else None
-    error = None if checked is None else checked.error
-    if checked is None and result.status.is_completed and chosen.motion.motion_kind.is_repeated_for_its_error:
-        error = result.error()
-    follows = list(filter(None, [result.following if verdict is None else verdict.sentence]))
-    # Gains that are in force are no news: they stand last.
-    tuned = [] if in_force is None else [in_force.sentence]
-    from ppafo.documents.json_text import plain
+    with shown_in(loaded.device.shown):
+        warn_of_coarse_pairs([loaded])
+        report = assessed(run_scenario(loaded), check)
+        return CommandOutput(
+            _text(report),
+            {**_document(report), "folder": str(folder)},
+            finish=partial(_write, report, folder),
+            exit_code=EXIT_GOOD if report.is_good else EXIT_CHECK_FAILED,
+            aside="" if report.result.status.is_completed else f"{loaded.name}: {report.result.status.message}",
+        )
 
-    metrics = {name: plain(metric) for name, metric in result.metrics.items()}
-    document = {
+
+@dataclass(frozen=True, slots=True)
+class _RunReport:
+    """Result of a run with its assessment: check and estimated error if made, verdict if it misses its reference."""
+
+    result: "Result"
+    check: "Check | None"
+    error: "ErrorEstimate | None"
+    tracking: "Tracking | None"
+    gains: "Gains | None"
+
+    @property
+    def is_good(self) -> bool:
+        """True for a completed run whose check, if requested, finds it repeatable and of use."""
+        # A reference that is not followed makes the result useless, and a check fails.
+        is_useless = self.tracking is not None and self.tracking.is_useless
+        passes = self.check is None or (self.check.is_determined and not is_useless)
+        return self.result.status.is_completed and passes
+
+    @property
+    def verdict(self) -> list[str]:
+        """Sentence on following the reference; empty for a run without a reference."""
+        sentence = self.result.following if self.tracking is None else self.tracking.sentence
+        return [sentence] if sentence else []
+
+    @property
+    def gain_text(self) -> list[str]:
+        """Sentence on the gains in use; empty for a controller without gains."""
+        return [] if self.gains is None else [self.gains.sentence]
+
+
+def assessed(result: "Result", check: bool) -> _RunReport:
+    """Return a result with its assessment; ``check`` runs the scenario again for the repeatability of its metrics."""
+    from ppafo.running import gains, tried
+
+    scenario = result.scenario
+    # A run that diverged has no result to repeat; its exit code says so already.
+    repeatability = result.check() if check and result.status.is_completed else None
+    error = None if repeatability is None else repeatability.error
+    if error is None and result.status.is_completed and scenario.motion.motion_kind.is_repeated_for_its_error:
+        error = result.error()
+    return _RunReport(result, repeatability, error, tried(scenario, result.tracking), gains(scenario))
+
+
+def _text(report: _RunReport) -> str:
+    """Return status, tracking error, metrics, their repeatability, and gains of a run as text."""
+    from ppafo.report.display_units import metrics_lines
+
+    # The result's own text has a verdict whose remedies were not tried.
+    head = [f"{report.result.scenario.name}: {report.result.status.kind}", *report.verdict, ""]
+    accuracy = [] if report.error is None else [report.error.sentence]
+    if report.check is not None:
+        accuracy = [repr(report.check)]
+    # Gains that are in force are no news: they stand last.
+    last = [*accuracy, *report.gain_text]
+    return "\n".join([*head, *metrics_lines(report.result.metrics), *([""] if last else []), *last])
+
+
+def _document(report: _RunReport) -> dict[str, Any]:
+    """Return the run and its assessment as plain data in SI units."""
+    result, tracking = report.result, report.tracking
+    return {
         "scenario": result.scenario.name,
         "status": plain(result.status),
-        "tracking": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
-        "gains": plain(in_force),
-        "metrics": metrics,
-        **({} if error is None else {"error": plain(error)}),
-        **({} if checked is None else {"check": checked.document()}),
-        "folder": str(folder),
+        "tracking": None if tracking is None else {**plain(tracking), "sentence": tracking.sentence},
+        "gains": plain(report.gains),
+        "metrics": {name: plain(metric) for name, metric in result.metrics.items()},
+        **({} if report.error is None else {"error": plain(report.error)}),
+        **({} if report.check is None else {"check": report.check.document()}),
     }
-    # A reference that is not followed makes the result useless, and a check fails.
-    is_useful = verdict is None or not verdict.is_useless
-    is_good = result.status.is_completed and (checked is None or (checked.is_determined and is_useful))
-    return CommandOutput(
-        _text(result, error, checked, follows, tuned),
-        document,
-        finish=partial(_write, result, checked, follows, tuned, folder),
-        exit_code=EXIT_GOOD if is_good else EXIT_CHECK_FAILED,
-        aside="" if result.status.is_completed else f"{chosen.name}: {result.status.message}",
-    )
 
 
-def _finding(result: "Result", check: "Check | None", follows: Sequence[str], tuned: Sequence[str]) -> "Finding[None]":
+@in_units(lambda report, _folder: report.result.scenario.device.shown)
+def _write(report: _RunReport, folder: Path) -> str:
+    """Draw the figure and the page, write the result folder, and return the last lines of text."""
+    # Before anything else imports Matplotlib, so that it comes without what it does for others.
+    from ppafo.report.drawing import load_drawing
+
+    load_drawing()
+    from ppafo.report.finding import REPORT, page_files
+
+    checks = {} if report.check is None else {CHECK_FILE: f"{json_text(report.check.document())}\n".encode()}
+    report.result.save(folder, {**page_files(finding_of(report)), **checks})
+    written = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", REPORT, *checks]
+    scenario = report.result.scenario
+    next_command = scenario.motion.motion_kind.further_command(str(scenario.origin.file))
+    return "\n".join(["", *([next_command] if next_command else []), f"written: {folder} ({', '.join(written)})"])
+
+
+def finding_of(report: _RunReport) -> "Finding[None]":
     """Return the content of a result page: metrics, figure, and the interactive run."""
     from ppafo.report.display_units import metric_text, metric_words
     from ppafo.report.finding import Finding, Section, columns_of
     from ppafo.report.live_parts import live_part
 
+    result, check = report.result, report.check
     scenario, status = result.scenario, result.status
     device = f"device '{scenario.device.name}', valve '{scenario.device.valve_name}'"
     changed = f"; values changed for this run: {', '.join(scenario.origin.overrides)}"
-    caption = "What the device does over time. Pressures count from the atmosphere."
     rows = [
         (metric_words(name), metric_text(metric.value, metric.unit), metric.summary)
         for name, metric in result.metrics.items()
@@ -108,11 +167,16 @@ def _finding(result: "Result", check: "Check | None", follows: Sequence[str], tu
         title=scenario.name,
         said=(" ".join(scenario.description.split()), f"{device}{changed if scenario.origin.overrides else ''}"),
         parts=(
-            Section(remarks=(*(() if status.is_completed else (f"The run {status.message}",)), *follows)),
+            Section(remarks=(*(() if status.is_completed else (f"The run {status.message}",)), *report.verdict)),
             Section("Metrics", columns_of(("Metric", "Value", "What it is"), rows), left=3),
-            Section("Over time", name=FIGURE, caption=caption, draw=result.plot),
+            Section(
+                "Over time",
+                name="figure",
+                caption="What the device does over time. Pressures count from the atmosphere.",
+                draw=result.plot,
+            ),
             Section() if check is None else Section("What can be repeated", code=repr(check)),
-            Section(remarks=tuned),
+            Section(remarks=report.gain_text),
         ),
         found=None,
         live=lambda: live_part([scenario]),
@@ -124,41 +188,3 @@ def list_descriptions() -> list[dict[str, Any]]:
     from ppafo.loading import list_all_scenarios, load_scenario
 
     return [{"name": name, "description": load_scenario(name).description} for name in list_all_scenarios()]
-
-
-@in_units(lambda result, *_: result.scenario.device.shown)
-def _write(result: "Result", check: "Check | None", follows: Sequence[str], tuned: Sequence[str], folder: Path) -> str:
-    """Draw the figure and the page, write the result folder, and return the last lines of text."""
-    # Before anything else imports Matplotlib, so that it comes without what it does for others.
-    from ppafo.report.drawing import load_drawing
-
-    load_drawing()
-    from ppafo.report.finding import REPORT, page_of
-    from ppafo.report.recording_figure import figure_files
-
-    figures = figure_files(result.plot())
-    report = page_of(_finding(result, check, follows, tuned), {FIGURE: figures[f"{FIGURE}.svg"]})
-    checks = {} if check is None else {CHECK_FILE: f"{json_text(check.document())}\n".encode()}
-    result.save(folder, {**figures, REPORT: report, **checks})
-    files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", REPORT]
-    written = ", ".join(files if check is None else [*files, CHECK_FILE])
-    further = result.scenario.motion.motion_kind.further_command(str(result.scenario.origin.file))
-    return "\n".join(["", *([further] if further else []), f"written: {folder} ({written})"])
-
-
-@in_units(lambda result, *_: result.scenario.device.shown)
-def _text(
-    result: "Result",
-    error: "ErrorEstimate | None",
-    check: "Check | None",
-    follows: Sequence[str],
-    tuned: Sequence[str],
-) -> str:
-    """Return status, tracking error, metrics, their repeatability, and gains of a run as text."""
-    from ppafo.report.display_units import metrics_lines
-
-    exact = [repr(check)] if check is not None else [] if error is None else [error.sentence]
-    last = ["", *exact, *tuned] if exact or tuned else []
-    # The result's own text has a verdict whose remedies were not tried.
-    head = [f"{result.scenario.name}: {result.status.kind}", *follows, ""]
-    return "\n".join([*head, *metrics_lines(result.metrics), *last])

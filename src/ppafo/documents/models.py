@@ -82,6 +82,10 @@ def validate(
         raise refusal(f"{file}: {all_problems(error.errors(include_url=False), model)}") from error
 
 
-def make_schema(model: type[BaseModel], title: str) -> dict[str, Any]:
-    """Return the JSON Schema of a file with this layout."""
-    return {"$schema": SCHEMA, **model.model_json_schema(), "title": title}
+REFERENCE = "#/$defs/{model}"
+"""Template of a reference to a definition inside a JSON Schema."""
+
+
+def make_schema(model: type[BaseModel], title: str, reference: str = REFERENCE) -> dict[str, Any]:
+    """Return the JSON Schema of a file with this layout; ``reference`` is the template of references within it."""
+    return {"$schema": SCHEMA, **model.model_json_schema(ref_template=reference), "title": title}

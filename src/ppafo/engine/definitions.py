@@ -5,15 +5,16 @@ import inspect
 import re
 import textwrap
 from collections.abc import Callable, Iterator
-from copy import deepcopy
+from functools import lru_cache
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
+from ppafo.engine.entries import PARSING
 from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
 from ppafo.errors import ProgramError
 
 Adaptation = Callable[[FunctionType, ast.FunctionDef], ast.FunctionDef]
-"""Function that converts a definition to the compiled subset of Python, from a copy of the syntax tree."""
+"""Function that converts the syntax tree of a definition to the compiled subset of Python."""
 
 
 def emitted_name(item: Any) -> str:
@@ -59,7 +60,7 @@ def parse_definition(function: FunctionType, adapt: Adaptation | None = None) ->
     code = function.__code__
     file, name = code.co_filename, function.__qualname__
     try:
-        text = textwrap.dedent(inspect.getsource(function))
+        text = _source_text(function, code)
     except (OSError, TypeError) as error:
         reason = f"its source text is not available ({error})"
         raise ProgramError(f"cannot compile {name}: {reason}") from error
@@ -71,29 +72,38 @@ def parse_definition(function: FunctionType, adapt: Adaptation | None = None) ->
         raise refusal(file, code.co_firstlineno, f"'{name}' must be a plain function defined with 'def'")
     if tree.decorator_list:
         raise refusal(file, tree, f"'{name}' is decorated, which cannot be compiled; remove the decorator")
-    # A copy, since the tree is compared with what Python runs below.
-    adapted = tree if adapt is None else adapt(function, deepcopy(tree))
+    adapted = tree if adapt is None else adapt(function, tree)
     check_grammar(adapted, file)
-    if _shape(code) not in (_shape(other) for other in _code_of(tree, function)):
+    if not _is_source_of(function, code, text):
         changed = "is not what its source text says; the file has changed since it was loaded: start again"
-        raise refusal(file, tree, f"'{name}' {changed}")
+        raise refusal(file, code.co_firstlineno, f"'{name}' {changed}")
     check_flow(adapted, file, code.co_varnames)
     return adapted
 
 
-def _code_of(tree: ast.FunctionDef, function: FunctionType) -> Iterator[CodeType]:
-    """Yield the bytecode of a definition compiled with and without the module imports in view."""
-    names = function.__code__.co_names
-    modules = [name for name in names if isinstance(function.__globals__.get(name), ModuleType)]
-    imports = [parse_module(f"import {name}").body[0] for name in modules]
+# One function is a part of several programs of a session; reading its source takes longer than parsing it.
+@lru_cache(maxsize=2048)
+def _source_text(function: FunctionType, _code: CodeType) -> str:
+    """Return the source text of a function with this code, without indentation; OSError if it is not available."""
+    return textwrap.dedent(inspect.getsource(function))
+
+
+@lru_cache(maxsize=2048)
+def _is_source_of(function: FunctionType, code: CodeType, text: str) -> bool:
+    """Return whether the code of a function is the bytecode of its source text."""
+    modules = [name for name in code.co_names if isinstance(function.__globals__.get(name), ModuleType)]
     # Python compiles a call through a module name otherwise where it has seen the import.
-    for before in (imports, []):
-        module = compile(ast.Module([*before, tree], []), "<source>", "exec", dont_inherit=True)
-        yield next(
+    for imports in ([f"import {name}" for name in modules], []):
+        with PARSING:
+            module = compile("\n".join([*imports, text]), "<source>", "exec", dont_inherit=True)
+        compiled = next(
             constant
             for constant in module.co_consts
-            if isinstance(constant, CodeType) and constant.co_name == tree.name
+            if isinstance(constant, CodeType) and constant.co_name == code.co_name
         )
+        if _shape(compiled) == _shape(code):
+            return True
+    return False
 
 
 def _shape(code: CodeType) -> tuple[Any, ...]:

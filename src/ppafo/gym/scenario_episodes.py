@@ -17,9 +17,9 @@ from ppafo.gym.tasks import Goal
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.graph import ATMOSPHERE_PATH, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
-from ppafo.simulation.building import set_name
 from ppafo.simulation.ensemble.columns import absolute, check_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
+from ppafo.simulation.hardware import set_name
 from ppafo.simulation.numbers import chosen_path, declared_numbers, number_at, with_numbers
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario

@@ -148,6 +148,8 @@ class EnvironmentSettings:
         name_plugins(self.plugins)
         _check_word("actions", self.actions, (CONTINUOUS, ON_OFF))
         _check_word("observations", self.observations, (PHYSICAL, SCALED))
+        if self.vary and not self.randomise:
+            raise ScenarioError("vary: with randomise = False nothing is drawn; omit one of them")
         if not (isinstance(self.frame_skip, int) and self.frame_skip >= 1):
             raise ScenarioError(f"frame_skip = {self.frame_skip!r}: must be a whole number of samples, at least 1")
 

@@ -63,11 +63,6 @@ def number_of(hint: Any) -> Quantity | None:
     return next((item for item in declared if isinstance(item, Quantity)), None)
 
 
-def range_rule(quantity: Quantity, limits: str) -> str:
-    """Return the rule that a value out of range breaks, such as "must be at least 0 m^2 (open area)"."""
-    return f"must be {limits}" + (f" ({quantity.summary})" if quantity.summary else "")
-
-
 class EmptyRow(NamedTuple):
     """Row without numbers: settings of a component without settings, or state of one without memory."""
 

@@ -12,7 +12,8 @@ from typing import Any
 
 from ppafo.errors import ScenarioError, UnitError
 from ppafo.page.motions import declared_content, page_look, relations_in_files, usual_changes, with_limits
-from ppafo.page.wasm import WasmModule, display_of
+from ppafo.page.wasm import WasmModule
+from ppafo.page.wasm.description import display_of
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import over, read_overrides
 from ppafo.report.display_units import metric_quantity

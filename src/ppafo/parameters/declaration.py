@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
+from typing import Any
 
 from ppafo.errors import UnitError
 from ppafo.model.actuators.vane import KIND as VANE
@@ -79,10 +80,10 @@ def alternatives(quantity: Quantity) -> tuple[str, ...]:
     return (quantity.unit, *_ALTERNATIVE_UNITS.get(quantity.unit, ()))
 
 
-def is_within(value: float, quantity: Quantity) -> bool:
-    """Return True if an SI value is within its declared limits."""
-    above = value >= quantity.minimum if quantity.minimum_allowed else value > quantity.minimum
-    return above and value <= quantity.maximum
+def is_within(value: Any, quantity: Quantity) -> Any:
+    """Return True if an SI value is within its declared limits; for an array, of each of its values."""
+    is_above = value >= quantity.minimum if quantity.minimum_allowed else value > quantity.minimum
+    return is_above & (value <= quantity.maximum)
 
 
 def actuator_quantities(kind: str) -> tuple[Quantity, ...]:
@@ -127,6 +128,14 @@ def fits(unit: str, si_unit: str) -> bool:
     except UnitError:
         return False
     return True
+
+
+def range_rule(quantity: Quantity, given: str = "") -> str:
+    """Return the rule for a value out of range, such as ``must be at least 0 m^2 (open area)``.
+
+    Limits are in the unit ``given`` by the user, as in ``limits_text``.
+    """
+    return f"must be {limits_text(quantity, given)}" + (f" ({quantity.summary})" if quantity.summary else "")
 
 
 def limits_text(quantity: Quantity, given: str = "") -> str:

@@ -11,8 +11,8 @@ from pydantic import Field
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import StrictTable, Text, Texts
 from ppafo.errors import ParameterError, UnitError, refused_as
-from ppafo.model.declaration import Quantity, range_rule
-from ppafo.parameters.declaration import SPECIES_PATH, alternatives, fits, is_within, limits_text, quantities
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.declaration import SPECIES_PATH, alternatives, fits, is_within, quantities, range_rule
 from ppafo.parameters.graph import (
     ATMOSPHERE_PATH,
     DISPLACEMENT_PATH,
@@ -306,7 +306,7 @@ def allowed_number(written: str, entry: Any, quantity: Quantity, atmosphere: flo
     with refused_as(ParameterError, written, UnitError):
         value = entry_in_si(entry, quantity, atmosphere)
     if not is_within(value, quantity):
-        raise ParameterError(f"{written}: {range_rule(quantity, limits_text(quantity, entry.unit))}")
+        raise ParameterError(f"{written}: {range_rule(quantity, entry.unit)}")
     return value
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ppafo.documents.json_text import json_text, plain
+from ppafo.errors import ArgumentError
 from ppafo.report.kind import PLAIN, ConfidenceInterval, Kind
 from ppafo.report.notebook import shown
 from ppafo.report.panels import Panel, draw_panels
@@ -133,6 +134,20 @@ class Section:
         """Rows of the table as text, without the titles."""
         return list(zip(*(column.texts for column in self.columns), strict=True))
 
+    @property
+    def table_lines(self) -> list[str]:
+        """Table as aligned lines, with titles and marks of highlighted rows; empty without rows."""
+        rows: list[tuple[str, ...]] = self.rows
+        if not rows:
+            return []
+        if not self.has_head:
+            return align_columns(rows, len(self.columns))
+        lines = [tuple(column.head for column in self.columns), *rows]
+        if self.marked:
+            marks = ["", *(MARK if number in self.marked else "" for number in range(len(rows)))]
+            lines = [(mark, *line) for mark, line in zip(marks, lines, strict=True)]
+        return align_columns(lines, self.left + bool(self.marked))
+
     def drawn(self, kind: RecordingKind) -> "matplotlib.figure.Figure | bytes":
         """Return the figure; its panels are marked with the kind of the numbers."""
         if self.draw is not None:
@@ -194,7 +209,7 @@ class Finding(Generic[T_co]):
     @property
     def figures(self) -> dict[str, Section]:
         """Sections with a figure, by the stem of the figure's files."""
-        return {part.name: part for part in self.parts if part.name}
+        return {section.name: section for section in self.parts if section.name}
 
     def __str__(self) -> str:
         """Return the text printed by the command."""
@@ -222,12 +237,16 @@ class Finding(Generic[T_co]):
 
     @in_units(_units_of)
     def plot(self, name: str | None = None) -> "matplotlib.figure.Figure":
-        """Return a figure of the report by name, by default the first; raises LookupError for an unknown name."""
+        """Return a figure of the report by name, by default the first; raises ArgumentError if there is none."""
         figures = self.figures
         chosen = figures.get(name or next(iter(figures), ""))
         drawn = None if chosen is None else chosen.drawn(self.kind)
         if drawn is None or isinstance(drawn, bytes):
-            raise LookupError(f"there is no figure '{name or ''}'; available: {', '.join(figures) or 'none'}")
+            named = f"no figure '{name}'" if name else "no figure"
+            available = (
+                f": available are {', '.join(figures)}" if figures else ": print it, or save() its text and page"
+            )
+            raise ArgumentError(f"a result of '{self.name}' has {named}{available}")
         return shown(drawn)
 
     def save(self, folder: str | Path) -> None:
@@ -235,7 +254,7 @@ class Finding(Generic[T_co]):
 
         The folder must be absent, empty or an earlier result; otherwise DataError is raised.
         """
-        from ppafo.storage.result_folder import write_marked_folder
+        from ppafo.storage.owned_folder import write_marked_folder
 
         write_marked_folder(Path(folder), files_of(self), self.command or self.name)
 
@@ -244,65 +263,53 @@ class Finding(Generic[T_co]):
 def text_of(finding: Finding[Any]) -> str:
     """Return the report as text: the first sentences, then every section that is not a detail of the page."""
     blocks = ["\n".join(finding.said)]
-    for part in finding.parts:
-        if not part.is_detail:
-            body = [*part.said, *_table_lines(part), *part.remarks, *([part.code] if part.code else [])]
-            # A heading over nothing is left out, and a part of the page alone, a figure, has no text.
-            blocks.append("\n".join([part.heading, *body] if part.heading and body else body))
+    for section in finding.parts:
+        if section.is_detail:
+            continue
+        body = [*section.said, *section.table_lines, *section.remarks, *([section.code] if section.code else [])]
+        # A heading over nothing is left out, and a part of the page alone, a figure, has no text.
+        blocks.append("\n".join([section.heading, *body] if section.heading and body else body))
     return "\n\n".join(block for block in blocks if block)
-
-
-def _table_lines(part: Section) -> list[str]:
-    """Return the table of a section as aligned lines, with head and marks of highlighted rows; empty without rows."""
-    rows: list[tuple[str, ...]] = part.rows
-    if not rows:
-        return []
-    if not part.has_head:
-        return align_columns(rows, len(part.columns))
-    rows = [tuple(column.head for column in part.columns), *rows]
-    if part.marked:
-        marks = ["", *(MARK if number in part.marked else "" for number in range(len(part.rows)))]
-        rows = [(mark, *row) for mark, row in zip(marks, rows, strict=True)]
-    return align_columns(rows, part.left + bool(part.marked))
-
-
-@in_units(_units_of)
-def page_of(finding: Finding[Any], drawn: Mapping[str, bytes]) -> bytes:
-    """Return the page of a report; ``drawn`` has the SVG or GIF content of each figure by name."""
-    if finding.page is not None:
-        return finding.page(drawn)
-    values = {
-        "finding": finding,
-        "parts": [
-            (part, _head_of(part), inline_figure(drawn[part.name]) if part.name else "") for part in finding.parts
-        ],
-        "origin": _ORIGINS[finding.kind],
-        "versions": f"ppafo {__version__}",
-        "live": None if finding.live is None else finding.live(),
-    }
-    return render_page("finding.html.jinja", values).encode()
-
-
-def _head_of(part: Section) -> list[str]:
-    """Return the titles of a table, with non-breaking spaces within a unit in brackets."""
-    if not part.has_head:
-        return []
-    heads = [column.head for column in part.columns]
-    return [_UNIT_IN_BRACKETS.sub(lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), head) for head in heads]
 
 
 @in_units(_units_of)
 def files_of(finding: Finding[Any]) -> dict[str, bytes]:
     """Return text, JSON, page, figures and further files of a report by name; this draws the figures."""
-    drawn: dict[str, Mapping[str, bytes]] = {}
-    for name, part in finding.figures.items():
-        figure = part.drawn(finding.kind)
-        drawn[name] = {"gif": figure} if isinstance(figure, bytes) else render_figure(figure, FORMATS)
-    on_page = {name: formats.get("svg") or formats["gif"] for name, formats in drawn.items()}
     return {
-        **{f"{name}.{form}": content for name, formats in drawn.items() for form, content in formats.items()},
-        **{name: content() for name, content in finding.files.items()},
+        **page_files(finding),
         f"{finding.name}.json": f"{json_text(finding.to_dict())}\n".encode(),
         f"{finding.name}.txt": f"{text_of(finding)}\n".encode(),
-        REPORT: page_of(finding, on_page),
     }
+
+
+@in_units(_units_of)
+def page_files(finding: Finding[Any]) -> dict[str, bytes]:
+    """Return page, figures and further files of a report by name; this draws the figures."""
+    files = {name: content() for name, content in finding.files.items()}
+    on_page = {}
+    for name, section in finding.figures.items():
+        figure = section.drawn(finding.kind)
+        formats = {"gif": figure} if isinstance(figure, bytes) else render_figure(figure, FORMATS)
+        files |= {f"{name}.{file_format}": content for file_format, content in formats.items()}
+        on_page[name] = formats.get("svg") or formats["gif"]
+    if finding.page is not None:
+        return files | {REPORT: finding.page(on_page)}
+    values = {
+        "finding": finding,
+        "parts": [
+            (section, _head_of(section), inline_figure(on_page[section.name]) if section.name else "")
+            for section in finding.parts
+        ],
+        "origin": _ORIGINS[finding.kind],
+        "versions": f"ppafo {__version__}",
+        "live": None if finding.live is None else finding.live(),
+    }
+    return files | {REPORT: render_page("finding.html.jinja", values).encode()}
+
+
+def _head_of(section: Section) -> list[str]:
+    """Return the titles of a table, with non-breaking spaces within a unit in brackets."""
+    if not section.has_head:
+        return []
+    heads = [column.head for column in section.columns]
+    return [_UNIT_IN_BRACKETS.sub(lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), head) for head in heads]

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,22 +39,31 @@ ALLOWED_CHANGE = 1.0e-3
 """Largest change of a metric that is ignored, as a fraction of its value or of the range of its quantity."""
 
 FINER, MOVED_START, MOVED_MEASUREMENT = "finer steps", "start moved", "measurement moved"
-_MOVES = frozenset({MOVED_START, MOVED_MEASUREMENT})
+_PERTURBATIONS = frozenset({MOVED_START, MOVED_MEASUREMENT})
 
 DRAWS = 4
 """Number of noise realisations with which measurements are perturbed if the sensors have no noise."""
 ALLOWED_PARTING = 1.0e-2
 """Largest difference between two runs over time that is ignored, as a fraction of the range."""
-_TEMPERATURES = "temperatures over time"
-_COURSES = {
-    "angle over time": ("angle",),
-    "pressures over time": ("pressure_1", "pressure_2"),
-    _TEMPERATURES: ("temperature_1", "temperature_2"),
+
+
+class _ComparedSignal(NamedTuple):
+    """Channels that are compared over time, their unit, and the promised error divided by their range [-]."""
+
+    channels: tuple[str, ...]
+    unit: str
+    promised_error: float
+
+
+_SIGNALS = {
+    "angle over time": _ComparedSignal(("angle",), "rad", LARGEST_OF_ANGLE),
+    "pressures over time": _ComparedSignal(("pressure_1", "pressure_2"), "Pa", LARGEST_OF_PRESSURE),
+    "temperatures over time": _ComparedSignal(("temperature_1", "temperature_2"), "K", LARGEST_OF_TEMPERATURE),
 }
 
 
-def _units_of(shown: "ErrorEstimate | Check") -> Mapping[str, str]:
-    return shown.units
+def _units_of(estimate: "ErrorEstimate | Check") -> Mapping[str, str]:
+    return estimate.units
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +95,8 @@ class ErrorEstimate:
         from ppafo.report.display_units import metric_change
 
         errors = {"rad": self.angle, "Pa": self.pressure, "K": self.temperature}
-        shown = [metric_change(error, unit) for unit, error in errors.items() if error is not None]
-        texts = [f"{without_exponent(value, '.1e')} {unit}" for value, unit in shown]
+        in_display_units = [metric_change(error, unit) for unit, error in errors.items() if error is not None]
+        texts = [f"{without_exponent(value, '.1e')} {unit}" for value, unit in in_display_units]
         over_time = f"{', '.join(texts[:-1])} and {texts[-1]}"
         of_metrics = f"; of a metric at most {self.share:.1e} of it ({self.largest})" if self.largest else ""
         beyond = ""
@@ -159,26 +168,26 @@ class Check:
                 f"All metrics are repeatable: none changes by more than {ALLOWED_CHANGE:.0e} of its value or its "
                 f"range. {self.error.sentence}"
             )
-        lost = [row for row in (*self.metrics, *self.courses) if not row.is_determined]
-        by_move = [row.name for row in lost if row.changed_by & _MOVES]
-        by_error = [row.name for row in lost if not row.changed_by & _MOVES]
-        what = " or ".join(sorted({name.split()[0] for row in lost for name in row.changed_by & _MOVES}, reverse=True))
-        causes = [
-            (
-                by_move,
-                f"a {what} moved by {MOVE:.0e} of its range, far below what can be measured, changes them. One run "
-                f"is no evidence of their values; give the spread over many (ppafo sweep --statistic).",
-            ),
-            (
-                by_error,
-                "finer steps with a sixteenth of the error change them. Take a smaller run.tolerance and check "
-                "again; metrics that still change are not repeatable.",
-            ),
-            (("how it ends",) if self.failed else (), f"the run with {' and that with '.join(self.failed)} diverged."),
-        ]
-        sentences = [f"{', '.join(names)}: {cause}" for names, cause in causes if names]
-        parting = [] if self.parts_at is None else [f"The runs separate at t = {self.parts_at:.4g} s."]
-        return " ".join([f"Numerically sensitive: {' Also: '.join(sentences)}", self.error.sentence, *parting])
+        sensitive = [row for row in (*self.metrics, *self.courses) if not row.is_determined]
+        perturbed = [row.name for row in sensitive if row.changed_by & _PERTURBATIONS]
+        inexact = [row.name for row in sensitive if not row.changed_by & _PERTURBATIONS]
+        sentences = []
+        if perturbed:
+            kinds = {name.split()[0] for row in sensitive for name in row.changed_by & _PERTURBATIONS}
+            sentences.append(
+                f"{', '.join(perturbed)}: a {' or '.join(sorted(kinds, reverse=True))} moved by {MOVE:.0e} of its "
+                "range, far below what can be measured, changes them. One run is no evidence of their values; give "
+                "the spread over many (ppafo sweep --statistic)."
+            )
+        if inexact:
+            sentences.append(
+                f"{', '.join(inexact)}: finer steps with a sixteenth of the error change them. Take a smaller "
+                "run.tolerance and check again; metrics that still change are not repeatable."
+            )
+        if self.failed:
+            sentences.append(f"how it ends: the run with {' and that with '.join(self.failed)} diverged.")
+        separation = [] if self.parts_at is None else [f"The runs separate at t = {self.parts_at:.4g} s."]
+        return " ".join([f"Numerically sensitive: {' Also: '.join(sentences)}", self.error.sentence, *separation])
 
     @in_units(_units_of)
     def __repr__(self) -> str:
@@ -187,11 +196,11 @@ class Check:
         from ppafo.report.writing import align_columns
 
         names = list(self.metrics[0].changes) if self.metrics else []
-        shown = [(row, metric_level(row.value, row.unit)) for row in self.metrics]
-        # The value of a course is a range, which does not count from the atmosphere.
-        shown += [(row, metric_change(row.value, row.unit)) for row in self.courses]
+        values = [(row, metric_level(row.value, row.unit)) for row in self.metrics]
+        # The value of a signal over time is its range, which does not count from the atmosphere.
+        values += [(row, metric_change(row.value, row.unit)) for row in self.courses]
         rows = [["", "value", *names, ""]]
-        for row, (value, unit) in shown:
+        for row, (value, unit) in values:
             changes = [without_exponent(metric_change(row.changes[name], row.unit)[0], "+.1e") for name in names]
             verdict = "" if row.is_determined else "sensitive"
             rows.append([row.name, f"{value:.4g} {unit}".rstrip(), *changes, verdict])
@@ -201,14 +210,12 @@ class Check:
     def document(self) -> dict[str, Any]:
         """Return the check as data that can be written as JSON, in SI units."""
         document: dict[str, Any] = plain(self)
-        rows = {"metrics": self.metrics, "courses": self.courses}
-        judged = {
-            group: [{**plain(row), "is_determined": row.is_determined} for row in row] for group, row in rows.items()
-        }
-        return {"is_determined": self.is_determined, "sentence": self.sentence, **document, **judged}
+        for name, rows in (("metrics", self.metrics), ("courses", self.courses)):
+            document[name] = [{**plain(row), "is_determined": row.is_determined} for row in rows]
+        return {"is_determined": self.is_determined, "sentence": self.sentence, **document}
 
 
-Again = Callable[[Sequence[Run]], Sequence[RecordedResult]]
+Rerun = Callable[[Sequence[Run]], Sequence[RecordedResult]]
 """Function that executes other planned runs of the same scenario."""
 
 
@@ -226,66 +233,71 @@ def finer(run: Run) -> Run:
 
 def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstimate:
     """Estimated error of a result, from the same run with finer steps; inf if the finer run diverged."""
-    courses = list(_courses_of(result).values())
-    if not fine.status.is_completed:
-        errors_at_end, errors = [math.inf for _ in courses], dict.fromkeys(result.metrics, math.inf)
-    else:
-        largest = [np.max(_largest_differences(fine.recording, result.recording, names)) for names in courses]
-        errors_at_end = [MARGIN * float(difference) for difference in largest]
-        changes = {name: abs(_difference(_value(fine, name), _value(result, name))) for name in result.metrics}
-        errors = {name: MARGIN * change for name, change in changes.items()}
-    angle, pressure = errors_at_end[:2]
-    temperature = errors_at_end[2] if len(errors_at_end) > 2 else None
-    shares = _shares(result, errors)
+    signals = _recorded_signals(result).values()
+    errors = {signal.unit: math.inf for signal in signals}
+    metric_errors = dict.fromkeys(result.metrics, math.inf)
+    if fine.status.is_completed:
+        for signal in signals:
+            differences = _largest_differences(fine.recording, result.recording, signal.channels)
+            errors[signal.unit] = MARGIN * float(np.max(differences))
+        for name in result.metrics:
+            metric_errors[name] = MARGIN * abs(_difference(_value(fine, name), _value(result, name)))
+    shares = _relative_errors(result, metric_errors)
     worst = max(shares, key=lambda name: shares[name], default="")
-    device, own = result.scenario.device, result.scenario.run.tolerance
-    promised = LARGEST_OF_PRESSURE * _pressure_range(result)
-    over = [angle / (LARGEST_OF_ANGLE * (device.actuator.angle_max - device.actuator.angle_min)), pressure / promised]
-    if temperature is not None:
-        over.append(temperature / (LARGEST_OF_TEMPERATURE * device.gas.temperature))
-    # The allowed error goes with the tolerance; with half of what is needed it is met.
-    less = max(0.5 * own / max(over), SMALLEST_TOLERANCE) if max(over) > 0.0 else own
+    over_promise = max(
+        errors[signal.unit] / (signal.promised_error * _signal_range(result, signal.unit)) for signal in signals
+    )
+    # The error is proportional to the tolerance: half of the tolerance that just meets the promise is proposed.
+    tolerance = result.scenario.run.tolerance
+    smaller = max(0.5 * tolerance / over_promise, SMALLEST_TOLERANCE) if over_promise > 0.0 else tolerance
     return ErrorEstimate(
-        angle=angle,
-        pressure=pressure,
-        metrics=errors,
-        temperature=temperature,
+        angle=errors["rad"],
+        pressure=errors["Pa"],
+        metrics=metric_errors,
+        temperature=errors.get("K"),
         largest=worst,
         share=shares.get(worst, 0.0),
-        over_promise=max(over),
-        tolerance=less if max(over) > 1.0 and less < own else 0.0,
+        over_promise=over_promise,
+        tolerance=smaller if over_promise > 1.0 and smaller < tolerance else 0.0,
     )
 
 
-def _courses_of(result: RecordedResult) -> dict[str, tuple[str, ...]]:
-    """Recorded channels that are compared over time, grouped by their description."""
+def _recorded_signals(result: RecordedResult) -> dict[str, _ComparedSignal]:
+    """Signals that are compared over time, with the channels that are recorded."""
     recorded = {
-        words: tuple(name for name in channels if name in result.recording) for words, channels in _COURSES.items()
+        name: signal._replace(channels=tuple(channel for channel in signal.channels if channel in result.recording))
+        for name, signal in _SIGNALS.items()
     }
-    return {words: channels for words, channels in recorded.items() if channels}
+    return {name: signal for name, signal in recorded.items() if signal.channels}
 
 
-def _shares(result: RecordedResult, errors: Mapping[str, float]) -> dict[str, float]:
+def _signal_range(result: RecordedResult, unit: str) -> float:
+    """Range of the angle [rad] or of the pressures [Pa], or the gas temperature [K]."""
+    actuator = result.scenario.device.actuator
+    if unit == "Pa":
+        return _pressure_range(result)
+    return actuator.angle_max - actuator.angle_min if unit == "rad" else result.scenario.device.gas.temperature
+
+
+def _pressure_range(result: RecordedResult) -> float:
+    """Range of the chamber, supply and atmospheric pressures [Pa]; the atmospheric pressure if the range is 0."""
+    supply = result.scenario.device.supply
+    constant = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
+    chambers = [result.recording[name] for name in ("pressure_1", "pressure_2") if name in result.recording]
+    return float(np.ptp(np.concatenate([*chambers, constant]))) or supply.atmospheric_pressure
+
+
+def _relative_errors(result: RecordedResult, errors: Mapping[str, float]) -> dict[str, float]:
     """Relative errors of metrics [-]: divided by the metric's value or, if larger, the range of its quantity."""
-    pressures = _pressure_range(result)
     scales = {
-        name: max(abs(metric.value), _metric_range(result, name, metric.unit, pressures))
+        name: max(abs(metric.value), _metric_range(result, name, metric.unit))
         for name, metric in result.metrics.items()
         if math.isfinite(metric.value)
     }
     return {name: errors[name] / scale for name, scale in scales.items() if 0.0 < scale < math.inf}
 
 
-def _pressure_range(result: RecordedResult) -> float:
-    """Range of the chamber, supply and atmospheric pressures [Pa]; the atmospheric pressure if the range is 0."""
-    supply = result.scenario.device.supply
-    outside = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
-    chambers = [result.recording[name] for name in _COURSES["pressures over time"] if name in result.recording]
-    values = np.concatenate([*chambers, outside])
-    return float(np.ptp(values)) or supply.atmospheric_pressure
-
-
-def checked(result: RecordedResult, run: Run, again: Again) -> Check:
+def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
     """Return the repeatability check of a result, from its planned run.
 
     Raises SimulationError for a Python controller that gives a different run each time, which makes a check impossible.
@@ -293,49 +305,56 @@ def checked(result: RecordedResult, run: Run, again: Again) -> Check:
     scenario, recording = result.scenario, result.recording
     controller = scenario.controller.custom
     if controller is not None:
-        same = again([run])[0].recording
+        same = rerun([run])[0].recording
         if not all(np.array_equal(same[name], recording[name]) for name in same.names):
             raise SimulationError(
                 f"{scenario.name}: {type(controller).__name__} gives a different run each time, so nothing can be "
                 f"checked; its reset() must forget everything, and its random numbers need a fixed seed"
             )
-    pressures = _pressure_range(result)
-    starts = [start_moved(run, move, apart) for apart in (1.0, -1.0) for move in (MOVE, -MOVE)]
-    repeats = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]
+    starts = [start_moved(run, move, opposite) for opposite in (1.0, -1.0) for move in (MOVE, -MOVE)]
+    runs = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]
     if not run.program.ideal_sensors:
-        # A little more noise on each sensor, either way; one draw alone seldom crosses a step of a coarse sensor.
-        sensors, angles = run.sensors, run.plant.angle_max - run.plant.angle_min
-        draws = 1 if sensors.angle_noise or sensors.pressure_noise else DRAWS
-        for draw, move in product(range(draws), (MOVE, -MOVE)):
-            noisy = sensors._replace(
-                angle_noise=sensors.angle_noise + move * angles,
-                pressure_noise=sensors.pressure_noise + move * pressures,
-                seed=sensors.seed + draw,
-            )
-            repeats.append((MOVED_MEASUREMENT, replace(run, sensors=noisy)))
-    results = again([repeat for _, repeat in repeats])
-    checked = [(name, repeated) for (name, _), repeated in zip(repeats, results, strict=True)]
-    compared = _courses_of(result)
-    courses = tuple(_course(words, channels, checked, result, pressures) for words, channels in compared.items())
-    partings = [repeated.status.time for repeated in results if repeated.status.time is not None]
+        runs += [(MOVED_MEASUREMENT, noisy) for noisy in _measurement_moved(run, _pressure_range(result))]
+    results = rerun([planned for _, planned in runs])
+    repeats = [(kind, repeat) for (kind, _), repeat in zip(runs, results, strict=True)]
+    signals = _recorded_signals(result)
+    courses = tuple(_signal_check(name, signal, repeats, result) for name, signal in signals.items())
+    separations = [repeat.status.time for repeat in results if repeat.status.time is not None]
     for course in courses:
-        for repeated in results:
-            beyond = _largest_differences(repeated.recording, recording, compared[course.name]) > course.allowed
-            partings += [float(recording.time[np.argmax(beyond)])] if beyond.any() else []
+        for repeat in results:
+            differences = _largest_differences(repeat.recording, recording, signals[course.name].channels)
+            is_beyond = differences > course.allowed
+            separations += [float(recording.time[np.argmax(is_beyond)])] if is_beyond.any() else []
     return Check(
         scenario=scenario.name,
-        metrics=_metrics(result, checked, pressures),
+        metrics=_metric_checks(result, repeats),
         courses=courses,
         error=estimated_error(result, results[0]),
-        parts_at=min(partings, default=None),
-        failed=tuple(dict.fromkeys(name for name, repeated in checked if not repeated.status.is_completed)),
+        parts_at=min(separations, default=None),
+        failed=tuple(dict.fromkeys(kind for kind, repeat in repeats if not repeat.status.is_completed)),
     )
 
 
-def start_moved(run: Run, move: float, apart: float) -> Run:
+def _measurement_moved(run: Run, pressures: float) -> list[Run]:
+    """Runs with a little more or less noise on each sensor, as a fraction of the ranges of angle and pressures [Pa]."""
+    sensors, angles = run.sensors, run.plant.angle_max - run.plant.angle_min
+    # One draw alone seldom crosses a step of a coarse sensor without noise.
+    draws = 1 if sensors.angle_noise or sensors.pressure_noise else DRAWS
+    noisy = (
+        sensors._replace(
+            angle_noise=sensors.angle_noise + move * angles,
+            pressure_noise=sensors.pressure_noise + move * pressures,
+            seed=sensors.seed + draw,
+        )
+        for draw, move in product(range(draws), (MOVE, -MOVE))
+    )
+    return [replace(run, sensors=changed) for changed in noisy]
+
+
+def start_moved(run: Run, move: float, opposite: float) -> Run:
     """Run that starts with slightly more gas in both chambers and, for a free vane, at a slightly larger angle.
 
-    With ``apart`` -1 chamber 2 starts with slightly less gas instead, so that a torque that equals the reference
+    With ``opposite`` -1 chamber 2 starts with slightly less gas instead, so that a torque that equals the reference
     exactly no longer does.
     """
     plant, start = run.plant, run.initial
@@ -346,24 +365,25 @@ def start_moved(run: Run, move: float, apart: float) -> Run:
         angle = min(max(shifted, plant.angle_min), plant.angle_max)
     actuator = run.program.actuator
     pressures = pressures_of(actuator, plant, start.angle, start.mass_1, start.mass_2)
-    before, after = (volumes_of(actuator, plant, at, *pressures) for at in (start.angle, angle))
+    before, after = (volumes_of(actuator, plant, vane_angle, *pressures) for vane_angle in (start.angle, angle))
     # Mass in proportion to volume keeps the pressure, so that only the move itself changes it.
     mass_1 = start.mass_1 * after[0] / before[0] * (1.0 + move)
-    mass_2 = start.mass_2 * after[1] / before[1] * (1.0 + apart * move)
+    mass_2 = start.mass_2 * after[1] / before[1] * (1.0 + opposite * move)
     return replace(run, initial=start._replace(angle=angle, mass_1=mass_1, mass_2=mass_2))
 
 
-def _metrics(
-    result: RecordedResult, repeats: list[tuple[str, RecordedResult]], pressures: float
-) -> tuple[NumberCheck, ...]:
-    names = dict.fromkeys(name for one in (result, *(repeat for _, repeat in repeats)) for name in one.metrics)
+def _metric_checks(result: RecordedResult, repeats: list[tuple[str, RecordedResult]]) -> tuple[NumberCheck, ...]:
+    """Changes of every metric that the run or a repeat has."""
+    units: dict[str, str] = {}
+    for compared in (result, *(repeat for _, repeat in repeats)):
+        for name, metric in compared.metrics.items():
+            units.setdefault(name, metric.unit)
     rows = []
-    for name in names:
-        kind = next(one.metrics[name] for one in (result, *(r for _, r in repeats)) if name in one.metrics)
+    for name, unit in units.items():
         value = _value(result, name)
-        changes = _largest((repeat, _difference(_value(repeated, name), value)) for repeat, repeated in repeats)
-        scale = max(abs(value) if math.isfinite(value) else 0.0, _metric_range(result, name, kind.unit, pressures))
-        rows.append(NumberCheck(name, kind.unit, value, ALLOWED_CHANGE * scale, changes, ALLOWED_CHANGE * scale))
+        changes = _largest_changes((kind, _difference(_value(repeat, name), value)) for kind, repeat in repeats)
+        scale = max(abs(value) if math.isfinite(value) else 0.0, _metric_range(result, name, unit))
+        rows.append(NumberCheck(name, unit, value, ALLOWED_CHANGE * scale, changes, ALLOWED_CHANGE * scale))
     return tuple(rows)
 
 
@@ -371,15 +391,15 @@ def _value(result: RecordedResult, name: str) -> float:
     return result.metrics[name].value if name in result.metrics else math.nan
 
 
-def _difference(now: float, before: float) -> float:
-    """Change from ``before`` to ``now``; inf if only one of the two is finite."""
-    if math.isfinite(now) and math.isfinite(before):
-        return now - before
+def _difference(after: float, before: float) -> float:
+    """Change from ``before`` to ``after``; inf if only one of the two is finite."""
+    if math.isfinite(after) and math.isfinite(before):
+        return after - before
     # Equal infinities and two values that are not known are no change.
-    return 0.0 if now == before or (math.isnan(now) and math.isnan(before)) else math.inf
+    return 0.0 if after == before or (math.isnan(after) and math.isnan(before)) else math.inf
 
 
-def _largest(changes: Iterable[tuple[str, float]]) -> dict[str, float]:
+def _largest_changes(changes: Iterable[tuple[str, float]]) -> dict[str, float]:
     """Largest signed change over all perturbations, by kind of repeat."""
     largest: dict[str, float] = {}
     for name, change in changes:
@@ -387,11 +407,11 @@ def _largest(changes: Iterable[tuple[str, float]]) -> dict[str, float]:
     return largest
 
 
-def _metric_range(result: RecordedResult, name: str, unit: str, pressures: float) -> float:
+def _metric_range(result: RecordedResult, name: str, unit: str) -> float:
     """Range of the quantity of a metric; 1 for a count of events, 0 for a unit without a range."""
     scenario, recording = result.scenario, result.recording
-    actuator = scenario.device.actuator
-    angles, torques = actuator.angle_max - actuator.angle_min, abs(actuator.torque_constant) * pressures
+    angles, pressures = _signal_range(result, "rad"), _signal_range(result, "Pa")
+    torques = abs(scenario.device.actuator.torque_constant) * pressures
     # Largest mass in both chambers; a walk does not record it, and takes more than that.
     masses = [recording[name] for name in ("mass_1", "mass_2") if name in recording]
     content = float(np.max(sum(masses))) if masses else 0.0
@@ -408,36 +428,29 @@ def _metric_range(result: RecordedResult, name: str, unit: str, pressures: float
     }
     if unit in ranges:
         return ranges[unit]
-    # A ratio of work and gas is as open as both are; where one is next to nothing, so is what the ratio says.
-    parts = {"mechanical_work": ranges["J"], "gas_supplied": ranges["kg"]}
-    values = {part: abs(_value(result, part)) for part in parts}
-    if not all(value > ALLOWED_CHANGE * parts[part] for part, value in values.items()):
+    # A ratio of work and gas is as uncertain as both are; where one is next to nothing, the ratio means nothing.
+    of_ratio = {"mechanical_work": ranges["J"], "gas_supplied": ranges["kg"]}
+    values = {metric: abs(_value(result, metric)) for metric in of_ratio}
+    if not all(value > ALLOWED_CHANGE * of_ratio[metric] for metric, value in values.items()):
         return math.inf
-    return abs(_value(result, name)) * max(parts[part] / value for part, value in values.items())
+    return abs(_value(result, name)) * max(of_ratio[metric] / value for metric, value in values.items())
 
 
-def _largest_differences(one: Recording, other: Recording, channels: Iterable[str]) -> Floats:
+def _largest_differences(recording: Recording, other: Recording, channels: Iterable[str]) -> Floats:
     """Largest difference over the channels at each sample that both recordings have."""
     # A repeat that diverged is shorter.
-    count = min(len(one), len(other))
-    return np.asarray(np.max([np.abs(one[name][:count] - other[name][:count]) for name in channels], axis=0))
+    count = min(len(recording), len(other))
+    return np.asarray(np.max([np.abs(recording[name][:count] - other[name][:count]) for name in channels], axis=0))
 
 
-def _course(
-    name: str,
-    channels: tuple[str, ...],
-    repeats: list[tuple[str, RecordedResult]],
-    result: RecordedResult,
-    pressures: float,
+def _signal_check(
+    name: str, signal: _ComparedSignal, repeats: list[tuple[str, RecordedResult]], result: RecordedResult
 ) -> NumberCheck:
-    device = result.scenario.device
-    span, unit, promised = {
-        "angle over time": (device.actuator.angle_max - device.actuator.angle_min, "rad", LARGEST_OF_ANGLE),
-        "pressures over time": (pressures, "Pa", LARGEST_OF_PRESSURE),
-        _TEMPERATURES: (device.gas.temperature, "K", LARGEST_OF_TEMPERATURE),
-    }[name]
-    changes = _largest(
-        (repeat, float(np.max(_largest_differences(repeated.recording, result.recording, channels))))
-        for repeat, repeated in repeats
+    """Largest changes of a signal over time."""
+    extent = _signal_range(result, signal.unit)
+    changes = _largest_changes(
+        (kind, float(np.max(_largest_differences(repeat.recording, result.recording, signal.channels))))
+        for kind, repeat in repeats
     )
-    return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes, promised * span / MARGIN)
+    promised = signal.promised_error * extent / MARGIN
+    return NumberCheck(name, signal.unit, extent, ALLOWED_PARTING * extent, changes, promised)

@@ -1,16 +1,19 @@
-"""Document of a scenario: values by dotted path, and conversion of a text with its unit to SI or a one-line error."""
+"""Document of a scenario: request to build from it, values by dotted path, conversion of a text with its unit to SI."""
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.problems import quote
 from ppafo.errors import ScenarioError, UnitError
 from ppafo.model.controlled import CONTROLLED, TORQUE
-from ppafo.model.declaration import Quantity, range_rule
-from ppafo.parameters.declaration import is_within, limits_text
+from ppafo.model.declaration import Quantity
+from ppafo.parameters import ParameterSet
+from ppafo.parameters.declaration import is_within, range_rule
+from ppafo.parameters.overrides import Override
 from ppafo.units import format_quantity, parse_quantity, split_quantity
 from ppafo.units.shown import shown_unit
 from ppafo.wording import one_line
@@ -40,6 +43,25 @@ def controlled_in(document: Mapping[str, Any]) -> str:
     """Return the controlled quantity of a document's reference: a torque by default, and also for an unknown word."""
     name = value_at(document, REFERENCE_OF)
     return name if isinstance(name, str) and name in CONTROLLED else TORQUE
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioRequest:
+    """Request to build a scenario.
+
+    ``file`` is the name of the scenario in messages, ``path`` the file, if there is one, ``folder`` the folder from
+    which relative paths start, and ``content`` the document as given. ``parameter_set`` replaces the parameter set that
+    the document names. ``instead`` maps a path in the document to the name of another file; relative names in
+    ``instead`` start from the working folder.
+    """
+
+    file: str
+    path: str | None
+    folder: Path
+    content: dict[str, Any]
+    overrides: tuple[Override, ...]
+    parameter_set: ParameterSet | None = None
+    instead: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +113,7 @@ class DocumentReader:
             raise self.refusal(path, f"a number without a unit; must be {_form(quantity, result)}")
         if not is_within(result, quantity):
             given = split_quantity(value)[1] if isinstance(value, str) else quantity.unit
-            raise self.refusal(path, range_rule(quantity, limits_text(quantity, given)))
+            raise self.refusal(path, range_rule(quantity, given))
         return result
 
     def section(

@@ -19,12 +19,12 @@ from ppafo.parameters.overrides import (
     in_two_forms,
     read_overrides,
 )
-from ppafo.simulation.building import ScenarioRequest, build_scenario
+from ppafo.simulation.building import build_scenario
 from ppafo.simulation.declaration import (
     OF_A_VANE,
     DeclaredContent,
 )
-from ppafo.simulation.document import DocumentReader, value_at
+from ppafo.simulation.document import DocumentReader, ScenarioRequest, value_at
 from ppafo.simulation.numbers import check_parts
 from ppafo.simulation.overrides import OverriddenDocument, apply_overrides
 from ppafo.simulation.scenario import (

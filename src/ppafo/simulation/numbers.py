@@ -5,14 +5,14 @@ from collections.abc import Collection, Mapping
 from dataclasses import fields, replace
 from typing import Any
 
+from ppafo.arguments.conversion import taken_number
 from ppafo.arguments.values import shown
-from ppafo.arguments.words import taken_number
 from ppafo.errors import ScenarioError
 from ppafo.model.catalog import VALVES, device_effects
 from ppafo.model.controlled import CONTROLLED
-from ppafo.model.declaration import Quantity, range_rule
+from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
-from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, is_within, limits_text, members
+from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, is_within, members, range_rule
 from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.effects import number_under, part_of
 from ppafo.parameters.graph import Graph, holding, in_other_forms, left, paths_in, resolved
@@ -34,6 +34,8 @@ _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow
 _OF_DEVICE = (*_DEVICE_SECTIONS, "valve", EFFECT_SETTINGS)
 ORIFICES = {"valve": ("device", "valve", "orifice"), "actuator.leak": ("device", "actuator", "leak")}
 
+WHOLE_NUMBERS = ("sensors.seed", "wearer.person")
+"""Paths of index-like numbers: a random seed, and a person of the population."""
 _RATE, _PERIOD = "controller.rate", "controller.period"
 
 
@@ -97,7 +99,7 @@ def check_parts(scenario: Scenario) -> None:
         except ValueError:
             is_good = False
         if not is_good:
-            raise refusal(path, value, range_rule(quantity, limits_text(quantity, quantity.unit)))
+            raise refusal(path, value, range_rule(quantity, quantity.unit))
     _ACCEPTED.append(scenario)
 
 

@@ -22,8 +22,10 @@ from ppafo.units import SI, number_text
 from ppafo.wording import nearest_name
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+"""Number without a unit."""
 _SEED, _VALVE = "sensors.seed", "device.valve"
 _OF_ANY_KIND = {"controller": frozenset({"kind", "rate", "period"})}
+"""Keys of a section that every kind has."""
 _KIND = "kind"
 """Last name of the paths of kinds, which decide the other values of their section."""
 
@@ -43,35 +45,45 @@ def apply_overrides(
     """Return a changed copy of a document; ``file`` is the document's name in messages.
 
     Naming another kind of motion, controller, timing or profile drops the settings of the document that only the old
-    kind has; giving a rate drops its period, and vice versa. A gain on the torque may omit its unit. Raises
-    ScenarioError for a path that is neither ``declared`` nor of the device, and for an override that another one makes
-    useless.
+    kind has; giving a rate drops its period, and vice versa. A gain on the torque, or one of 0, may omit its unit.
+    Raises ScenarioError for a path that is neither ``declared`` nor of the device, and for an override that another one
+    makes useless.
     """
-    overrides_of = override_set(overrides, ScenarioError, declared.same)
-    if _VALVE in overrides_of:
-        chosen = overrides_of[_VALVE]
-        check_valve(overrides_of.values(), chosen.text, f"override '{chosen}'", ScenarioError)
-    changed = _with_one_path_each(document, file, declared)
-    of_device = {
-        path: override
-        for path, override in overrides_of.items()
-        if path not in declared.appended and is_of_device(path)
+    override_at = override_set(overrides, ScenarioError, declared.same)
+    if _VALVE in override_at:
+        valve = override_at[_VALVE]
+        check_valve(override_at.values(), valve.text, f"override '{valve}'", ScenarioError)
+    changed = _with_preferred_paths(document, file, declared)
+    device_overrides = {
+        path: override for path, override in override_at.items() if path not in declared.appended and is_of_device(path)
     }
-    own = {path: override for path, override in overrides_of.items() if path not in of_device}
-    waiting = _choose_kinds(changed, own, file, declared)
-    known = declared.paths(changed) if own else ()
-    for path in sorted(own):
-        if path not in known:
-            # Where a kind is unknown too, that is the mistake.
-            declared.find_kinds(changed, file)
-            raise _unused(path, own, (*known, *declared.same), file)
-    for path in waiting:
+    scenario_overrides = {path: override for path, override in override_at.items() if path not in device_overrides}
+    remaining = _choose_kinds(changed, scenario_overrides, file, declared)
+    known = declared.paths(changed) if scenario_overrides else ()
+    for path in sorted(scenario_overrides):
+        if path in known:
+            continue
+        # Where a kind is unknown too, that is the mistake.
+        declared.find_kinds(changed, file)
+        override = scenario_overrides[path]
+        deciding = deciding_kinds(path, filter(_is_kind_path, scenario_overrides))
+        if not deciding:
+            raise unknown_value(override, (*known, *declared.same), f"{file} has")
+        section = f"{deciding[-1].rpartition('.')[0]}."
+        names = [name for name in (*known, *declared.same) if name.startswith(section)]
+        hint = nearest_name(path, names) or f"; there it has {', '.join(names)}"
+        raise ScenarioError(
+            f"overrides '{override}' and '{scenario_overrides[deciding[-1]]}': with the latter {file} has no value "
+            f"'{path}'{hint}"
+        )
+    for path in remaining:
         if path in declared.appended:
-            section, inner = declared.appended[path]
-            changed.setdefault(section, {}).setdefault("overrides", []).append(f"{inner}={own[path].text}")
+            section, path_in_section = declared.appended[path]
+            texts = changed.setdefault(section, {}).setdefault("overrides", [])
+            texts.append(f"{path_in_section}={scenario_overrides[path].text}")
         else:
-            _set(changed, path, own[path].text, file, declared)
-    return OverriddenDocument(changed, frozenset(own), tuple(of_device.values()))
+            _set(changed, path, scenario_overrides[path].text, file, declared)
+    return OverriddenDocument(changed, frozenset(scenario_overrides), tuple(device_overrides.values()))
 
 
 def over_layer(
@@ -90,75 +102,64 @@ def over_layer(
         if override.typed == _VALVE:
             valve = override.text
             earlier = [old for old in earlier if not of_another_valve(old.typed, valve)]
-    every = layered(earlier, later, ScenarioError, declared.same, valve)
-    new = {path for path, override in every.items() if override in later}
-    choosing = set(filter(_is_choosing, new))
-    if not choosing:
-        return tuple(every.values())
-    changed = _with_one_path_each(content, file, declared)
-    _choose_kinds(changed, every, file, declared)
-    known = new.union(declared.paths(changed))
-    return tuple(override for path, override in every.items() if path in known or not chosen_by(path, choosing))
+    combined = layered(earlier, later, ScenarioError, declared.same, valve)
+    later_paths = {path for path, override in combined.items() if override in later}
+    kind_paths = set(filter(_is_kind_path, later_paths))
+    if not kind_paths:
+        return tuple(combined.values())
+    changed = _with_preferred_paths(content, file, declared)
+    _choose_kinds(changed, combined, file, declared)
+    known = later_paths.union(declared.paths(changed))
+    return tuple(
+        override for path, override in combined.items() if path in known or not deciding_kinds(path, kind_paths)
+    )
 
 
-def _is_choosing(path: str) -> bool:
+def _is_kind_path(path: str) -> bool:
     section, _, name = path.rpartition(".")
     return bool(section) and name == _KIND
 
 
-def chosen_by(path: str, choosing: Iterable[str]) -> list[str]:
+def deciding_kinds(path: str, kind_paths: Iterable[str]) -> list[str]:
     """Return the kind paths that decide whether a path exists, the innermost last."""
-    found = []
-    for chosen in choosing:
-        own = f"{chosen.rpartition('.')[0]}."
-        found += [chosen] if chosen != path and path.startswith(own) else []
-    return sorted(found, key=len)
+    deciding = [
+        kind_path
+        for kind_path in kind_paths
+        if kind_path != path and path.startswith(f"{kind_path.rpartition('.')[0]}.")
+    ]
+    return sorted(deciding, key=len)
 
 
 def _choose_kinds(
-    document: dict[str, Any], overrides_of: Mapping[str, Override], file: str, declared: DeclaredContent
+    document: dict[str, Any], override_at: Mapping[str, Override], file: str, declared: DeclaredContent
 ) -> tuple[str, ...]:
     """Set the given kinds, outer sections first, and return the remaining paths.
 
     A kind of a missing section is among the remaining paths.
     """
     # A kind of an outer section decides which sections there are inside it.
-    first = sorted(filter(_is_choosing, overrides_of), key=lambda path: (path.count("."), path))
+    kind_paths = sorted(filter(_is_kind_path, override_at), key=lambda path: (path.count("."), path))
     done = set()
-    for path in first:
+    for path in kind_paths:
         if path in declared.paths(document):
             if path == "motion.kind":
-                declared.check_motion(overrides_of[path].text, f"override '{overrides_of[path]}'")
-            _set(document, path, overrides_of[path].text, file, declared)
+                declared.check_motion(override_at[path].text, f"override '{override_at[path]}'")
+            _set(document, path, override_at[path].text, file, declared)
             done.add(path)
-    return tuple(path for path in sorted(overrides_of) if path not in done)
+    return tuple(path for path in sorted(override_at) if path not in done)
 
 
-def _unused(path: str, overrides_of: Mapping[str, Override], known: tuple[str, ...], file: str) -> ScenarioError:
-    """Return the error for a useless override: incompatible with a given kind, or of an unknown path."""
-    choosing = chosen_by(path, filter(_is_choosing, overrides_of))
-    if not choosing:
-        return unknown_value(overrides_of[path], known, f"{file} has")
-    section = f"{choosing[-1].rpartition('.')[0]}."
-    near = [known_path for known_path in known if known_path.startswith(section)]
-    hint = nearest_name(path, near) or f"; there it has {', '.join(near)}"
-    return ScenarioError(
-        f"overrides '{overrides_of[path]}' and '{overrides_of[choosing[-1]]}': with the latter {file} has no value "
-        f"'{path}'{hint}"
-    )
-
-
-def _with_one_path_each(document: Mapping[str, Any], file: str, declared: DeclaredContent) -> dict[str, Any]:
+def _with_preferred_paths(document: Mapping[str, Any], file: str, declared: DeclaredContent) -> dict[str, Any]:
     """Return a copy of a document in which each value is at its preferred path."""
     changed = copy.deepcopy(dict(document))
-    for path, kept in declared.same.items():
+    for path, preferred in declared.same.items():
         section, _, name = path.rpartition(".")
         table = value_at(changed, section)
         if not isinstance(table, dict) or name not in table:
             continue
-        if kept in changed:
-            raise ScenarioError(f"{file}: give either {path} or {kept}, not both")
-        changed[kept] = table.pop(name)
+        if preferred in changed:
+            raise ScenarioError(f"{file}: give either {path} or {preferred}, not both")
+        changed[preferred] = table.pop(name)
     return changed
 
 
@@ -174,14 +175,14 @@ def is_of_device(path: str) -> bool:
     return path.partition(".")[0] in {*SECTIONS, EFFECTS_SECTION, "valve", "valves"}
 
 
-def unknown_value(override: Override, known: tuple[str, ...], who_has: str) -> ScenarioError:
-    """Return the error for an unknown path; ``who_has`` is the start of its text, such as ``task.toml has``."""
+def unknown_value(override: Override, known: tuple[str, ...], owner: str) -> ScenarioError:
+    """Return the error for an unknown path; ``owner`` is the start of its text, such as ``task.toml has``."""
     EFFECTS.load_own()
     allowed = [*known, *device_paths()]
     section = override.typed.partition(".")[0]
-    near = [name for name in known if name.startswith(f"{section}.")]
-    hint = nearest_name(override.typed, allowed) or f"; for example {', '.join(near[:6] or known[:6])}"
-    return ScenarioError(f"override '{override}': {who_has} no value '{override.typed}'{hint}")
+    examples = [name for name in known if name.startswith(f"{section}.")] or known
+    hint = nearest_name(override.typed, allowed) or f"; for example {', '.join(examples[:6])}"
+    return ScenarioError(f"override '{override}': {owner} no value '{override.typed}'{hint}")
 
 
 def _set(document: dict[str, Any], path: str, text: str, file: str, declared: DeclaredContent) -> None:
@@ -193,11 +194,11 @@ def _set(document: dict[str, Any], path: str, text: str, file: str, declared: De
             raise ScenarioError(f"override '{path}={text}': {file} has no table [{section}]")
     if name == _KIND and table.get(_KIND) != text:
         # What both kinds have stays as the document gives it.
-        before = _setting_names(document, section, declared)
+        old_names = _setting_names(document, section, declared)
         table[_KIND] = text
-        after = _setting_names(document, section, declared)
-        for lost in before - after - _OF_ANY_KIND.get(section, frozenset()):
-            table.pop(lost, None)
+        new_names = _setting_names(document, section, declared)
+        for name_of_old_kind in old_names - new_names - _OF_ANY_KIND.get(section, frozenset()):
+            table.pop(name_of_old_kind, None)
     # Area and conductance, rate and period: given in another form as well, a value would be there twice.
     for other in other_forms(path):
         table.pop(other.rpartition(".")[2], None)
@@ -207,10 +208,12 @@ def _set(document: dict[str, Any], path: str, text: str, file: str, declared: De
         except ValueError as error:
             raise ScenarioError(f"override '{path}={text}': must be a whole number") from error
         return
-    # Papers print gains on the torque without units, so one without gets its SI unit.
+    # Papers print gains on the torque without units, so one without gets its SI unit; 0 is the same in any unit.
     quantity = declared.quantities(document).get(path)
-    is_gain = quantity is not None and path.startswith("controller.") and "(N m" in quantity.unit
-    table[name] = f"{text} {quantity.unit}" if quantity is not None and is_gain and _NUMBER.fullmatch(text) else text
+    is_bare = quantity is not None and path.startswith("controller.") and _NUMBER.fullmatch(text)
+    if quantity is not None and is_bare and ("(N m" in quantity.unit or ("/" in quantity.unit and float(text) == 0.0)):
+        text = f"{text} {quantity.unit}"
+    table[name] = text
 
 
 def _setting_names(document: dict[str, Any], section: str, declared: DeclaredContent) -> frozenset[str]:

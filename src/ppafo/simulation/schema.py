@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field, WithJsonSchema
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind
-from ppafo.documents.models import SchemaVersion, make_schema, one_of, optional, table
+from ppafo.documents.models import REFERENCE, SchemaVersion, make_schema, one_of, optional, table
 from ppafo.documents.problems import NAME
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
@@ -233,8 +233,11 @@ def _scenario_file(sections: tuple[str, ...], kinds: tuple[tuple[str, str], ...]
     return file_model("ScenarioFile", own, sections)
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a scenario file, with the controllers and profiles of all packages."""
+def json_schema(reference: str = REFERENCE) -> dict[str, Any]:
+    """Return the JSON Schema of a scenario file, with the controllers and profiles of all packages.
+
+    ``reference`` is the template of references to its definitions.
+    """
     CONTROLLERS.load_all()
     PROFILES.load_all()
-    return make_schema(scenario_file(), "ppafo scenario")
+    return make_schema(scenario_file(), "ppafo scenario", reference)

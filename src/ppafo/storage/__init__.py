@@ -2,14 +2,13 @@
 
 from ppafo.storage.comma_separated import read_csv, write_csv
 from ppafo.storage.netcdf import dataset_of, write_netcdf
-from ppafo.storage.result_folder import StoredResult, check_result_folder, read_recording, read_stored, write_result
+from ppafo.storage.result_folder import StoredResult, check_result_folder, read_stored, write_result
 
 __all__ = [
     "StoredResult",
     "check_result_folder",
     "dataset_of",
     "read_csv",
-    "read_recording",
     "read_stored",
     "write_csv",
     "write_netcdf",

@@ -11,12 +11,12 @@ import numpy as np
 from ppafo.errors import ScenarioError, UnitError, refused_as
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import alternatives, fits, is_within, limits_text
+from ppafo.parameters.declaration import alternatives, fits, is_within, range_rule
 from ppafo.parameters.graph import counts_from, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si, unit_in
-from ppafo.simulation.building import parameter_set_of
 from ppafo.simulation.document import PLAIN
-from ppafo.simulation.numbers import declared_numbers, number_at
+from ppafo.simulation.hardware import parameter_set_of
+from ppafo.simulation.numbers import WHOLE_NUMBERS, declared_numbers, number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import (
@@ -31,20 +31,17 @@ from ppafo.studies.distributions import (
     UniformBetween,
     WholeNumbersBetween,
 )
-from ppafo.studies.sampling import NOISE
 from ppafo.studies.study import Axis, RandomValue
 from ppafo.units import parse_quantity, split_pressure_kind, split_quantity
 from ppafo.units.shown import shown_unit, shown_value
 from ppafo.wording import nearest_name
 
-WHOLE = (NOISE, "wearer.person")
-"""Paths of index-like numbers: a random seed, and a person of the population."""
 _UNIT_OF_DIFFERENCE = {"Pa_a": "Pa_d"}
 _OFFSET_UNITS = ("degC", "°C")
 DEVIATIONS_IN_HALF_WIDTH = 1.959963984540054
 """Half width of the 95 % interval of a normal distribution, in standard deviations."""
 _STATED_DIFFERENCES = {"psi_g": "psi_d", "psi_a": "psi_d", "degC": "K", "°C": "K"}
-_SMALLEST_SAID, _LARGEST_SAID = 1.0e-3, 1.0e7
+_SMALLEST_SHOWN, _LARGEST_SHOWN = 1.0e-3, 1.0e7
 """Range of numbers that are displayed in the unit in which they were given."""
 
 
@@ -67,7 +64,7 @@ class VariedPath:
         number = self._in_si(value, self.quantity)
         if not is_within(number, self.quantity):
             given = split_quantity(value)[1] if isinstance(value, str) else ""
-            raise UnitError(f"{self.path} must be {limits_text(self.quantity, given)}")
+            raise UnitError(f"{self.path} {range_rule(self.quantity, given)}")
         return _parse(str(value), self.quantity, 0.0) if self.is_gauge else number
 
     def distance(self, value: str | float) -> float:
@@ -137,7 +134,7 @@ def given_in(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
     A unit in which the number needs a power of ten, such as 1.451e-5 m^3, is not used for display.
     """
     number, unit = next((split_quantity(str(text)) for text in texts if unit_in(text)), (0.0, ""))
-    is_plain = number == 0.0 or _SMALLEST_SAID <= abs(number) < _LARGEST_SAID
+    is_plain = number == 0.0 or _SMALLEST_SHOWN <= abs(number) < _LARGEST_SHOWN
     return replace(varied, given=unit) if is_plain and fits(unit, varied.quantity.unit) else varied
 
 
@@ -167,9 +164,9 @@ def texts_of(entry: declared.Varied) -> list[object]:
 
 def axis_or_distribution(entry: declared.Varied, varied: VariedPath) -> Axis | RandomValue:
     """Return the axis or distribution of a table; UnitError with the key for an unusable or contradictory value."""
-    is_counted, is_whole = entry.path in WHOLE, entry.kind == "whole_numbers"
+    is_counted, is_whole = entry.path in WHOLE_NUMBERS, entry.kind == "whole_numbers"
     if is_whole and not is_counted:
-        raise UnitError(f"kind = 'whole_numbers' is for {' and '.join(WHOLE)} alone; use 'choice' or 'uniform'")
+        raise UnitError(f"kind = 'whole_numbers' is for {' and '.join(WHOLE_NUMBERS)} alone; use 'choice' or 'uniform'")
     if is_counted and entry.kind not in ("grid", "list", "choice", "whole_numbers"):
         raise UnitError(
             f"kind = '{entry.kind}' gives no whole numbers, which '{entry.path}' needs; use 'whole_numbers'"
@@ -190,7 +187,7 @@ def axis_or_distribution(entry: declared.Varied, varied: VariedPath) -> Axis | R
 
 
 def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
-    broken = [value for value in values if path in WHOLE and value != math.floor(value)]
+    broken = [value for value in values if path in WHOLE_NUMBERS and value != math.floor(value)]
     if broken:
         raise UnitError(f"{broken[0]:g} must be a whole number")
     return values

@@ -24,10 +24,10 @@ from ppafo.simulation.recorded.channels import (
     check_gaps,
 )
 from ppafo.simulation.recorded.clock import usual_interval
-from ppafo.storage import read_recording
 from ppafo.storage.column_map import ColumnMap, column_map_of
 from ppafo.storage.files import read_bytes
 from ppafo.storage.foreign import read_foreign
+from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import NETCDF_FILE
 from ppafo.units.shown import in_units, shown_text
 from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2

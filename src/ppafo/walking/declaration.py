@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS, load_walking_controller, walking_controllers
 from ppafo.control.walking.timings import TIMINGS
-from ppafo.documents.models import make_schema, one_of, optional, table
+from ppafo.documents.models import REFERENCE, make_schema, one_of, optional, table
 from ppafo.documents.problems import quote
 from ppafo.errors import KindError, ScenarioError, refused_as
 from ppafo.model.declaration import Quantity
@@ -278,10 +278,10 @@ def _faults_table() -> type[BaseModel]:
     return table("Faults", faults)
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a walk file."""
+def json_schema(reference: str = REFERENCE) -> dict[str, Any]:
+    """Return the JSON Schema of a walk file; ``reference`` is the template of references to its definitions."""
     WALKING_CONTROLLERS.load_all()
     CONTROLLERS.load_all()
     MOTIONS.load_all()
     motions = tuple(name for name in MOTIONS if is_walk(name))
-    return make_schema(_walk_file(tuple(walking_controllers().items()), motions), "ppafo walk")
+    return make_schema(_walk_file(tuple(walking_controllers().items()), motions), "ppafo walk", reference)

@@ -27,19 +27,13 @@ from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import read_overrides
 from ppafo.parameters.plant import venting_valve
 from ppafo.plugins import Plugins, name_plugins
-from ppafo.simulation.building import (
-    ScenarioRequest,
-    assumed_lines,
-    origin_of,
-    read_device,
-    read_gas_model,
-    read_hardware,
-    read_supply_line,
-)
+from ppafo.simulation.assumptions import assumed_lines
+from ppafo.simulation.building import origin_of, read_gas_model, read_supply_line
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE
 from ppafo.simulation.default_gains import loop_terms
-from ppafo.simulation.document import DocumentReader, kind_at, value_at
+from ppafo.simulation.document import DocumentReader, ScenarioRequest, kind_at, value_at
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
+from ppafo.simulation.hardware import read_device, read_hardware
 from ppafo.simulation.law_signals import IN_WALK, PERIOD_PATH
 from ppafo.simulation.loading import Layout, request_again, scenario_of
 from ppafo.simulation.motion_kind import MOTIONS, WALK

@@ -21,7 +21,7 @@ from ppafo.simulation import at_hand
 from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
-from ppafo.simulation.tracking import Tracking, tracking_in
+from ppafo.simulation.tracking import Tracking, following_text, tracking_in
 from ppafo.simulation.vane_recording import gas_channels
 from ppafo.storage.opensim import write_opensim
 from ppafo.storage.opensim_names import opensim_recording
@@ -49,7 +49,7 @@ from ppafo.walking.strides import (
     task_sequence_metrics,
     walk_metrics,
 )
-from ppafo.walking.task_sequence import PlannedSequence, pace_in_time
+from ppafo.walking.task_sequence_plan import PlannedSequence, pace_in_time
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -214,6 +214,29 @@ class WalkResult:
         return None if strides is None or strides.value == 0.0 else tracking_in(self)
 
     @in_units(_units_of)
+    def verdict_lines(self, verdict: Tracking | None) -> list[str]:
+        """Lines on whether the walk is useful: torque, strides with help, and toes that would drag.
+
+        ``verdict`` is ``tracking``, with or without remedies that were tried.
+        """
+        if verdict is not None:
+            lines = [verdict.sentence]
+        elif not self.is_helped:
+            lines = [self.help_text]
+        else:
+            lines = [following_text(self) if "strides" in self.metrics else ""]
+        toes = self.metrics.get("lowest_toes")
+        if toes is not None and toes.value < 0.0:
+            lines.append("the toes would drag in mid-swing: the ankle is not lifted enough")
+        return [line for line in lines if line]
+
+    @property
+    def help_text(self) -> str:
+        """Number of strides with help, and a remark if these are fewer than half."""
+        enough = "" if self.is_helped else ": fewer than half"
+        return f"help in {int(self.helped.sum())} of {self.helped.size} strides{enough}"
+
+    @in_units(_units_of)
     def __repr__(self) -> str:
         """Return name, status, duration and a line for each metric, in display units."""
         from ppafo.report.display_units import name_lines
@@ -223,11 +246,11 @@ class WalkResult:
 
     @in_units(_units_of)
     def __str__(self) -> str:
-        """Return status and metrics in display units, as printed by ``ppafo simulate``."""
+        """Return status, verdict and metrics in display units, as printed by ``ppafo simulate``."""
         from ppafo.report.display_units import metrics_lines
 
-        head = f"{self.scenario.name}: {self.status.kind}"
-        return "\n".join([head, "", *metrics_lines(self.metrics)])
+        verdict = self.verdict_lines(self.tracking) if self.status.is_completed else []
+        return "\n".join([f"{self.scenario.name}: {self.status.kind}", *verdict, "", *metrics_lines(self.metrics)])
 
     @in_units(_units_of)
     def plot(self) -> "Figure":

@@ -16,7 +16,7 @@ from pandas import DataFrame, Series
 
 import ppafo
 from ppafo import ArgumentError, Channel, DataError, ScenarioError
-from ppafo.arguments.words import taken_document, taken_overrides, taken_text
+from ppafo.arguments.conversion import taken_document, taken_overrides, taken_text
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.scenario import Sensors

@@ -26,7 +26,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, Status, compile_models
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
-from ppafo.storage.result_folder import check_owned_folder, marked_folder, write_marked_folder
+from ppafo.storage.owned_folder import check_owned_folder, marked_folder, write_marked_folder
 from ppafo.units.shown import counted_from, shown_in
 
 FILES = ["figure.png", "figure.svg", "recording.csv", "recording.nc", "report.html", "run.json"]

@@ -17,7 +17,7 @@ from ppafo.page.html import bundled, digest
 from ppafo.page.workbench import live_part
 from ppafo.storage import read_csv
 from ppafo.storage.netcdf_reading import read_netcdf
-from ppafo.storage.result_folder import read_recording
+from ppafo.storage.reading import read_recording
 from ppafo.walking import loading
 from ppafo.walking.loading import load_walk
 

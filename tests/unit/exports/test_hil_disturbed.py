@@ -19,11 +19,13 @@ from typing import Protocol
 import pytest
 
 from ppafo.errors import ScenarioError
-from ppafo.exports.hil.loop import BROKEN, SILENT, RealTime
+from ppafo.exports.hil.loop import BROKEN, SILENT
+from ppafo.exports.hil.pacing import RealTime
 from ppafo.exports.hil.plant import CompiledPlant, plant_of
+from ppafo.exports.hil.ports import open_port
 from ppafo.exports.hil.result import HardwareRun
 from ppafo.exports.hil.run import run_plant
-from ppafo.exports.hil.wire import Reader, WireSample, open_port, sample_bytes
+from ppafo.exports.hil.wire import Reader, WireSample, sample_bytes
 from ppafo.model.valves.kind import VENT
 from ppafo.simulation.loading import load_scenario
 from tests.virtual_wire import Fault, ProportionalPartner, faults, undisturbed
@@ -156,7 +158,7 @@ def assert_only_fresh_commands_act(found: HardwareRun, partner: ProportionalPart
     """What acts is a command of the last 20 ms, and once the plant is vented nothing else ever."""
     sent = {number: command / 1.0e6 for number, command in partner.commands.items()}
     vented = False
-    for number, row in enumerate(found.exchange.rows):
+    for number, row in enumerate(found.traffic.rows):
         assert row.is_vented >= vented
         vented = row.is_vented
         fresh = {sent[old] for old in range(max(0, number - 19), number + 1) if old in sent}
@@ -178,11 +180,11 @@ def test_lost_late_doubled_and_garbled_packets_neither_crash_nor_act(kind: str, 
     partner = ProportionalPartner()
     with serving(kind, partner, disturbed(partner, fault, 5)) as address:
         found = run_at(address, plant())
-    assert len(found.exchange.rows) == SAMPLES
-    assert found.exchange.vented in ("", SILENT)
-    assert found.exchange.failure == ""
+    assert len(found.traffic.rows) == SAMPLES
+    assert found.traffic.vent_reason in ("", SILENT)
+    assert found.traffic.failure == ""
     assert_only_fresh_commands_act(found, partner)
-    dropped = found.exchange.refused.total() + found.exchange.ignored.total()
+    dropped = found.traffic.refused.total() + found.traffic.ignored.total()
     assert found.document()["missed"] + dropped > 10
 
 
@@ -203,9 +205,9 @@ def test_a_controller_that_goes_away_leaves_no_pressure(kind: str) -> None:
     with serving(kind, partner, leaving(partner)) as address:
         found = run_at(address, plant("0.8 s"))
     # A serial device is known to be gone; a datagram that nobody takes is lost.
-    assert found.exchange.vented == (SILENT if kind == "udp" else BROKEN)
-    assert ("the serial port broke" in found.exchange.failure) == (kind == "serial")
-    assert len(found.exchange.rows) == 800
+    assert found.traffic.vent_reason == (SILENT if kind == "udp" else BROKEN)
+    assert ("the serial port broke" in found.traffic.failure) == (kind == "serial")
+    assert len(found.traffic.rows) == 800
     assert_only_fresh_commands_act(found, partner)
     recording = found.result.recording
     for chamber in ("pressure_1", "pressure_2"):
@@ -247,8 +249,8 @@ def test_a_flood_neither_holds_the_plant_nor_acts(kind: str, flood: bytes) -> No
 
     with serving(kind, partner, act) as address:
         found = run_at(address, plant())
-    assert len(found.exchange.rows) == SAMPLES
-    assert found.exchange.refused.total() > 100
+    assert len(found.traffic.rows) == SAMPLES
+    assert found.traffic.refused.total() > 100
     assert_only_fresh_commands_act(found, partner)
 
 
@@ -266,9 +268,9 @@ def test_answers_in_two_halves_are_answers_and_halves_alone_are_none() -> None:
 
     with serving("serial", partner, act) as address:
         found = run_at(address, plant())
-    assert found.exchange.vented == SILENT
-    assert found.exchange.vented_at is not None
-    assert 0.02 < found.exchange.vented_at <= 0.085
-    assert found.exchange.taken > 0
-    assert found.exchange.refused.total() > 0
+    assert found.traffic.vent_reason == SILENT
+    assert found.traffic.vented_at is not None
+    assert 0.02 < found.traffic.vented_at <= 0.085
+    assert found.traffic.accepted > 0
+    assert found.traffic.refused.total() > 0
     assert_only_fresh_commands_act(found, partner)

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
-from ppafo.exports.hil.loop import BROKEN, NOT_SOUND, SILENT, STOPPED, Bench, LockStep, LogRow, RealTime
+from ppafo.exports.hil.loop import BROKEN, NOT_SOUND, SILENT, STOPPED, Bench, LogRow
+from ppafo.exports.hil.pacing import LockStep, RealTime
 from ppafo.exports.hil.plant import CompiledPlant, check_baud, plant_of
 from ppafo.exports.hil.result import HardwareRun, longest_silence
 from ppafo.exports.hil.run import run_plant
@@ -51,7 +52,7 @@ def run_on(wire: VirtualWire, made: CompiledPlant | None = None, **further: obje
 
 
 def rows_of(found: HardwareRun) -> tuple[LogRow, ...]:
-    return found.exchange.rows
+    return found.traffic.rows
 
 
 def replayed_is_same(found: HardwareRun) -> bool:
@@ -74,9 +75,9 @@ def test_a_controller_that_answers_in_time_decides_as_in_a_simulation(name: str)
     found = run_on(wire, plant_of(scenario))
     wanted = simulate(scenario.controlled_by(ProportionalLaw())).recording
     assert found.is_good
-    assert len(found.sent_late) - len(found.answered_after) == 0
-    assert found.sent_late == pytest.approx([0.0] * 200, abs=1e-12)
-    assert found.answered_after[1:] == pytest.approx([3.0e-4] * 199, abs=1e-12)
+    assert len(found.delays) - len(found.response_times) == 0
+    assert found.delays == pytest.approx([0.0] * 200, abs=1e-12)
+    assert found.response_times[1:] == pytest.approx([3.0e-4] * 199, abs=1e-12)
     for channel in wanted.names:
         assert np.array_equal(found.result.recording[channel], wanted[channel]), channel
     assert replayed_is_same(found)
@@ -104,8 +105,8 @@ def test_a_controller_that_falls_silent_for_20_ms_is_vented(name: str) -> None:
     commands = [row.command for row in rows_of(found)]
     assert commands[59:79] == [partner.commands[59] / 1e6] * 20
     assert commands[79:] == [VENT] * (1000 - 79)
-    assert found.exchange.vented == SILENT
-    assert found.exchange.vented_at == pytest.approx(0.079)
+    assert found.traffic.vent_reason == SILENT
+    assert found.traffic.vented_at == pytest.approx(0.079)
     assert not found.is_good
     assert longest_silence(rows_of(found)) == 1000 - 60
     atmosphere = found.plant.scenario.device.supply.atmospheric_pressure
@@ -123,7 +124,7 @@ def test_nineteen_missed_samples_vent_nothing_and_twenty_do() -> None:
         partner = ProportionalPartner()
         lost = range(50, 50 + missing)
         wire = VirtualWire(lambda data, lost=lost, partner=partner: without(partner, data, lost))
-        assert bool(run_on(wire).exchange.vented) == vents
+        assert bool(run_on(wire).traffic.vent_reason) == vents
 
 
 def without(partner: ProportionalPartner, data: bytes, lost: range) -> list[bytes]:
@@ -140,20 +141,20 @@ def test_one_answer_again_and_again_does_not_keep_the_plant_from_venting() -> No
         return kept[:10][-1:]
 
     found = run_on(VirtualWire(stuck))
-    assert found.exchange.vented == SILENT
-    assert found.exchange.vented_at == pytest.approx(0.029)
-    assert found.exchange.ignored["doubled or overtaken"] >= 190 - 10
+    assert found.traffic.vent_reason == SILENT
+    assert found.traffic.vented_at == pytest.approx(0.029)
+    assert found.traffic.ignored["doubled or overtaken"] >= 190 - 10
 
 
 def test_answers_that_are_always_30_ms_old_vent() -> None:
     found = run_on(VirtualWire(ProportionalPartner().answers, latency=0.030), patience=0.2)
-    assert found.exchange.vented == SILENT
-    assert found.exchange.ignored["too late"] == 20
+    assert found.traffic.vent_reason == SILENT
+    assert found.traffic.ignored["too late"] == 20
 
 
 def test_a_controller_that_is_not_sound_is_vented_at_once_and_for_good() -> None:
     found = run_on(VirtualWire(ProportionalPartner(unsound_from=40).answers))
-    assert found.exchange.vented == NOT_SOUND
+    assert found.traffic.vent_reason == NOT_SOUND
     assert [row.command == VENT for row in rows_of(found)] == [number >= 40 for number in range(200)]
 
 
@@ -173,7 +174,7 @@ def test_an_answer_to_something_else_does_nothing_but_be_counted(run: int, shift
     calm = run_on(VirtualWire(ProportionalPartner().answers))
     found = run_on(wire)
     assert [row.command for row in rows_of(found)] == [row.command for row in rows_of(calm)]
-    assert found.exchange.ignored[why] >= 198
+    assert found.traffic.ignored[why] >= 198
     assert found.is_good
 
 
@@ -199,9 +200,9 @@ def test_no_disturbance_of_the_wire_crashes_or_holds_pressure(fault: Fault, seed
             break
         # What acts is a command that was given less than 20 ms ago, and no older one than before.
         assert row.command in {sent[old] for old in range(max(0, number - 19), number + 1) if old in sent}
-        if row.answered_after is not None:
+        if row.response_time is not None:
             assert row.command == sent[number]
-    assert found.exchange.vented in ("", SILENT)
+    assert found.traffic.vent_reason in ("", SILENT)
     assert replayed_is_same(found)
 
 
@@ -211,17 +212,17 @@ def test_a_run_that_is_stopped_vents_and_its_log_is_whole() -> None:
     made = plant("run.duration=2 s", *AT_REST)
     found = run_on(wire, made, is_stopped=lambda: len(partner.seen) > 150)
     rows = rows_of(found)
-    assert found.exchange.is_stopped
-    assert found.exchange.vented == STOPPED
+    assert found.traffic.is_stopped
+    assert found.traffic.vent_reason == STOPPED
     assert [row.sequence for row in rows] == list(range(len(rows)))
     vented = [row for row in rows if row.is_vented]
     assert len(vented) == 500
-    assert all(row.sent_late is None and row.command == VENT for row in vented)
+    assert all(row.delay is None and row.command == VENT for row in vented)
     assert found.result.recording.time[-1] == pytest.approx(rows[-1].due)
     assert found.result.recording["pressure_1"][-1] < found.result.recording["pressure_1"].max()
     assert [bool(sample.flags & OVER) for sample in partner.seen[-6:]] == [True] * 6
     assert replayed_is_same(found)
-    assert len(found.sent_late) == len(rows) - 500
+    assert len(found.delays) == len(rows) - 500
 
 
 def test_a_computer_that_sleeps_makes_time_stand_still_and_blames_nobody() -> None:
@@ -229,9 +230,9 @@ def test_a_computer_that_sleeps_makes_time_stand_still_and_blames_nobody() -> No
     wire.sleeps = {80: 0.050}
     found = run_on(wire)
     assert found.is_good
-    assert len(found.exchange.stood_still) == 1
-    assert found.exchange.stood_still[0] == pytest.approx(0.049)
-    assert max(found.sent_late) == pytest.approx(0.049)
+    assert len(found.traffic.pauses) == 1
+    assert found.traffic.pauses[0] == pytest.approx(0.049)
+    assert max(found.delays) == pytest.approx(0.049)
     calm = run_on(VirtualWire(ProportionalPartner().answers))
     assert [row.command for row in rows_of(found)] == [row.command for row in rows_of(calm)]
 
@@ -262,7 +263,7 @@ def test_in_lock_step_an_answer_may_take_any_time_below_the_patience() -> None:
     calm = run_on(VirtualWire(ProportionalPartner().answers))
     assert found.is_good
     assert [row.command for row in rows_of(found)] == [row.command for row in rows_of(calm)]
-    assert not found.exchange.is_real_time
+    assert not found.traffic.is_real_time
     assert "link.png" not in found.files()
 
 
@@ -270,7 +271,7 @@ def test_in_lock_step_nobody_is_waited_for_once_the_plant_is_vented() -> None:
     wire = VirtualWire(ProportionalPartner(silent_from=60).answers)
     start = wire.time
     found = run_plant(plant(), wire, lambda _: LockStep(clock=wire.clock), run=RUN)
-    assert found.exchange.vented == SILENT
+    assert found.traffic.vent_reason == SILENT
     assert len(rows_of(found)) == 200
     assert wire.time - start == pytest.approx(20.0, abs=1.0)  # a second for each sample up to there
 
@@ -278,8 +279,8 @@ def test_in_lock_step_nobody_is_waited_for_once_the_plant_is_vented() -> None:
 def test_in_lock_step_a_vented_controller_that_answers_is_listened_to() -> None:
     wire = VirtualWire(ProportionalPartner(unsound_from=40).answers)
     found = run_plant(plant(), wire, lambda _: LockStep(clock=wire.clock), run=RUN)
-    assert found.exchange.vented == NOT_SOUND
-    assert rows_of(found)[40].answered_after is not None
+    assert found.traffic.vent_reason == NOT_SOUND
+    assert rows_of(found)[40].response_time is not None
 
 
 class BreakingWire(VirtualWire):
@@ -294,8 +295,8 @@ class BreakingWire(VirtualWire):
 
 def test_a_wire_that_is_pulled_out_vents_at_once_and_the_log_goes_on() -> None:
     found = run_on(BreakingWire(ProportionalPartner().answers), plant(*SHORT, *AT_REST))
-    assert found.exchange.vented == BROKEN
-    assert found.exchange.vented_at == pytest.approx(0.060)
+    assert found.traffic.vent_reason == BROKEN
+    assert found.traffic.vented_at == pytest.approx(0.060)
     assert len(rows_of(found)) == 200
     assert found.text().endswith("port       the serial port broke: it is gone")
     assert replayed_is_same(found)
@@ -314,8 +315,8 @@ class FloodedWire(VirtualWire):
 def test_a_flood_does_not_hold_the_plant() -> None:
     found = run_on(FloodedWire(ProportionalPartner().answers), plant("run.duration=0.06 s", *AT_REST))
     assert len(rows_of(found)) == 60
-    assert found.exchange.vented == SILENT
-    assert found.exchange.stood_still == ()
+    assert found.traffic.vent_reason == SILENT
+    assert found.traffic.pauses == ()
 
 
 class LeavingPlant:
@@ -382,5 +383,5 @@ def test_a_line_that_is_too_slow_is_refused() -> None:
 def test_twenty_milliseconds_are_four_samples_at_200_a_second() -> None:
     made = plant_of(load_scenario(TASK, SHORT), 200)
     found = run_on(VirtualWire(ProportionalPartner(silent_from=20).answers), made)
-    assert found.exchange.vented_at == pytest.approx(0.115)
+    assert found.traffic.vented_at == pytest.approx(0.115)
     assert isinstance(found.plant.scenario.device, Device)

@@ -23,11 +23,12 @@ from hypothesis import strategies as st
 
 from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
-from ppafo.exports.hil.wire import Answer, Reader, WireSample, answer_bytes, open_port, sample_bytes
+from ppafo.exports.hil.ports import open_port
+from ppafo.exports.hil.wire import Answer, Reader, WireSample, answer_bytes, sample_bytes
 from ppafo.processor.link import example_controller
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.storage import read_recording
+from ppafo.storage.reading import read_recording
 from tests.example_board import COMPILER, SENT, WHOLE, built, running
 from tests.virtual_wire import ProportionalPartner, free_port
 

@@ -29,7 +29,7 @@ from ppafo.exports.hil.wire import (
     count_of,
     sample_bytes,
 )
-from ppafo.storage import read_recording
+from ppafo.storage.reading import read_recording
 from tests.virtual_wire import free_port, sending_bench
 
 START = WRAP - 50_000

@@ -11,7 +11,8 @@ from ppafo.errors import ProgramError
 from ppafo.exports import c_library
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import library_files
-from ppafo.exports.c_library.preparation import VANE_PREPARATION, Preparation, PreparedLane, start
+from ppafo.exports.c_library.preparation import VANE_PREPARATION, start
+from ppafo.exports.c_library.prepared import Preparation, PreparedLane
 from ppafo.loading import load_scenario
 
 WARM = (

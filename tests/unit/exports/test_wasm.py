@@ -86,7 +86,8 @@ def test_the_programs_of_the_package_are_what_the_compiler_makes_of_its_physics(
 
 
 def test_a_program_stays_good_where_its_functions_move_in_python_and_not_where_they_change() -> None:
-    text = wasm.source_of(library_of(load_scenario("step-response")))
+    library = library_of(load_scenario("step-response"))
+    text = wasm.source_of(library, wasm.compose(library))
     moved = text.replace("model_orifice_", "model_flow_of_orifices_")
     assert moved != text
     assert wasm.digest_of(moved) == wasm.digest_of(text)
@@ -112,7 +113,7 @@ def test_a_module_that_was_found_once_is_found_again_without_writing_its_text(
     fresh_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = module_of(load_scenario("torque-task-proportional"))
-    monkeypatch.setattr(wasm, "source_of", lambda _library: pytest.fail("the text was written"))
+    monkeypatch.setattr(wasm, "source_of", lambda *_: pytest.fail("the text was written"))
     assert module_of(load_scenario("torque-task-proportional", MOVED)).wasm == first.wasm
     assert list(fresh_cache.rglob("digest-*"))
 
@@ -127,18 +128,24 @@ from scripts.wasm_programs import keys_of
 _, keys = keys_of(["step-response"]), keys_of(["step-response"])
 scenario = load_scenario("step-response")
 wasm._shipped_keys = lambda: keys
-composed = []
-wasm._known_digest = lambda library: composed.append(library) or ""
+composed, translated = [], []
+outlines, source_of = wasm.outline_of_unit, wasm.source_of
+wasm.outline_of_unit = lambda *given: composed.append(given) or outlines(*given)
+wasm.source_of = lambda *given: translated.append(given) or source_of(*given)
 wasm.check_can_build = lambda: None
 wasm.build = lambda text: b"built"
 assert wasm.module_of(scenario).wasm != b"built" and not composed, "as it is shipped"
+assert wasm.module_of(load_scenario("step-response", ["run.duration=0.1 s"])).wasm != b"built"
+assert composed and not translated, "with another duration"
 pneumatics.GAMMA = 0.3
-assert wasm.module_of(scenario).wasm == b"built" and composed, "with a number changed"
+assert wasm.module_of(scenario).wasm == b"built" and translated, "with a number changed"
 """
 
 
 @pytest.mark.long
-def test_a_shipped_scenario_has_its_program_without_composing_a_text(fresh_cache: Path) -> None:
+def test_a_shipped_scenario_has_its_program_without_composing_and_with_other_settings_without_translating(
+    fresh_cache: Path,
+) -> None:
     """In a process of its own: this one has functions of the tests in the package, which then has no keys."""
     done = subprocess.run([sys.executable, "-c", _COMPOSED_NEVER], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

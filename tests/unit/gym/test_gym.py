@@ -107,6 +107,11 @@ def test_replayed_commands_have_the_bits_of_simulate(name: str, settings: dict[s
     assert np.array_equal(np.array(observations)[:-1, :4], np.array(shown, dtype=np.float32))
 
 
+def test_numbers_to_vary_are_refused_where_nothing_is_drawn() -> None:
+    with pytest.raises(ppafo.ScenarioError, match="vary: with randomise = False nothing is drawn"):
+        one(TORQUE, randomise=False, vary={"valve.area": ("10 mm^2", "12 mm^2")})
+
+
 def test_a_constant_policy_has_the_trace_of_a_constant_controller() -> None:
     env = one(ANGLE, duration=0.2, randomise=False)
     _, states, _ = play(env, [1.0] * 200)

@@ -15,7 +15,8 @@ from ppafo.cli.main import main
 from ppafo.errors import IdentificationError, PpafoError
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import with_estimates
-from ppafo.identification.problem import FreeDecayProblem, ProcedureContext, VaneLeakProblem, json_schema, parse_problem
+from ppafo.identification.problem import json_schema, parse_problem
+from ppafo.identification.procedures import FreeDecayProblem, ProcedureContext, VaneLeakProblem
 from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory import FittedExperiment, tolerance_parameters
 from ppafo.identification.trajectory.tolerances import stated_by
@@ -28,7 +29,7 @@ from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv
-from ppafo.storage.result_folder import read_recording
+from ppafo.storage.reading import read_recording
 from ppafo.units import to_si
 from tests.unit.identification import planted
 

@@ -11,7 +11,7 @@ import pytest
 
 from ppafo.loading import load_scenario
 from ppafo.page.content import page_content
-from ppafo.page.wasm import display_of
+from ppafo.page.wasm.description import display_of
 from ppafo.report.display_units import display_value, metric_quantity
 from ppafo.units import without_exponent
 from ppafo.units.shown import QUANTITIES, shown_in

@@ -10,8 +10,10 @@ import pytest
 
 from ppafo.errors import DataError, ParameterError, PpafoError
 from ppafo.rig import list_presets, load_preset, record
-from ppafo.rig.experiments import EXPERIMENTS, on_scale, write_rig_recording
+from ppafo.rig.experiments import EXPERIMENTS
+from ppafo.rig.folder import write_rig_recording
 from ppafo.rig.preset import PATHS, SECTIONS, Preset, json_schema
+from ppafo.rig.steady import on_scale
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage import read_csv
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -189,7 +191,7 @@ def test_the_truth_names_the_preset_with_overrides_and_the_device() -> None:
         ({"seed": -1}, "seed = -1"),
         ({"device": "ppafo2012"}, "ppafo2011"),
         ({"overrides": ["rig.friction.scater=0"]}, "did you mean 'rig.friction.scatter'"),
-        ({"overrides": ["rig.friction.scatter=2"]}, "from 0 to 0.5"),
+        ({"overrides": ["rig.friction.scatter=2"]}, "at least 0 and at most 0.5"),
         ({"overrides": ["rig.line.volume=3 s"]}, "override 'rig.line.volume=3 s'"),
         ({"overrides": ["rig.line.volume=40 cm^3"]}, "is part of each dead volume"),
         ({"overrides": ["rig.line.area=0 m^2"]}, "must be above 0 with a line"),
@@ -215,7 +217,7 @@ def test_bad_input_is_one_line_with_the_nearest_name(words: dict[str, object], m
         ),
         ('unit = "1/m"', 'unit = "K"', "gas.wall_area_per_volume"),
         ("value = 60.0", 'value = "60"', "must be a valid number"),
-        ("value = 60.0", "value = -60.0", "must be from 0"),
+        ("value = 60.0", "value = -60.0", "must be at least 0"),
         ("schema_version = 1", "schema_version = 2", "schema_version = 2 is not allowed; allowed: 1"),
         ("reason =", "note =", "allowed here: value, unit, reason"),
         ("[sampling.rate]", "[sampling.rates]", "did you mean 'rate'"),

@@ -82,6 +82,12 @@ def test_a_gain_may_leave_out_its_unit_as_the_paper_does() -> None:
     assert bare.proportional_gain == 0.1
 
 
+def test_a_gain_of_0_needs_no_unit_whatever_is_controlled() -> None:
+    assert load_scenario("pressure-loop", ["controller.proportional_gain=0"]).controller.proportional_gain == 0.0
+    with pytest.raises(ScenarioError, match="a unit like '1/Pa' is needed"):
+        load_scenario("pressure-loop", ["controller.proportional_gain=1"])
+
+
 @pytest.mark.parametrize("override", ["motion.angle=80", "run.duration=2", "reference.level=5", "sensors.delay=1"])
 def test_any_other_value_must_say_its_unit(override: str) -> None:
     assert "a number without a unit" in problem_of(override)

@@ -30,7 +30,7 @@ def test_a_joint_that_friction_holds_is_named_with_a_stiffness_that_moves_it() -
     mended = tried(servo(*STUCK, *weak), verdict)
     assert mended is not None
     assert re.search(
-        r"with `controller.angle_stiffness = \S+ N m/rad`.* it does, as a further run shows", mended.sentence
+        r"with `controller.angle_stiffness = \S+ N m/rad`.* it follows, as a further run shows", mended.sentence
     )
 
 

@@ -51,7 +51,7 @@ def test_a_torque_beyond_the_reach_is_said_and_a_file_may_say_why_it_asks_for_it
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
     assert verdict.is_useless
-    assert "with `supply.pressure = 94.5 psi_g` it does, as a further run shows" in verdict.sentence
+    assert "with `supply.pressure = 94.5 psi_g` it follows, as a further run shows" in verdict.sentence
 
 
 def test_a_pair_that_is_too_large_and_a_load_that_is_too_heavy_are_named() -> None:
@@ -112,7 +112,7 @@ def test_a_walk_whose_pair_takes_the_torque_beyond_its_limit_is_told_with_a_valv
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
     assert verdict.kind == "overshoots"
-    offered = re.search(r"with `valve.area = ([^`]*)` it does, as a further run shows", verdict.sentence)
+    offered = re.search(r"with `valve.area = ([^`]*)` it follows, as a further run shows", verdict.sentence)
     assert offered is not None
     assert simulate("solenoid", [f"valve.area={offered[1]}", *changes[1:]]).tracking is None
 
@@ -123,7 +123,7 @@ def test_a_walk_with_an_actuator_that_pushes_one_way_is_told_to_ask_for_no_dorsi
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
     assert "it pushes one way only" in verdict.cause
-    offered = re.search(r"; with (.*) it does, as a further run shows", verdict.sentence)
+    offered = re.search(r"; with (.*) it follows, as a further run shows", verdict.sentence)
     assert offered is not None
     unasked = [text.replace(" = ", "=") for text in re.findall(r"`([^`]*)`", offered[1])]
     assert len(unasked) == 4
@@ -322,7 +322,7 @@ def test_a_law_that_rests_within_the_dead_band_is_given_what_it_lacks(law: tuple
         r"its command of 0\.\d+ (stays within|hardly opens the valve beyond) `valve\.dead_band = 0\.3`",
         verdict.sentence,
     )
-    assert re.search(rf"with `controller\.{given}` it does, as a further run shows", verdict.sentence)
+    assert re.search(rf"with `controller\.{given}` it follows, as a further run shows", verdict.sentence)
 
 
 LATE_SINE = ["sensors.delay=10 ms", "reference.frequency=2 Hz", "run.duration=2 s"]
@@ -335,7 +335,7 @@ def test_a_sine_that_is_too_quick_for_the_loop_is_told_with_one_that_it_follows(
     assert verdict is not None
     assert verdict.kind == "does not follow", "an error that turns with its reference is no oscillation"
     assert "its reference" in verdict.cause
-    offered = re.search(r"; with (.*) it does, as a further run shows", verdict.sentence)
+    offered = re.search(r"; with (.*) it follows, as a further run shows", verdict.sentence)
     assert offered is not None
     changes = [text.replace(" = ", "=") for text in re.findall(r"`([^`]*)`", offered[1])]
     changed = [text.partition("=")[0] for text in changes]

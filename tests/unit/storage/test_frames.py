@@ -9,7 +9,8 @@ import ppafo
 from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.at_hand import dataframe
-from ppafo.storage import dataset_of, read_recording
+from ppafo.storage import dataset_of
+from ppafo.storage.reading import read_recording
 
 pandas = pytest.importorskip("pandas", reason="pandas is not installed")
 TIME = np.arange(30.0)

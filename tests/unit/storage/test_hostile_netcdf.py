@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.storage import read_recording, trial_reading
+from ppafo.storage import trial_reading
 from ppafo.storage.netcdf_reading import read_netcdf
+from ppafo.storage.reading import read_recording
 
 SECRET = np.arange(3.0)
 

@@ -12,7 +12,7 @@ from ppafo.errors import DataError
 from ppafo.storage.column_map import ColumnMap
 from ppafo.storage.foreign import read_foreign
 from ppafo.storage.matlab import open_matlab, read_matlab
-from ppafo.storage.result_folder import read_recording
+from ppafo.storage.reading import read_recording
 
 LVM = """LabVIEW Measurement\t
 Writer_Version\t2

@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 
 from ppafo.storage.files import write_file
-from ppafo.storage.result_folder import write_marked_folder
+from ppafo.storage.owned_folder import write_marked_folder
 
 WRITER = """
 import sys
 from itertools import count
 from pathlib import Path
 from ppafo.storage.files import write_file
-from ppafo.storage.result_folder import write_marked_folder
+from ppafo.storage.owned_folder import write_marked_folder
 
 folder = Path(sys.argv[1])
 for number in count():

@@ -10,7 +10,7 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.storage import files
-from ppafo.storage.result_folder import MARK, check_owned_folder, marked_folder, write_marked_folder
+from ppafo.storage.owned_folder import MARK, check_owned_folder, marked_folder, write_marked_folder
 
 CLAIMS = "claims.json"
 WHOLE = {"report.html": b"report", "step-response.csv": b"rows", CLAIMS: b'{"claims": []}'}

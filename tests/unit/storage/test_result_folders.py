@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import ppafo
 from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording
-from ppafo.storage import check_result_folder, files, read_recording, read_stored, write_result
+from ppafo.storage import check_result_folder, files, read_stored, write_result
+from ppafo.storage.reading import read_recording
 
 DOCUMENT = {"status": {"kind": "completed"}, "scenario": {"name": "task"}}
 
@@ -243,3 +245,9 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
         read_recording(tmp_path / "nothing")
     with pytest.raises(DataError, match=r"contains no result of a walk or a simulation"):
         read_recording(tmp_path)
+
+
+def test_a_folder_of_an_analysis_is_no_result_of_a_run_and_says_what_reads_it(tmp_path: Path) -> None:
+    ppafo.audit("ppafo2011").save(tmp_path / "audit")
+    with pytest.raises(DataError, match="is a result of 'ppafo sets audit', not of a run; 'ppafo export figure' draws"):
+        ppafo.read_result(tmp_path / "audit")

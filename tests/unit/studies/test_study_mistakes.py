@@ -155,9 +155,9 @@ def test_the_duration_varies_only_where_nothing_is_kept_over_time(small: Any) ->
 
 def test_a_value_below_its_only_limit_is_told_that_limit(varying: Callable[..., Any]) -> None:
     table = {"path": "actuator.torque_constant", "kind": "list", "values": ["-1 cm^3"]}
-    assert refused(varying(table)).endswith("actuator.torque_constant must be at least 1e-12 cm^3")
+    assert "actuator.torque_constant must be at least 1e-12 cm^3 (" in refused(varying(table))
     plain = {"path": "valve.discharge_coefficient", "kind": "list", "values": [20.0]}
-    assert refused(varying(plain)).endswith("must be more than 0 and at most 2"), "a plain number has no unit"
+    assert "must be more than 0 and at most 2 (" in refused(varying(plain)), "a plain number has no unit"
 
 
 def test_metrics_of_tracking_need_a_reference(varying: Callable[..., Any]) -> None:

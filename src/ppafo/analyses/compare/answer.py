@@ -20,7 +20,8 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.tracking import Tracking
 from ppafo.simulation.tracking.pair_step import coarse_pair
-from ppafo.studies.distributions import Floats, fraction_text, is_carried
+from ppafo.studies.distributions import Floats
+from ppafo.studies.intervals import fraction_text, is_carried
 from ppafo.study.runs import Rows
 from ppafo.units import without_exponent
 from ppafo.wording import count_of
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _ERROR, _GAS = "rms_error", "gas_supplied"
+_PROBABILITY = Kind(form=".4g")
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,8 +136,6 @@ _PARETO = (
 def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
     """Return a comparison as a finding with sentences, tables and panels."""
     names = comparison.configurations
-    has_errors = _ERROR in comparison.metrics
-    said = [_READING] if comparison.draws else []
     tasks, values = count_of(len(comparison.tasks), "task"), count_of(len(comparison.varied), "uncertain value")
     lead = f"{len(names)} configurations on {tasks}, baseline {comparison.baseline}; "
     if not comparison.draws:
@@ -146,23 +146,21 @@ def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
         beside = " and of the sensor noise" if comparison.has_noise else ""
         lead += f"{comparison.draws:,} draws of {values}{beside}, the same for all; each "
         lead += f"interval with {100.0 * comparison.confidence:g} % confidence"
-    pareto, change = (
-        Section(
-            "Error against gas",
-            panels=partial(_pareto_panels, comparison),
-            name="pareto",
-            caption=_PARETO,
-            is_detail=True,
-        ),
-        Section(
-            "Spread of the change",
-            panels=partial(_change_panels, comparison),
-            name="change",
-            caption="Change against the baseline in each draw; the dashed line is the nominal device.",
-            across=2,
-            size=(3.0, 2.5),
-            is_detail=True,
-        ),
+    pareto = Section(
+        "Error against gas",
+        panels=lambda: [_pareto(comparison, task) for task in comparison.tasks],
+        name="pareto",
+        caption=_PARETO,
+        is_detail=True,
+    )
+    change = Section(
+        "Spread of the change",
+        panels=lambda: [_change(comparison, task, metric) for task in comparison.tasks for metric in (_ERROR, _GAS)],
+        name="change",
+        caption="Change against the baseline in each draw; the dashed line is the nominal device.",
+        across=2,
+        size=(3.0, 2.5),
+        is_detail=True,
     )
     return Finding(
         name="compare",
@@ -171,10 +169,10 @@ def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
         said=(lead,),
         parts=(
             *(part for task in comparison.tasks for part in _parts(comparison, task)),
-            *([pareto] if has_errors else []),
-            *([change] if has_errors and comparison.draws else []),
+            *([pareto] if _ERROR in comparison.metrics else []),
+            *([change] if _ERROR in comparison.metrics and comparison.draws else []),
             Section(remarks=comparison.remarks),
-            Section("How to read it" if said else "", said=said, is_detail=True),
+            Section("How to read it", said=[_READING], is_detail=True) if comparison.draws else Section(),
         ),
         found=comparison,
         passed=all(case.status.is_completed for task in comparison.tasks for case in task.cases),
@@ -187,7 +185,7 @@ def _parts(comparison: ComparisonResult, task: OnTask) -> list[Section]:
     where = "" if len(comparison.tasks) == 1 else f", {task.task}"
     kinds = [(name, of_metric(name)) for name in comparison.metrics]
     best = {
-        metric: ", ".join(f"{name} {_PROBABILITY.interval(each)}" for name, each in task.best[metric].items())
+        metric: ", ".join(f"{name} {_PROBABILITY.interval(share)}" for name, share in task.best[metric].items())
         for metric in (_ERROR, _GAS)
         if len(comparison.configurations) > 2 and task.best.get(metric)
     }
@@ -209,27 +207,18 @@ def _parts(comparison: ComparisonResult, task: OnTask) -> list[Section]:
     ]
 
 
-_PROBABILITY = Kind(form=".4g")
-
-
 def _paired(comparison: ComparisonResult, task: OnTask, name: str) -> list[Column]:
     """Return the columns of a table with a row for each metric: change, mean difference, probability of improvement."""
     pairs = task.pairs[name]
     kinds = [of_metric(pair.metric, "+.3g") for pair in pairs]
-    nominal: list[str] = []
-    scales: list[float] = []
+    nominal, spread = [], []
     for kind, pair in zip(kinds, pairs, strict=True):
-        first, other = (task.case(each).value(pair.metric) for each in (comparison.baseline, name))
+        base, other = (task.case(configuration).value(pair.metric) for configuration in (comparison.baseline, name))
         # Nothing is a percentage of what is zero within the accuracy of a run.
-        scales.append(display_difference(first, kind.quantity))
-        change = display_difference(other - first, kind.quantity)
-        nominal.append(_percent(change / abs(scales[-1])) if scales[-1] else "")
-    spread = [
-        f"{_percent(pair.change)} ({_percent(pair.change_low)} to {_percent(pair.change_high)})"
-        if math.isfinite(pair.change) and scale
-        else ""
-        for pair, scale in zip(pairs, scales, strict=True)
-    ]
+        scale = abs(display_difference(base, kind.quantity))
+        nominal.append(_percent(display_difference(other - base, kind.quantity) / scale) if scale else "")
+        quantiles = f"{_percent(pair.change)} ({_percent(pair.change_low)} to {_percent(pair.change_high)})"
+        spread.append(quantiles if math.isfinite(pair.change) and scale else "")
     better = [
         "" if pair.better is None else "equal in all" if pair.equal == 1.0 else _PROBABILITY.interval(pair.better)
         for pair in pairs
@@ -253,29 +242,31 @@ def _percent(fraction: float) -> str:
 
 def remarks_of(comparison: ComparisonResult) -> list[str]:
     """Return remarks on differing tasks, failed runs, means that depend on few draws, and noise."""
-    said, failed, carried = [], [], []
+    remarks, failed, uncertain = [], [], []
     for task in comparison.tasks:
-        asked = {case.configuration: (case.scenario.reference, case.scenario.run.duration) for case in task.cases}
-        # Compared by what they follow and not by file: two configurations may name one task differently.
-        others = [name for name, what in asked.items() if what != asked[comparison.baseline]]
+        followed = {case.configuration: (case.scenario.reference, case.scenario.run.duration) for case in task.cases}
+        # Compared by reference and duration and not by file: two configurations may name one task differently.
+        others = [name for name, reference in followed.items() if reference != followed[comparison.baseline]]
         if others:
             follow, run = ("follows", "runs") if len(others) == 1 else ("follow", "run")
-            said.append(
+            remarks.append(
                 f"task '{task.task}': {', '.join(others)} {follow} a different reference, or {run} for a different "
                 f"time, than {comparison.baseline}: the differences come partly from the task"
             )
         for case in task.cases:
             where = f"{case.configuration}, {task.task}"
-            said += [coarse] if (coarse := coarse_pair(case.scenario)) else []
-            failed += [] if case.status.is_completed else [f"{where}: {case.status.message}"]
+            if coarse := coarse_pair(case.scenario):
+                remarks.append(coarse)
+            if not case.status.is_completed:
+                failed.append(f"{where}: {case.status.message}")
             if case.tracking is not None and not case.follows:
-                said.append(f"{where}: {case.tracking.sentence}; it is not among the best")
+                remarks.append(f"{where}: {case.tracking.sentence}; it is not among the best")
             if case.failed_draws:
                 failed.append(
                     f"{where}: {case.failed_draws:,} of {comparison.draws:,} draws failed and are left out of every "
                     f"pair; the first: {case.reason}"
                 )
-        carried += [
+        uncertain += [
             f"{name}, task '{task.task}': the mean difference of {pair.metric} has an effective sample size of "
             f"{pair.effective_size:.3g} of {pair.pairs:,} draws: do not trust its interval; the probability of being "
             "better is not affected"
@@ -283,29 +274,21 @@ def remarks_of(comparison: ComparisonResult) -> list[str]:
             for pair in pairs
             if not is_carried(pair.effective_size, pair.pairs)
         ]
-    return [*said, *failed, *carried, *([_NOISE] if comparison.has_noise else [])]
+    return [*remarks, *failed, *uncertain, *([_NOISE] if comparison.has_noise else [])]
 
 
 def front_of(cases: Sequence[ConfigurationResult]) -> list[str]:
     """Return the configurations that follow their reference and are Pareto-optimal in error and gas."""
-    judged = [case for case in cases if case.follows]
-    points = np.array([[case.value(name) for name in (_ERROR, _GAS)] for case in judged]).reshape(-1, 2)
-    return [case.configuration for case, is_front in zip(judged, pareto_front(points), strict=True) if is_front]
+    following = [case for case in cases if case.follows]
+    points = np.array([[case.value(name) for name in (_ERROR, _GAS)] for case in following]).reshape(-1, 2)
+    return [case.configuration for case, is_front in zip(following, pareto_front(points), strict=True) if is_front]
 
 
 _MARKS = "osD^vP"
 _MAXIMUM_DOTS = 1500
 _BINS = 40
-_SHOWN = (0.5, 99.5)
+_SHOWN_PERCENTILES = (0.5, 99.5)
 """Percentiles between which changes are plotted; a few distant ones would squeeze all others into one bar."""
-
-
-def _pareto_panels(comparison: ComparisonResult) -> list[Panel]:
-    return [_pareto(comparison, task) for task in comparison.tasks]
-
-
-def _change_panels(comparison: ComparisonResult) -> list[Panel]:
-    return [_change(comparison, task, metric) for task in comparison.tasks for metric in (_ERROR, _GAS)]
 
 
 def _pareto(comparison: ComparisonResult, task: OnTask) -> Panel:
@@ -313,10 +296,10 @@ def _pareto(comparison: ComparisonResult, task: OnTask) -> Panel:
     cases = [case for case in task.cases if case.status.is_completed]
     front, marks, on_front = front_of(cases), [], []
     # As everywhere: the colour of a valve, where that tells the configurations apart.
-    of_valves = [look_of_valve(case.scenario.device.valve.kind).colour for case in cases]
-    is_told = len(set(of_valves)) == len(cases)
+    valve_colours = [look_of_valve(case.scenario.device.valve.kind).colour for case in cases]
+    are_different = len(set(valve_colours)) == len(cases)
     for number, case in enumerate(cases):
-        colour = of_valves[number] if is_told else COLOURS[number % len(COLOURS)]
+        colour = valve_colours[number] if are_different else COLOURS[number % len(COLOURS)]
         if case.rows is not None:
             dots = {"linestyle": "", "marker": ".", "alpha": 0.35, "markersize": 4, "markeredgewidth": 0}
             gas, error = (case.rows[name][:_MAXIMUM_DOTS] for name in (_GAS, _ERROR))
@@ -324,7 +307,8 @@ def _pareto(comparison: ComparisonResult, task: OnTask) -> Panel:
         marker = {"linestyle": "", "marker": _MARKS[number % len(_MARKS)], "markersize": 8, "markeredgecolor": "white"}
         x, y = (case.value(name) for name in (_GAS, _ERROR))
         marks.append(Mark("line", [x], [y], label=case.configuration, colour=colour, style=marker))
-        on_front += [(x, y)] if case.configuration in front else []
+        if case.configuration in front:
+            on_front.append((x, y))
     # From left to right, so that the front is a line and no zigzag.
     x_front, y_front = np.array(sorted(on_front)).reshape(-1, 2).T
     marks.append(Mark("line", x_front, y_front, colour=GREY, style={"linewidth": 1.0, "zorder": 1}))
@@ -336,17 +320,17 @@ def _change(comparison: ComparisonResult, task: OnTask, metric: str) -> Panel:
     """Return a panel with histograms of the change of a metric against the baseline; dashed: nominal device."""
     baseline, marks, ends = task.case(comparison.baseline), [], []
     for number, name in enumerate(comparison.configurations):
-        own, colour = task.case(name), COLOURS[number % len(COLOURS)]
-        if name == comparison.baseline or own.rows is None or baseline.rows is None:
+        case, colour = task.case(name), COLOURS[number % len(COLOURS)]
+        if name == comparison.baseline or case.rows is None or baseline.rows is None:
             continue
-        change = _relative(baseline.rows[metric], own.rows[metric])
+        change = _relative(baseline.rows[metric], case.rows[metric])
         if change.size == 0:
             continue
-        low, high = np.percentile(change, _SHOWN)
+        low, high = np.percentile(change, _SHOWN_PERCENTILES)
         # Fewer bins for fewer draws, so that each has some of them.
         counts, edges = np.histogram(change, min(_BINS, max(8, round(1.5 * change.size**0.5))), (low, high))
         marks.append(Mark("bars", edges, counts, label=name, colour=colour))
-        nominal = _relative(*(np.array([case.value(metric)]) for case in (baseline, own)))
+        nominal = _relative(*(np.array([side.value(metric)]) for side in (baseline, case)))
         dashed = {"linestyle": "--", "linewidth": 1.2}
         marks += [Mark("at", value, label="as declared", colour=colour, style=dashed) for value in nominal]
         ends += [float(low), float(high), *nominal.tolist()]
@@ -354,7 +338,7 @@ def _change(comparison: ComparisonResult, task: OnTask, metric: str) -> Panel:
     is_first = metric == _ERROR
     title = f"Task: {task.task}" if len(comparison.tasks) > 1 and is_first else ""
 
-    def reach(axes: "Axes") -> None:
+    def limit_changes(axes: "Axes") -> None:
         # Zero is shown where it is near: far from all changes it would squeeze them into a few pixels.
         low, high = min(ends, default=0.0), max(ends, default=0.0)
         span = high - low or 1.0
@@ -364,7 +348,7 @@ def _change(comparison: ComparisonResult, task: OnTask, metric: str) -> Panel:
         axes.set_xlim(low - 0.08 * span, high + 0.08 * span)
 
     axis, draws = Kind(words, "%"), Kind("Draws" if is_first else "")
-    return Panel(axis, draws, marks, title, legend="" if is_first else "above", then=reach if ends else None)
+    return Panel(axis, draws, marks, title, legend="" if is_first else "above", then=limit_changes if ends else None)
 
 
 def _relative(baseline: Floats, other: Floats) -> Floats:

@@ -81,7 +81,7 @@ def compare(
 
     from ppafo.analyses.compare.answer import finding_of
     from ppafo.analyses.compare.solve import Draws, compared
-    from ppafo.arguments.words import taken_tasks
+    from ppafo.arguments.conversion import taken_tasks
     from ppafo.studies.draws import study_of
     from ppafo.studies.study import choose_configurations
     from ppafo.units.shown import shown_in

@@ -1,7 +1,8 @@
 """Comparison of configurations: nominal runs, and runs over the same draws of uncertain values."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from ppafo.analyses.compare.answer import ComparisonResult, ConfigurationResult, OnTask, front_of, remarks_of
 from ppafo.analyses.compare.pairs import COMPARED, Paired, best_probabilities, compare_pairs
@@ -20,7 +21,7 @@ from ppafo.studies.limits import CONFIDENCE, check_fraction
 from ppafo.studies.sampling import NOISE, with_new_noise
 from ppafo.studies.study import Configuration, Study, with_overrides
 from ppafo.studies.varying import value_at, varied_path
-from ppafo.study.runs import Rows, RunCounter, Runs, failures_of, unvaried
+from ppafo.study.runs import Rows, RunCounter, failures_of, scenario_runs, unvaried
 from ppafo.wording import first_twice, nearest_name
 
 AS_WRITTEN = "as written"
@@ -65,8 +66,17 @@ Scenarios = Mapping[tuple[str, str], Scenario]
 """Scenarios by task and configuration."""
 
 
-_DrawnRuns = Mapping[tuple[str, str], tuple[Rows, Rows | None, str]]
-"""Runs of each case over the draws, first runs repeated with other noise or None, reason of the first failure."""
+class _DrawnRuns(NamedTuple):
+    """Runs of a scenario over the draws.
+
+    ``rows``: runs; None without draws
+    ``renoised``: first runs repeated with other sensor noise; None without noise
+    ``failure``: reason of the first failed run
+    """
+
+    rows: Rows | None = None
+    renoised: Rows | None = None
+    failure: str = ""
 
 
 def compared(
@@ -88,27 +98,53 @@ def compared(
         hint = nearest_name(baseline, names)
         raise StudyError(f"baseline: no configuration '{baseline}'{hint}; available: {', '.join(names)}")
     baseline = baseline or names[0]
-    pairs = list(tasks) or [(AS_WRITTEN, ())]
-    repeated = first_twice([name for name, _ in pairs])
+    named_tasks = list(tasks) or [(AS_WRITTEN, ())]
+    repeated = first_twice([name for name, _ in named_tasks])
     if repeated is not None:
         raise StudyError(f"there are two tasks named '{repeated}'; give each its own name")
-    overrides = dict(pairs)
-    scenarios: dict[tuple[str, str], Scenario] = {}
-    for task, texts in overrides.items():
-        for configuration in configurations:
-            scenarios[task, configuration.name] = with_overrides(configuration.scenario, texts)
+    scenarios = {
+        (task, configuration.name): with_overrides(configuration.scenario, overrides)
+        for task, overrides in named_tasks
+        for configuration in configurations
+    }
     warn_of_coarse_pairs(scenarios.values())
-    # Those of the table that all scenarios can have: without a reference there is no error.
+    # Metrics that all scenarios can have: without a reference there is no error.
     metrics = [
         name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios.values())
     ]
     distributions = Uncertainty(()) if study is None or not study.paths else uncertainty_of(study)
     uncertainty = distributions.with_noise_of(scenarios.values())
+    if not uncertainty.drawn and draws.requested is not None:
+        raise StudyError(
+            f"draws = {draws.requested}: nothing in this comparison is random; give a study or sensors with "
+            f"noise, or omit draws"
+        )
     seed = draws.seed
     if seed is None:
         seed = DEFAULT_SEED if study is None else study.sample.seed
-    drawn = _drawn_runs(scenarios, metrics, study, uncertainty, draws, seed)
-    cases = _cases(scenarios, drawn, draws.threads)
+    drawn: dict[tuple[str, str], _DrawnRuns] = {}
+    if uncertainty.drawn:
+        if study is not None:
+            _check_different_values(study, scenarios)
+        drawn = _runs_over_draws(scenarios, metrics, study, uncertainty, draws, seed)
+    # With the seed of each scenario: what the tables call nominal is one realisation of its noise.
+    results = simulate_many(list(scenarios.values()), draws.threads)
+    cases: dict[str, list[ConfigurationResult]] = {task: [] for task, _ in named_tasks}
+    for ((task, name), scenario), result in zip(scenarios.items(), results, strict=True):
+        runs = drawn.get((task, name), _DrawnRuns())
+        cases[task].append(
+            ConfigurationResult(
+                configuration=name,
+                status=result.status,
+                metrics={metric: value for metric, value in result.metrics.items() if metric in COMPARED},
+                tracking=tried(scenario, result.tracking),
+                failed_draws=0 if runs.rows is None else failures_of(runs.rows),
+                reason=runs.failure,
+                scenario=scenario,
+                rows=runs.rows,
+                renoised=runs.renoised,
+            )
+        )
     comparison = ComparisonResult(
         units="SI: N m, kg, J; fractions from 0 to 1",
         configurations=names,
@@ -119,7 +155,8 @@ def compared(
         varied=[path for path in uncertainty.paths if path != NOISE],
         confidence=draws.confidence,
         tasks=[
-            _on_task(task, texts, cases[task], baseline, metrics, draws.confidence) for task, texts in overrides.items()
+            _task_result(task, overrides, cases[task], baseline, metrics, draws.confidence)
+            for task, overrides in named_tasks
         ],
         metrics=tuple(metrics),
     )
@@ -132,80 +169,52 @@ def compared(
     return replace(comparison, remarks=remarks)
 
 
-def _drawn_runs(
+def _check_different_values(study: Study, scenarios: Scenarios) -> None:
+    """Raise StudyError if the study draws one value for scenarios that have different ones."""
+    for path in study.paths:
+        # Orifices of different valves are meant to differ: what the study draws replaces the value of each.
+        if path.startswith("valve.") or path == NOISE:
+            continue
+        declared = [value_at(path, scenario) for (_, name), scenario in scenarios.items() if study.varies(path, name)]
+        values = [value for value in declared if value is not None]
+        lowest, highest = min(values, default=0.0), max(values, default=0.0)
+        if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
+            varied = varied_path(path, next(iter(scenarios.values())))
+            raise StudyError(
+                f"the study draws '{path}' for every configuration, so the different values of the configurations "
+                f"({varied.quote(lowest)} and {varied.quote(highest)}) would be ignored; use a study that does not "
+                "draw it"
+            )
+
+
+def _runs_over_draws(
     scenarios: Scenarios,
     metrics: Sequence[str],
     study: Study | None,
     uncertainty: Uncertainty,
     draws: Draws,
     seed: int,
-) -> _DrawnRuns:
-    """Return the runs of every case over the same draws; empty if nothing is random.
-
-    Raises StudyError if draws are requested although nothing is random.
-    """
-    if not uncertainty.drawn:
-        if draws.requested is not None:
-            raise StudyError(
-                f"draws = {draws.requested}: nothing in this comparison is random; give a study or sensors with "
-                f"noise, or omit draws"
-            )
-        return {}
-    if study is not None:
-        # Where cases differ in a value that the study draws for all of them, the difference would not count.
-        # Orifices of different valves are meant to differ: what the study draws replaces each one's own.
-        for path in (path for path in study.paths if not path.startswith("valve.") and path != NOISE):
-            own = [value_at(path, scenario) for (_, name), scenario in scenarios.items() if study.varies(path, name)]
-            values = [value for value in own if value is not None]
-            lowest, highest = min(values, default=0.0), max(values, default=0.0)
-            if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
-                place = varied_path(path, next(iter(scenarios.values())))
-                raise StudyError(
-                    f"the study draws '{path}' for every configuration, so the different values of the configurations "
-                    f"({place.quote(lowest)} and {place.quote(highest)}) would be ignored; use a study that does not "
-                    "draw it"
-                )
+) -> dict[tuple[str, str], _DrawnRuns]:
+    """Return the runs of every scenario over the same draws; StudyError if too many of them fail."""
     columns = uncertainty.replicated_columns(0, draws.count, seed)
-    renoised = with_new_noise(columns) if uncertainty.has_noise else {}
-    tally = RunCounter((draws.count + len(renoised.get(NOISE, ()))) * len(scenarios), draws.progress)
-    drawn: dict[tuple[str, str], tuple[Rows, Rows | None, str]] = {}
+    renoised_columns = with_new_noise(columns) if uncertainty.has_noise else {}
+    runs_of_scenario = draws.count + len(renoised_columns.get(NOISE, ()))
+    counter = RunCounter(runs_of_scenario * len(scenarios), draws.progress)
+    drawn = {}
     for (task, name), scenario in scenarios.items():
-        runs = Runs(scenario, metrics, tally, uncertainty.gauge, draws.threads)
-        # The noise is in all configurations, whatever a study says of its paths.
+        runs = scenario_runs(scenario, metrics, counter, uncertainty.gauge, draws.threads)
+        # The noise is in all configurations, even if the study varies other paths in some of them only.
         paths = [path for path in columns if study is None or path == NOISE or study.varies(path, name)]
         rows = runs.run({path: columns[path] for path in paths} or unvaried(scenario, draws.count))
         runs.check(rows, draws.maximum_failed, f"configuration '{name}', task '{task}'")
-        # The reason of the draws themselves: the runs with other noise may overwrite it.
-        reason = runs.reason
-        again = runs.run({path: renoised[path] for path in paths}) if renoised else None
-        drawn[task, name] = rows, again, reason
+        # Read before the runs with other noise, which may overwrite it.
+        failure = runs.reason
+        renoised = runs.run({path: renoised_columns[path] for path in paths}) if renoised_columns else None
+        drawn[task, name] = _DrawnRuns(rows, renoised, failure)
     return drawn
 
 
-def _cases(scenarios: Scenarios, drawn: _DrawnRuns, threads: int | None) -> dict[str, list[ConfigurationResult]]:
-    """Return the results of each task: nominal run of every configuration, and its runs over the draws."""
-    # With the seed of each scenario: what the tables call nominal is one realisation of its noise.
-    results = simulate_many(list(scenarios.values()), threads)
-    cases: dict[str, list[ConfigurationResult]] = {}
-    for ((task, name), scenario), result in zip(scenarios.items(), results, strict=True):
-        rows, renoised, reason = drawn.get((task, name), (None, None, ""))
-        cases.setdefault(task, []).append(
-            ConfigurationResult(
-                configuration=name,
-                status=result.status,
-                metrics={metric: value for metric, value in result.metrics.items() if metric in COMPARED},
-                tracking=tried(scenario, result.tracking),
-                failed_draws=0 if rows is None else failures_of(rows),
-                reason=reason,
-                scenario=scenario,
-                rows=rows,
-                renoised=renoised,
-            )
-        )
-    return cases
-
-
-def _on_task(
+def _task_result(
     task: str,
     overrides: Sequence[str],
     cases: list[ConfigurationResult],
@@ -214,26 +223,34 @@ def _on_task(
     confidence: float,
 ) -> OnTask:
     """Return the results of a task; with draws, also paired statistics and probabilities of being the best."""
-    first = next(case for case in cases if case.configuration == baseline)
-    pairs: dict[str, list[Paired]] = {}
-    for case in cases:
-        if case is first:
-            continue
-        pairs[case.configuration] = []
-        if first.rows is None or case.rows is None:
-            continue
-        for name in metrics:
-            renoised = None
-            if first.renoised is not None and case.renoised is not None:
-                renoised = (first.renoised[name], case.renoised[name])
-            pair = compare_pairs(name, first.rows[name], case.rows[name], COMPARED[name], confidence, renoised)
-            pairs[case.configuration] += [] if pair is None else [pair]
-    # A case that does not follow its reference is not among the best, and a metric may have no end that is better.
-    judged = [case for case in cases if case.follows]
-    rows = [case.rows for case in judged if case.rows is not None]
+    base = next(case for case in cases if case.configuration == baseline)
+    pairs = {
+        case.configuration: list(_paired_metrics(base, case, metrics, confidence)) for case in cases if case is not base
+    }
+    # A case that does not follow its reference is not among the best.
+    following = [case for case in cases if case.follows]
+    rows = [case.rows for case in following if case.rows is not None]
     best: dict[str, dict[str, ConfidenceInterval]] = {}
-    for name in (name for name in metrics if rows and COMPARED[name]):
-        # All at once: no pair says which of three is the best. No shares where no draw has a value of all.
-        shares = best_probabilities([row[name] for row in rows], COMPARED[name], confidence)
-        best[name] = dict(zip([case.configuration for case in judged], shares, strict=False))
+    for name in metrics:
+        better = COMPARED[name]
+        # A metric may have no better end.
+        if rows and better:
+            # All at once: no pair says which of three is the best. Empty where no draw has a value of all.
+            shares = best_probabilities([row[name] for row in rows], better, confidence)
+            best[name] = dict(zip([case.configuration for case in following], shares, strict=False))
     return OnTask(task, list(overrides), cases, front_of(cases), pairs, best)
+
+
+def _paired_metrics(
+    base: ConfigurationResult, other: ConfigurationResult, metrics: Sequence[str], confidence: float
+) -> Iterator[Paired]:
+    """Yield the paired statistics of two configurations for each metric with a pair of values; none without draws."""
+    if base.rows is None or other.rows is None:
+        return
+    for name in metrics:
+        noise = None
+        if base.renoised is not None and other.renoised is not None:
+            noise = base.renoised[name], other.renoised[name]
+        pair = compare_pairs(name, base.rows[name], other.rows[name], COMPARED[name], confidence, noise)
+        if pair is not None:
+            yield pair

@@ -74,7 +74,7 @@ def design(
     from ppafo.analyses.design.wearer import answer as wearer
     from ppafo.analyses.design.wearer.requirements import DesignRequirements
     from ppafo.analyses.design.wearer.solve import size_for_wearer
-    from ppafo.arguments.words import units_given
+    from ppafo.arguments.reading import units_given
     from ppafo.errors import StudyError
     from ppafo.parameters.parts.catalogue import DEFAULT
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs

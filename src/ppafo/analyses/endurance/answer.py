@@ -23,6 +23,8 @@ from ppafo.version import __version__
 from ppafo.walking.bottle.coupling import Schedule
 from ppafo.walking.bottle.course import minutes_text, strides_text
 
+FORMAT = "ppafo bottle"
+_TITLE = "How long the bottle lasts"
 _MASS, _FLOW = Kind("Left in the bottle", "kg", "gas mass", ".3g"), Kind("", "kg/s", "mass flow", ".3g")
 _DURATION, _PRESSURE = Kind("Time", "s", "duration"), Kind("Pressure in the bottle", "Pa_a", "pressure", ".3g")
 _WARMTH = Kind("Temperature of the bottle", "K", "temperature", ".1f")
@@ -58,21 +60,21 @@ class Endurance:
 
     def json_document(self) -> dict[str, Any]:
         """Return time series, ending and bottle as plain data in SI units."""
-        course, bottle = self.discharge, self.bottle
-        recording = course.recording
+        result, bottle = self.discharge, self.bottle
+        recording = result.recording
         return {
             "format": FORMAT,
             "schema_version": 1,
             "kind": "simulated",
             "ppafo": __version__,
             "result": {
-                "walking_time": course.walking_time,
-                "total_time": course.total_time,
-                "strides": course.strides,
-                "ending": asdict(course.ending),
+                "walking_time": result.walking_time,
+                "total_time": result.total_time,
+                "strides": result.strides,
+                "ending": asdict(result.ending),
                 "coldest_temperature": float(np.min(recording["bottle_temperature"])),
                 "at_end": {name: float(recording[name][-1]) for name in recording.names},
-                "balance": course.balance._asdict(),
+                "balance": result.balance._asdict(),
                 "strides_when_warm": self.strides_when_warm,
             },
             "draw": asdict(self.draw) | {"mean_flow": self.draw.mean_flow},
@@ -100,7 +102,6 @@ class Endurances:
         return {"recordings": {name: use.json_document() for name, use in self.uses.items()}}
 
 
-FORMAT = "ppafo bottle"
 _LEFT_OUT = (
     "Not in the model: a regulator that its gas cools or ices, unless a walk is on the bottle; liquid carried out "
     "with the vapour, a bottle upside down, leaking connections, and ice on the outside of the bottle."
@@ -180,15 +181,12 @@ def _counted(endurance: Endurance) -> str:
     return "repetition" if endurance.is_of_task_sequence or endurance.is_of_recording else "stride"
 
 
-_TITLE = "How long the bottle lasts"
-
-
 def endurance_panels(endurance: Endurance) -> list[Panel]:
     """Return the panels of temperature, pressure and gas of the bottle over time."""
     recording, bottle = endurance.discharge.recording, endurance.bottle
     time, needed = recording.time, bottle.regulator.set_pressure + bottle.regulator.pressure_margin
     dotted, dashed = ({"linestyle": style, "linewidth": 1.2} for style in (":", "--"))
-    lines = (
+    channels = (
         (_WARMTH, "wall_temperature", "wall", ORANGE),
         (_WARMTH, "bottle_temperature", "content", BLUE),
         (_PRESSURE, "bottle_pressure", "bottle", BLUE),
@@ -200,36 +198,36 @@ def endurance_panels(endurance: Endurance) -> list[Panel]:
         _PRESSURE: [Mark("level", (), needed, (), "needed", VERMILION, dashed)],
         _MASS: [],
     }
-    for kind, name, label, look in lines:
+    for kind, name, label, colour in channels:
         if name in recording:
-            marks[kind].append(Mark("line", time, recording[name], (), label, look))
+            marks[kind].append(Mark("line", time, recording[name], (), label, colour))
     end = float(_DURATION.values(time[-1]))
     return [
-        Panel(_DURATION, kind, each, then=lambda axes: axes.set_xlim(0.0, end), shares_x=True)
-        for kind, each in marks.items()
+        Panel(_DURATION, kind, lines, then=lambda axes: axes.set_xlim(0.0, end), shares_x=True)
+        for kind, lines in marks.items()
     ]
 
 
 def _facts(endurance: Endurance) -> list[tuple[str, str]]:
     """Return the most important results as pairs of name and value."""
-    course, draw = endurance.discharge, endurance.draw
-    recording, bottle, room = course.recording, endurance.bottle, endurance.bottle.room_temperature
+    result, draw = endurance.discharge, endurance.draw
+    recording, bottle, room = result.recording, endurance.bottle, endurance.bottle.room_temperature
     # What warms the gas of the full bottle to the room's temperature behind the regulator.
     content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, room)
     heat = heat_to_warm(bottle.fluid.table, content, room, bottle.regulator.set_pressure)
     counted, repeated = _counted(endurance), "recording" if endurance.is_of_recording else "task sequence"
     use = "of use" if endurance.is_of_recording else "of walking"
     rows = [
-        ("run time", f"{minutes_text(course.walking_time)} {use}, {minutes_text(course.total_time)} in total"),
+        ("run time", f"{minutes_text(result.walking_time)} {use}, {minutes_text(result.total_time)} in total"),
         (
             "strides" if counted == "stride" else f"repetitions of the {repeated}",
-            strides_text(course.strides),
+            strides_text(result.strides),
         ),
         (
             f"{counted}s without cooling",
             f"{strides_text(endurance.strides_when_warm)} (a bottle that stays at room temperature)",
         ),
-        ("ended", course.ending.message),
+        ("ended", result.ending.message),
         (
             "gas",
             f"{_MASS.text(draw.mass_per_stride)} a {counted}, {_FLOW.text(draw.mean_flow)}, largest "
@@ -241,6 +239,7 @@ def _facts(endurance: Endurance) -> list[tuple[str, str]]:
     ]
     if "liquid_mass" in recording:
         dry = np.flatnonzero(recording["liquid_mass"] <= 0.0)
-        left = f"no, {_MASS.text(float(recording['liquid_mass'][-1]))} left"
-        rows.append(("liquid used up", f"after {minutes_text(float(recording.time[dry[0]]))}" if dry.size else left))
+        remaining = f"no, {_MASS.text(float(recording['liquid_mass'][-1]))} left"
+        used_up = f"after {minutes_text(float(recording.time[dry[0]]))}" if dry.size else remaining
+        rows.append(("liquid used up", used_up))
     return rows

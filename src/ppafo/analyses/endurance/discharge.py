@@ -84,27 +84,27 @@ def ending(bottle: Bottle, draw: GasDemand, mass: float, content: BottleContent,
     otherwise.
     """
     usable = max(0.0, mass - smallest_mass_when_warm(bottle, draw))
-    left = f"{mass * GRAMS_PER_KILOGRAM:.3g} g are left"
+    remaining = f"{mass * GRAMS_PER_KILOGRAM:.3g} g are left"
     warm = f"{usable * GRAMS_PER_KILOGRAM:.3g} g of this would be usable at room temperature"
     if stopped_by == "time":
         return DischargeEnd(
-            TIME_IS_UP, f"the supply pressure was maintained for the whole requested time; {left}", mass, usable
+            TIME_IS_UP, f"the supply pressure was maintained for the whole requested time; {remaining}", mass, usable
         )
     if stopped_by == "frozen":
         cold = "the liquid begins to freeze (dry ice)" if has_liquid(bottle.fluid.table) else "the gas is too cold"
-        return DischargeEnd("frozen", f"{cold}, and the property table ends here; {left}, {warm}", mass, usable)
-    of_pressure, of_flow = reserves(bottle, draw, content.pressure, content.temperature)
+        return DischargeEnd("frozen", f"{cold}, and the property table ends here; {remaining}, {warm}", mass, usable)
+    pressure_margin, flow_margin = reserves(bottle, draw, content.pressure, content.temperature)
     # Both are fractions, so that the smaller one says what went short first.
-    is_pressure = of_pressure <= of_flow
+    is_pressure = pressure_margin <= flow_margin
     short = "maintain the supply pressure" if is_pressure else "drive the largest flow through the regulator"
     why = f"its pressure is too low to {short}"
     # What a warm bottle would still give decides between the two: cold is mended by waiting, empty is not.
     if usable > _NEXT_TO_NOTHING * bottle.mass:
-        return DischargeEnd("too cold", f"the bottle is too cold: {why}; {left}, {warm}", mass, usable)
-    return DischargeEnd("empty", f"the bottle is empty: {why}, and would be also when warm; {left}", mass, usable)
+        return DischargeEnd("too cold", f"the bottle is too cold: {why}; {remaining}, {warm}", mass, usable)
+    return DischargeEnd("empty", f"the bottle is empty: {why}, and would be also when warm; {remaining}", mass, usable)
 
 
-MAXIMUM_STRETCHES = 2000
+MAXIMUM_INTERVALS = 2000
 """Largest number of walking and resting intervals of a schedule; each is integrated separately."""
 SAMPLES = 1001
 """Number of samples of the recording."""
@@ -115,7 +115,7 @@ _ABOVE_FREEZING = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class DischargeInterval:
+class _Interval:
     """Interval with a constant draw [kg/s], from ``start`` to ``end`` [s].
 
     ``solution`` is the state as a function of time and ``last`` the state at the end; ``stopped_by`` is the reason of
@@ -131,7 +131,7 @@ class DischargeInterval:
     stopped_by: Stop | None
 
 
-class Balance(NamedTuple):
+class _Balance(NamedTuple):
     """Mass and energy balance of bottle and wall over a run.
 
     Across the boundary: gas drawn [kg], its enthalpy [J], heat from the room [J]. Changes inside: mass of the content
@@ -154,7 +154,7 @@ class Discharge:
     total_time: float
     strides: float
     ending: DischargeEnd
-    balance: Balance | SupplyBalance
+    balance: _Balance | SupplyBalance
     record: Callable[[], Recording] = field(repr=False, compare=False)
 
     @cached_property
@@ -170,10 +170,10 @@ def check_schedule(schedule: Schedule) -> None:
             raise ParameterError(f"{name} must be at least {least:g} s and finite, it is {value:g} s")
     if not 0.0 <= schedule.rest < float("inf"):
         raise ParameterError(f"rest must be at least 0 s and finite, it is {schedule.rest:g} s")
-    if schedule.rest > 0.0 and 2.0 * schedule.longest / (schedule.walk + schedule.rest) > MAXIMUM_STRETCHES:
+    if schedule.rest > 0.0 and 2.0 * schedule.longest / (schedule.walk + schedule.rest) > MAXIMUM_INTERVALS:
         raise ParameterError(
             f"walking {schedule.walk:g} s and resting {schedule.rest:g} s over {schedule.longest:g} s are more "
-            f"than {MAXIMUM_STRETCHES} periods: lengthen walking or resting, or shorten the longest time"
+            f"than {MAXIMUM_INTERVALS} periods: lengthen walking or resting, or shorten the longest time"
         )
 
 
@@ -193,21 +193,21 @@ def discharge(bottle: Bottle, draw: GasDemand, schedule: Schedule) -> Discharge:
         )
     energy = content_energy(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
     start = np.array([bottle.mass, energy, bottle.room_temperature, 0.0, 0.0, 0.0])
-    stretches: list[DischargeInterval] = []
+    intervals: list[_Interval] = []
     time, values, walking = 0.0, start, True
     reason: Stop | None = None
     while reason is None:
-        # Walking and resting take turns; without a rest all of it is one stretch.
+        # Walking and resting take turns; without a rest there is one interval.
         length = schedule.longest if schedule.rest == 0.0 else (schedule.walk if walking else schedule.rest)
         end = min(time + length, schedule.longest)
-        stretch = solve_stretch(bottle, draw, time, end, values, walking)
-        stretches.append(stretch)
-        time, values, walking = stretch.end, stretch.last, not walking
-        reason = stretch.stopped_by or ("time" if time >= schedule.longest else None)
-    last = stretches[-1].last
-    walked = sum(stretch.end - stretch.start for stretch in stretches if stretch.draw > 0.0)
+        interval = _solve_interval(bottle, draw, time, end, values, walking)
+        intervals.append(interval)
+        time, values, walking = interval.end, interval.last, not walking
+        reason = interval.stopped_by or ("time" if time >= schedule.longest else None)
+    last = intervals[-1].last
+    walked = sum(interval.end - interval.start for interval in intervals if interval.draw > 0.0)
     change = last - start
-    balance = Balance(
+    balance = _Balance(
         drawn_mass=float(last[3]),
         outflow_energy=float(last[4]),
         room_heat=float(last[5]),
@@ -217,11 +217,11 @@ def discharge(bottle: Bottle, draw: GasDemand, schedule: Schedule) -> Discharge:
     )
     return Discharge(
         walking_time=walked,
-        total_time=stretches[-1].end,
+        total_time=intervals[-1].end,
         strides=walked / draw.stride_time,
         ending=ending(bottle, draw, float(last[0]), content_of(bottle, float(last[0]), float(last[1])), reason),
         balance=balance,
-        record=partial(_recording, bottle, stretches),
+        record=partial(_recording, bottle, intervals),
     )
 
 
@@ -243,15 +243,15 @@ def discharge_of_life(life: BottleLife, draw: GasDemand) -> Discharge:
     )
 
 
-def _recording(bottle: Bottle, stretches: Sequence[DischargeInterval]) -> Recording:
+def _recording(bottle: Bottle, intervals: Sequence[_Interval]) -> Recording:
     """Return the recording of a discharge at uniformly spaced times, from the start to the exact end."""
-    times = np.linspace(0.0, stretches[-1].end, SAMPLES)
-    ends = np.array([stretch.end for stretch in stretches])
+    times = np.linspace(0.0, intervals[-1].end, SAMPLES)
+    ends = np.array([interval.end for interval in intervals])
     # The last time may be beyond the last end by rounding.
-    places = np.minimum(np.searchsorted(ends, times, side="left"), len(stretches) - 1)
-    rows = np.array([stretches[stretch].solution(time) for stretch, time in zip(places, times, strict=True)])
+    numbers = np.minimum(np.searchsorted(ends, times, side="left"), len(intervals) - 1)
+    rows = np.array([intervals[number].solution(time) for number, time in zip(numbers, times, strict=True)])
     contents = [content_of(bottle, float(row[0]), float(row[1])) for row in rows]
-    flows = [stretches[stretch].draw for stretch in places]
+    flows = [intervals[number].draw for number in numbers]
     supply = [
         delivered_pressure(bottle.regulator, content.pressure, flow)
         for content, flow in zip(contents, flows, strict=True)
@@ -276,9 +276,9 @@ def content_of(bottle: Bottle, mass: float, energy: float) -> BottleContent:
     return bottle_content(table, mass, bottle.volume, content_temperature(table, mass, bottle.volume, energy))
 
 
-def solve_stretch(
+def _solve_interval(
     bottle: Bottle, draw: GasDemand, start: float, end: float, values: Floats, walking: bool
-) -> DischargeInterval:
+) -> _Interval:
     """Return one interval of walking or rest; walking ends early if the supply pressure is no longer maintained."""
     from scipy.integrate import solve_ivp
 
@@ -300,12 +300,12 @@ def solve_stretch(
         content = content_of(bottle, float(y[0]), float(y[1]))
         return min(reserves(bottle, draw, content.pressure, content.temperature))
 
-    # A stretch may begin without a reserve, and the solver finds crossings only.
+    # An interval may begin without a reserve, and the solver finds crossings only.
     if walking and to_spare(start, values) <= 0.0:
-        return DischargeInterval(start, start, flow, lambda _times: values, values, "supply")
+        return _Interval(start, start, flow, lambda _times: values, values, "supply")
     events: list[Any] = [kelvins_above_freezing, *([to_spare] if walking else [])]
     for event in events:
-        # It ends the stretch where it falls through 0.
+        # It ends the interval where it falls through 0.
         event.terminal, event.direction = True, -1.0
     solution = solve_ivp(
         rates,
@@ -321,6 +321,4 @@ def solve_stretch(
         raise SimulationError(f"the bottle could not be simulated beyond {solution.t[-1]:.4g} s: {solution.message}")
     stopped: Stop = "frozen" if len(solution.t_events[0]) else "supply"
     last = np.asarray(solution.y[:, -1])
-    return DischargeInterval(
-        start, float(solution.t[-1]), flow, solution.sol, last, stopped if solution.status == 1 else None
-    )
+    return _Interval(start, float(solution.t[-1]), flow, solution.sol, last, stopped if solution.status == 1 else None)

@@ -63,22 +63,25 @@ def bottle(
     from dataclasses import replace
 
     from ppafo.analyses.endurance.answer import Endurances, finding_of, finding_of_several
-    from ppafo.analyses.endurance.gas_demand import demand_of_numbers, demand_of_recording
-    from ppafo.analyses.endurance.solve import BETWEEN_RESTS, STRIDE_TIME, endurance_of_walk_gas, follow_bottle
-    from ppafo.analyses.endurance.walk_gas import WALK_FILE, read_walk_gas, walk_gas
+    from ppafo.analyses.endurance.gas_demand import demand_of_numbers
+    from ppafo.analyses.endurance.solve import (
+        BETWEEN_RESTS,
+        STRIDE_TIME,
+        endurance_of_gas_use,
+        follow_bottle,
+        named_gas_uses,
+    )
     from ppafo.arguments.door import argument_text
-    from ppafo.arguments.words import units_given
+    from ppafo.arguments.reading import units_given
     from ppafo.errors import ParameterError
     from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
-    from ppafo.report.stored_figure import stated_units
     from ppafo.signals import Recording
-    from ppafo.storage.result_folder import RUN_FILE, read_json, read_recording
     from ppafo.units.shown import shown_in, units_in_force
     from ppafo.walking import WalkResult
     from ppafo.walking.bottle.coupling import Schedule
 
-    given = (recordings,) if isinstance(recordings, str | Path | Recording | WalkResult) else tuple(recordings)
-    if bool(given) == (gas_per_stride is not None):
+    gas_uses = (recordings,) if isinstance(recordings, str | Path | Recording | WalkResult) else tuple(recordings)
+    if bool(gas_uses) == (gas_per_stride is not None):
         example = argument_text("gas_per_stride", "0.3 g")
         raise ParameterError(f"give either a recording or {argument_text('gas_per_stride')}, for example {example}")
     if walk is not None and rest is None:
@@ -87,46 +90,20 @@ def bottle(
             f"{argument_text('longest')} for the total time"
         )
     schedule = Schedule(BETWEEN_RESTS if walk is None else walk, rest or 0.0, longest)
-    named, changed = PAPER_BOTTLE if bottle is None else bottle, tuple(overrides)
+    changes = tuple(overrides)
     if gas_per_stride is not None:
         units = units_given({"kg/s": peak_flow})
         with shown_in({**units_in_force(), **units}):
             draw = demand_of_numbers(gas_per_stride, STRIDE_TIME if stride_time is None else stride_time, peak_flow)
-        emptied = follow_bottle(load_bottle(named, changed), draw, schedule)
-        return finding_of(replace(emptied, device_units=units))
+        full = load_bottle(PAPER_BOTTLE if bottle is None else bottle, changes)
+        return finding_of(replace(follow_bottle(full, draw, schedule), device_units=units))
     if peak_flow is not None:
         raise ParameterError(
             f"{argument_text('peak_flow')} belongs to {argument_text('gas_per_stride')}; a recording has its own "
             "largest flow"
         )
-    uses: dict[str, str | Path | Recording | WalkResult] = {}
-    for use in given:
-        if any(use is other or (isinstance(use, str | Path) and str(use) == str(other)) for other in uses.values()):
-            raise ParameterError("the same recording is given twice")
-        label = (
-            use.label if isinstance(use, Recording) else use.scenario.name if isinstance(use, WalkResult) else str(use)
-        )
-        # Walks of one scenario with other overrides have one name.
-        alike = sum(name == label or name.startswith(f"{label} (") for name in uses)
-        uses[f"{label} ({alike + 1})" if alike else label] = use
-    found = {}
-    for name, use in uses.items():
-        gas = walk_gas(use) if isinstance(use, WalkResult) else None
-        # The folder that a walk of one wearer was written into.
-        if isinstance(use, str | Path) and (Path(use) / WALK_FILE).is_file():
-            gas = read_walk_gas(Path(use))
-        if gas is None:
-            full = load_bottle(named, changed)
-            recording = use if isinstance(use, Recording) else read_recording(Path(str(use)))
-            life = follow_bottle(full, demand_of_recording(recording, stride_time), schedule)
-            run = Path(str(use)) / RUN_FILE
-            units = stated_units(run, read_json(run)) if not isinstance(use, Recording) and run.is_file() else {}
-            # Whoever says how long a stride takes recorded strides; else the recording is what repeats.
-            found[name] = replace(life, is_of_recording=stride_time is None, device_units=units)
-            continue
-        if stride_time is not None:
-            stride = f"its whole task sequence '{gas.task_sequence}'" if gas.task_sequence else "one stride of its walk"
-            given_time = argument_text("stride_time")
-            raise ParameterError(f"{given_time}: a stride of {name} is {stride}; omit {given_time}")
-        found[name] = endurance_of_walk_gas(gas, bottle, schedule, changed)
-    return finding_of(*found.values()) if len(found) == 1 else finding_of_several(Endurances(found))
+    endurances = {
+        name: endurance_of_gas_use(name, use, stride_time, bottle, schedule, changes)
+        for name, use in named_gas_uses(gas_uses).items()
+    }
+    return finding_of(*endurances.values()) if len(endurances) == 1 else finding_of_several(Endurances(endurances))

@@ -1,18 +1,27 @@
-"""Duration of a bottle for one gas demand, or for several compared."""
+"""Duration of a bottle for a gas demand: of given numbers, of a recording, or of a walk."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.endurance.discharge import check_schedule, discharge, discharge_of_life, smallest_mass_when_warm
-from ppafo.analyses.endurance.gas_demand import GasDemand
-from ppafo.analyses.endurance.walk_gas import WalkGas, demand_of_walk, walk_gas
+from ppafo.analyses.endurance.gas_demand import GasDemand, demand_of_recording
+from ppafo.analyses.endurance.walk_gas import WALK_FILE, WalkGas, demand_of_walk, read_walk_gas, walk_gas
 from ppafo.arguments import checked
-from ppafo.errors import DataError
-from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle
+from ppafo.arguments.door import argument_text
+from ppafo.errors import DataError, ParameterError
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
 from ppafo.report.kind import Kind
+from ppafo.report.stored_figure import stated_units
+from ppafo.signals import Recording
+from ppafo.storage.owned_folder import read_json
+from ppafo.storage.reading import read_recording
+from ppafo.storage.result_folder import RUN_FILE
 from ppafo.walking import WalkResult
 from ppafo.walking.bottle.coupling import Schedule
+from ppafo.walking.bottle.supply import is_of_bottle
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import bottle_life
@@ -24,6 +33,71 @@ STRIDE_TIME = 1.1
 LONGEST = 24.0 * 3600.0
 """Default of the longest simulated time [s]: one day."""
 WITHOUT_REST = Schedule(LONGEST, 0.0, LONGEST)
+GasUse = str | Path | Recording | WalkResult
+"""Gas use of a device: a walk or its folder, or a recording, its file or its folder."""
+
+
+def named_gas_uses(uses: Sequence[GasUse]) -> dict[str, GasUse]:
+    """Return gas uses by name; ParameterError for a gas use that is given twice."""
+    named: dict[str, GasUse] = {}
+    for use in uses:
+        if any(use is other or (isinstance(use, str | Path) and str(use) == str(other)) for other in named.values()):
+            raise ParameterError("the same recording is given twice")
+        if isinstance(use, Recording):
+            label = use.label
+        else:
+            label = use.scenario.name if isinstance(use, WalkResult) else str(use)
+        # Walks of one scenario with other overrides have one name.
+        alike = sum(name == label or name.startswith(f"{label} (") for name in named)
+        named[f"{label} ({alike + 1})" if alike else label] = use
+    return named
+
+
+def endurance_of_gas_use(
+    name: str,
+    use: GasUse,
+    stride_time: float | None,
+    bottle: str | Path | None,
+    schedule: Schedule,
+    overrides: Iterable[str],
+) -> Endurance:
+    """Return the duration of a bottle for a walk that continues, or for a recording that is repeated.
+
+    ``stride_time`` is the time of a stride in a recording [s]; by default the whole recording is what repeats. A walk
+    has its own: ParameterError, which calls the walk ``name``.
+    """
+    gas = walk_gas(use) if isinstance(use, WalkResult) else None
+    if isinstance(use, str | Path) and (Path(use) / WALK_FILE).is_file():
+        gas = read_walk_gas(Path(use))
+    if gas is not None:
+        if stride_time is not None:
+            stride = f"its whole task sequence '{gas.task_sequence}'" if gas.task_sequence else "one stride of its walk"
+            argument = argument_text("stride_time")
+            raise ParameterError(f"{argument}: a stride of {name} is {stride}; omit {argument}")
+        return endurance_of_walk_gas(gas, bottle, schedule, overrides)
+    full = load_bottle(PAPER_BOTTLE if bottle is None else bottle, overrides)
+    if isinstance(use, Recording):
+        recording, units = use, {}
+    else:
+        recording, run = read_recording(Path(str(use))), Path(str(use)) / RUN_FILE
+        document = read_json(run) if run.is_file() else {}
+        units = dict(stated_units(run, document)) if document else {}
+        _check_gas(run, document, full)
+    endurance = follow_bottle(full, demand_of_recording(recording, stride_time), schedule)
+    return replace(endurance, is_of_recording=stride_time is None, device_units=units)
+
+
+def _check_gas(run: Path, document: Any, bottle: Bottle) -> None:
+    """Raise DataError for a run whose device was fed with another gas than the bottle holds."""
+    gas: Any = document
+    for key in ("scenario", "device", "gas"):
+        gas = gas.get(key) if isinstance(gas, dict) else None
+    molar_mass, fluid = gas.get("molar_mass") if isinstance(gas, dict) else None, bottle.fluid.name
+    if isinstance(molar_mass, float) and not is_of_bottle(molar_mass, bottle):
+        raise DataError(
+            f"{run}: its device is fed with gas of {1.0e3 * molar_mass:.4g} g/mol, and bottle '{bottle.name}' holds "
+            f"{fluid}: take a bottle of that gas (ppafo bottle --list), or simulate with gas.species={fluid}"
+        )
 
 
 @checked
@@ -56,25 +130,25 @@ def endurance_of_walk_gas(
         raise DataError(
             f"{gas.name}: the folder does not state the scenario of the walk; repeat the walk with 'ppafo walk'"
         )
-    own = walk_of(gas.scenario).bottle
-    carried = on_bottle(gas.scenario, PAPER_BOTTLE if bottle is None and own is None else bottle, overrides)
-    supply = walk_of(carried).bottle
+    has_bottle = bottle is not None or walk_of(gas.scenario).bottle is not None
+    walking = on_bottle(gas.scenario, bottle if has_bottle else PAPER_BOTTLE, overrides)
+    supply = walk_of(walking).bottle
     assert supply is not None, "a walk on a bottle"
     check_schedule(schedule)
-    life = bottle_life(carried, schedule)
+    life = bottle_life(walking, schedule)
     # A bottle may end before the first stride does.
     strides = max(life.repeats, 1.0e-9)
     stride_time, mass = life.walked / strides, life.course.regulated / strides
     before = Kind("", "kg", "gas mass", ".3g").text(at_set_pressure.mass_per_stride)
     origin = f"{at_set_pressure.origin} on the bottle, mean over its strides ({before} before, at the set pressure)"
-    taken = GasDemand(mass, stride_time, max(at_set_pressure.peak_flow, mass / stride_time), origin)
-    usable = supply.mass - smallest_mass_when_warm(supply.bottle, taken)
+    demand = GasDemand(mass, stride_time, max(at_set_pressure.peak_flow, mass / stride_time), origin)
+    usable = supply.mass - smallest_mass_when_warm(supply.bottle, demand)
     return Endurance(
         bottle=supply.bottle,
-        draw=taken,
+        draw=demand,
         schedule=schedule,
-        discharge=discharge_of_life(life, taken),
-        strides_when_warm=usable / taken.mass_per_stride,
+        discharge=discharge_of_life(life, demand),
+        strides_when_warm=usable / demand.mass_per_stride,
         is_of_task_sequence=bool(gas.task_sequence),
         device_units=gas.scenario.device.shown,
     )

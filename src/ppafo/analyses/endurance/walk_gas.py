@@ -10,10 +10,11 @@ from ppafo.analyses.endurance.gas_demand import GasDemand, demand_of_numbers, la
 from ppafo.errors import DataError, PpafoError, ScenarioError, refused_as
 from ppafo.parameters.overrides import read_overrides
 from ppafo.signals import Recording
-from ppafo.simulation.building import ScenarioRequest
+from ppafo.simulation.document import ScenarioRequest
 from ppafo.simulation.loading import scenario_of
 from ppafo.simulation.scenario import Scenario
-from ppafo.storage.result_folder import read_json, read_recording
+from ppafo.storage.owned_folder import read_json
+from ppafo.storage.reading import read_recording
 from ppafo.walking import WalkResult
 from ppafo.walking.loading import WALKING
 from ppafo.walking.motion import walk_of

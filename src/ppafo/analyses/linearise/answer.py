@@ -23,7 +23,7 @@ from ppafo.units.shown import in_units, quantity_of_unit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# How far a linear model holds: steps of the command from the steady state, on the runs and of the model.
+# Range of validity of a linear model: steps of the command from the steady state, on the runs and of the model.
 
 DURATION, INTERVAL = 1.0, 1.0e-3
 """Duration of a run after a step of the command, and its sample time [s]."""
@@ -34,7 +34,7 @@ _LARGEST_COMMAND = 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StepResponses:
+class _StepResponses:
     """Torque responses to steps of the command, of the nonlinear runs and of the linear model.
 
     ``amplitudes`` (steps,): step heights of the command [-]
@@ -70,7 +70,7 @@ def can_step(model: LinearModel) -> bool:
     return 0.0 < abs(_value_at_point(model, "command")) < _LARGEST_COMMAND
 
 
-def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> StepResponses:
+def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> _StepResponses:
     """Return the torque responses to steps of the command by fractions of its steady value [-].
 
     The model must satisfy ``can_step``.
@@ -85,7 +85,7 @@ def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> StepResp
     row = [variable.name for variable in model.outputs].index("torque")
     system = StateSpace(model.a, model.b[:, [column]], model.c[[row]], model.d[[row]][:, [column]])
     linear = amplitudes[:, None] * step(system, T=times)[1]
-    return StepResponses(amplitudes, times, np.array(runs) - still, linear)
+    return _StepResponses(amplitudes, times, np.array(runs) - still, linear)
 
 
 def _value_at_point(model: LinearModel, name: str) -> float:
@@ -135,34 +135,14 @@ _STEPS_CAPTION = (
 def finding_of(model: LinearModel) -> Finding[LinearModel]:
     """Return a linear model as a finding with sentences, tables and panels."""
     when = "in its steady state" if model.time is None else f"at {model.time:g} s"
-    steps, caption = partial(steps_panels, model), _STEPS_CAPTION
-    far = Section("How far it holds", panels=steps, name="steps", caption=caption, across=2, size=(3.0, 2.8))
-    remarks = []
-    for edge in model.edges:
-        side, other = ("above", "below") if edge.is_above else ("below", "above")
-        remarks.append(
-            f"the plant has a kink at this point: the column of `{edge.name}` is valid {side} "
-            f"{_value_at_point(model, edge.name):.5g} only; its slope differs {other} it"
-        )
-    return Finding(
-        name="linearise",
-        kicker="Linear model",
-        title=f"Linear model of {model.scenario.name}, {when}",
-        said=_sentences(model),
-        parts=[
-            _point(model),
-            Section("Which side was taken", facts(model.sides.items()), remarks=remarks),
-            _poles(model),
-            *_matrices(model),
-            *([far] if can_step(model) else []),
-        ],
-        found=model,
-        files={"linearise.npz": partial(_arrays, model)},
+    validity = Section(
+        "How far it holds",
+        panels=partial(steps_panels, model),
+        name="steps",
+        caption=_STEPS_CAPTION,
+        across=2,
+        size=(3.0, 2.8),
     )
-
-
-def _sentences(model: LinearModel) -> list[str]:
-    """Return sentences on size, validity and omissions of the model."""
     size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
     sentences = [f"the plant without controller and sensors: {size}; differences from the point, SI units"]
     if not model.is_steady:
@@ -175,8 +155,30 @@ def _sentences(model: LinearModel) -> list[str]:
         ("age of the measurements", model.delays.signals),
         ("sample period", model.delays.period),
     )
-    left_out = ", ".join(f"{name} {1.0e3 * delay:g} ms" for name, delay in delays if delay > 0.0)
-    return [*sentences, f"not in the model: {left_out}, noise, resolution and bandwidth of sensors"]
+    omitted = ", ".join(f"{name} {1.0e3 * delay:g} ms" for name, delay in delays if delay > 0.0)
+    sentences.append(f"not in the model: {omitted}, noise, resolution and bandwidth of sensors")
+    remarks = []
+    for edge in model.edges:
+        side, other = ("above", "below") if edge.is_above else ("below", "above")
+        remarks.append(
+            f"the plant has a kink at this point: the column of `{edge.name}` is valid {side} "
+            f"{_value_at_point(model, edge.name):.5g} only; its slope differs {other} it"
+        )
+    return Finding(
+        name="linearise",
+        kicker="Linear model",
+        title=f"Linear model of {model.scenario.name}, {when}",
+        said=sentences,
+        parts=[
+            _point(model),
+            Section("Which side was taken", facts(model.sides.items()), remarks=remarks),
+            _poles(model),
+            *_matrices(model),
+            *([validity] if can_step(model) else []),
+        ],
+        found=model,
+        files={"linearise.npz": partial(_arrays, model)},
+    )
 
 
 def _point(model: LinearModel) -> Section:
@@ -243,9 +245,9 @@ def frequency_panels(model: LinearModel) -> list[Panel]:
     lowest = min(float(np.min(poles[poles > 0.0], initial=1.0)), 1.0)
     frequencies = np.geomspace(_LOWEST_SHARE * lowest, _HIGHEST_FREQUENCY, _POINTS)
     response = model.response(frequencies)
-    late = model.delays.command + model.delays.signals + 0.5 * model.delays.period
+    delay = model.delays.command + model.delays.signals + 0.5 * model.delays.period
     phase = np.degrees(np.unwrap(np.angle(response)))
-    delayed = f"with {1.0e3 * late:.3g} ms of dead time, late measurements and half a sample"
+    delayed = f"with {1.0e3 * delay:.3g} ms of dead time, late measurements and half a sample"
 
     def set_phase(axes: "Axes") -> None:
         from matplotlib.ticker import MultipleLocator
@@ -266,7 +268,7 @@ def frequency_panels(model: LinearModel) -> list[Panel]:
             Kind("Phase", "deg"),
             [
                 Mark("line", frequencies, phase, label="plant"),
-                Mark("line", frequencies, phase - 360.0 * frequencies * late, (), delayed, VERMILION, _DASHED),
+                Mark("line", frequencies, phase - 360.0 * frequencies * delay, (), delayed, VERMILION, _DASHED),
             ],
             legend="inside",
             then=set_phase,

@@ -39,6 +39,8 @@ UNITS = {
     "vented_flow": "kg/s",
 }
 """SI units of all signals of a linear model."""
+DRIVEN = ("supply_pressure", "dorsiflexion_pressure", "external_torque")
+"""Inputs of a linear model that are fields of ``PlantParameters``."""
 _SIZES = {"Pa": 1.0e5, "K": 300.0}
 """Reference size for values with a unit [SI]; 1 for any other unit."""
 
@@ -48,7 +50,7 @@ def size_of(name: str) -> float:
     return _SIZES.get(UNITS.get(name, ""), 1.0)
 
 
-class PlantValues(NamedTuple):
+class _PlantValues(NamedTuple):
     """Time derivatives of all states, and outputs, each by name [SI]."""
 
     rates: dict[str, float]
@@ -59,24 +61,26 @@ class PlantValues(NamedTuple):
 class LinearisedPlant:
     """Plant of a run without controller and sensors.
 
-    ``way``: direction of a free vane, 0 if friction or a stop holds it; None if the ankle is prescribed, so that angle
-        and angular velocity are inputs
+    ``direction``: direction of a free vane, 0 if friction or a stop holds it; None if the ankle is prescribed, so that
+        angle and angular velocity are inputs
     ``time``: time [s] for which the shank of a leg is fixed
     ``functions``: functions of the model, as used in the run
     """
 
     run: Run
-    way: float | None
+    direction: float | None
     time: float
     functions: PythonFunctions
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the inputs."""
-        more = ("angle", "angular_velocity") if self.way is None else ("external_torque",) if self.way else ()
+        more = (
+            ("angle", "angular_velocity") if self.direction is None else ("external_torque",) if self.direction else ()
+        )
         return ("command", "supply_pressure", "dorsiflexion_pressure", *more)
 
-    def at(self, values: Mapping[str, float]) -> PlantValues:
+    def at(self, values: Mapping[str, float]) -> _PlantValues:
         """Return time derivatives and outputs for values of all states and inputs by name [SI].
 
         A valve state that follows the command immediately does not count as a state: its derivative is 0.
@@ -88,29 +92,26 @@ class LinearisedPlant:
         pressures = values["pressure_1"], values["pressure_2"]
         valve = valve_at(run, self.functions, values)
         chambers = call(turning_chambers)(plant, angle, rate, *pressures, parts=program.functions)
-        moving, warm = {}, {}
+        motion_rates, temperature_rates = {}, {}
         if isinstance(run.thermal, ThermalParameters):
             temperatures = values["temperature_1"], values["temperature_2"]
             gas = call(thermal_rates)(plant, run.thermal, valve.openings, chambers, *pressures, *temperatures)
-            warm = {"temperature_1": gas.temperature_1, "temperature_2": gas.temperature_2}
+            temperature_rates = {"temperature_1": gas.temperature_1, "temperature_2": gas.temperature_2}
         else:
             gas = call(isothermal_rates)(plant, valve.openings, chambers, *pressures)
         # A vane that is held or prescribed has no acceleration: angle and velocity are no states then.
-        if self.way:
+        if self.direction:
             added = 0.0 if run.leg is None else torque_of_leg(program, run.leg, self.time, angle)
-            moved = call(free_motion)(plant, angle, rate, *pressures, added, self.way, parts=program.functions)
-            moving = dict(zip(("angle", "angular_velocity"), moved, strict=True))
-        rates = moving | {"pressure_1": gas.pressure_1, "pressure_2": gas.pressure_2} | warm
+            moved = call(free_motion)(plant, angle, rate, *pressures, added, self.direction, parts=program.functions)
+            motion_rates = dict(zip(("angle", "angular_velocity"), moved, strict=True))
+        pressure_rates = {"pressure_1": gas.pressure_1, "pressure_2": gas.pressure_2}
+        rates = motion_rates | pressure_rates | temperature_rates
         outputs = {"torque": program.actuator.torque(plant, angle, *pressures)} | {name: values[name] for name in rates}
         outputs |= {"supplied_flow": gas.supplied, "vented_flow": gas.vented}
-        return PlantValues(rates | valve.rates, outputs | {name: values[name] for name in valve.rates})
+        return _PlantValues(rates | valve.rates, outputs | {name: values[name] for name in valve.rates})
 
 
-DRIVEN = ("supply_pressure", "dorsiflexion_pressure", "external_torque")
-"""Inputs of a linear model that are fields of ``PlantParameters``."""
-
-
-def plant_of(run: Run, way: float | None, values: Mapping[str, float], time: float = 0.0) -> LinearisedPlant:
+def plant_of(run: Run, direction: float | None, values: Mapping[str, float], time: float = 0.0) -> LinearisedPlant:
     """Return the plant of a run near given states and inputs; other arguments as in ``LinearisedPlant``.
 
     If the valve has reached its requested opening, the slew limit is inactive: the valve follows a small command
@@ -118,7 +119,7 @@ def plant_of(run: Run, way: float | None, values: Mapping[str, float], time: flo
     """
     limitless, functions = without_slew_limit(run), functions_in(run)
     has_arrived = valve_at(run, functions, values).state == valve_at(limitless, functions, values).state
-    return LinearisedPlant(limitless if has_arrived else run, way, time, functions)
+    return LinearisedPlant(limitless if has_arrived else run, direction, time, functions)
 
 
 def functions_in(run: Run) -> PythonFunctions:
@@ -141,7 +142,7 @@ def valve_states(program: Program) -> dict[str, str]:
     return {VALVE + path.removeprefix("valve_state.").replace(".", "_"): path for path in paths}
 
 
-class SettledValve(NamedTuple):
+class _SettledValve(NamedTuple):
     """Valve state after its immediate changes, openings [-], and time derivatives of the states by name."""
 
     state: Any
@@ -149,7 +150,7 @@ class SettledValve(NamedTuple):
     rates: dict[str, float]
 
 
-def valve_at(run: Run, functions: PythonFunctions, values: Mapping[str, float]) -> SettledValve:
+def valve_at(run: Run, functions: PythonFunctions, values: Mapping[str, float]) -> _SettledValve:
     """Return the valve of a run for given valve states and command, by name."""
     valve, names = run.program.valve, valve_states(run.program)
     command = functions.of(at_valve)(values["command"])
@@ -157,7 +158,7 @@ def valve_at(run: Run, functions: PythonFunctions, values: Mapping[str, float]) 
     settled = functions.of(valve.settle)(run.valve, state, command, 0.0)
     openings = functions.of(valve.instant)(run.valve, settled, command)
     rates = numbers(functions.of(valve.rates)(run.valve, settled, command))
-    return SettledValve(settled, openings, dict(zip(names, rates, strict=True)))
+    return _SettledValve(settled, openings, dict(zip(names, rates, strict=True)))
 
 
 def without_slew_limit(run: Run) -> Run:
@@ -172,11 +173,11 @@ def opens_in_proportion(run: Run) -> bool:
     start = dict(zip(valve_states(run.program), numbers(run.program.valve.initial()), strict=True))
     functions = functions_in(limitless)
 
-    def moved(command: float) -> Floats:
+    def opening(command: float) -> Floats:
         valve = valve_at(limitless, functions, start | {"command": command})
         return np.array([*valve.openings, *valve.rates.values()])
 
-    return any(bool(np.any(one_sided_slopes(moved, value, 1.0, 1.0)[0])) for value in (-0.5, 0.5))
+    return any(bool(np.any(one_sided_slopes(opening, value, 1.0, 1.0)[0])) for value in (-0.5, 0.5))
 
 
 # Slopes by differences: towards one side of a point, where the model may have a kink.
@@ -196,21 +197,21 @@ def one_sided_slopes(function: Callable[[float], Floats], at: float, side: float
     step by Ridders' method (Adv. Eng. Softw. 4, 1982). For each row, the extrapolation with the smallest estimated
     error is taken. The function is not evaluated at the value itself, so a jump there has no effect.
     """
-    places = at + side * LONGEST * size / SHORTER ** np.arange(LENGTHS)
-    values = np.array([function(place) for place in places.tolist()])
-    slopes = np.diff(values, axis=0) / np.diff(places)[:, None]
+    steps = at + side * LONGEST * size / SHORTER ** np.arange(LENGTHS)
+    values = np.array([function(step) for step in steps.tolist()])
+    slopes = np.diff(values, axis=0) / np.diff(steps)[:, None]
     best, errors = slopes[-1], np.full(slopes.shape[1], np.inf)
     for order in range(1, ORDERS + 1):
         better = slopes[1:] + np.diff(slopes, axis=0) / (SHORTER**order - 1.0)
-        apart = np.maximum(np.abs(better - slopes[1:]), np.abs(better - slopes[:-1]))
-        nearest = np.nanargmin(np.where(np.isfinite(apart), apart, np.inf), axis=0), np.arange(best.size)
-        is_better = apart[nearest] < errors
-        best, errors = np.where(is_better, better[nearest], best), np.where(is_better, apart[nearest], errors)
+        error = np.maximum(np.abs(better - slopes[1:]), np.abs(better - slopes[:-1]))
+        nearest = np.nanargmin(np.where(np.isfinite(error), error, np.inf), axis=0), np.arange(best.size)
+        is_better = error[nearest] < errors
+        best, errors = np.where(is_better, better[nearest], best), np.where(is_better, error[nearest], errors)
         slopes = better
     return best, errors
 
 
-def side_of(name: str, values: Mapping[str, float], way: float | None) -> float:
+def side_of(name: str, values: Mapping[str, float], direction: float | None) -> float:
     """Side of a value (1 or -1) for which a linear model holds.
 
     The command and the valve opening increase, or decrease from full opening. Angle, pressure 1 and its supply
@@ -220,6 +221,6 @@ def side_of(name: str, values: Mapping[str, float], way: float | None) -> float:
         return 1.0 if abs(values[name]) < 1.0 else -float(np.sign(values[name]))
     if name in (f"{VALVE}requested", f"{VALVE}opening"):
         return 1.0 if values[name] < 1.0 else -1.0
-    if name == "angular_velocity" and way:
-        return way
+    if name == "angular_velocity" and direction:
+        return direction
     return 1.0 if name in ("pressure_1", "supply_pressure", "angle", "angular_velocity") else -1.0

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ppafo.analyses.linearise.plant import (
+    DRIVEN,
     VALVE,
     functions_in,
     one_sided_slopes,
@@ -45,12 +46,12 @@ class Point:
 
     ``time``: time [s] in the run; None for a steady state
     ``values``: all states and inputs by name [SI]
-    ``way``: direction of a free vane, 0 if friction or a stop holds it; None if the ankle is prescribed
+    ``direction``: direction of a free vane, 0 if friction or a stop holds it; None if the ankle is prescribed
     """
 
     time: float | None
     values: Mapping[str, float]
-    way: float | None
+    direction: float | None
 
 
 def point_at(scenario: Scenario, time: float) -> Point:
@@ -63,9 +64,9 @@ def point_at(scenario: Scenario, time: float) -> Point:
         raise ScenarioError(
             f"{scenario.name}: --at {time:g} s is outside the run, which lasts {scenario.run.duration:g} s"
         )
-    whole = plan_run(scenario)
-    steps = min(round(time / whole.step), whole.step_count)
-    return Point(steps * whole.step, *_after(scenario, whole, steps))
+    run = plan_run(scenario)
+    steps = min(round(time / run.step), run.step_count)
+    return Point(steps * run.step, *_after(scenario, run, steps))
 
 
 def _after(scenario: Scenario, run: Run, steps: int) -> tuple[dict[str, float], float | None]:
@@ -84,16 +85,15 @@ def _after(scenario: Scenario, run: Run, steps: int) -> tuple[dict[str, float], 
     )
     values = {"angle": angle, "angular_velocity": rate, "command": rows["result.command"]}
     values |= {"pressure_1": float(pressure_1), "pressure_2": float(pressure_2)}
-    driven = ("supply_pressure", "dorsiflexion_pressure", "external_torque")
-    values |= {name: float(getattr(run.plant, name)) for name in driven}
+    values |= {name: float(getattr(run.plant, name)) for name in DRIVEN}
     values |= {name: rows[path] for name, path in valve_states(run.program).items()}
     if isinstance(run.thermal, ThermalParameters):
         warm = [rows[f"state.mass_{side}"] / rows[f"masses.mass_{side}"] for side in (1, 2)]
         values |= {f"temperature_{side}": run.thermal.temperature * warm[side - 1] for side in (1, 2)}
-    return values, _way(run, values, steps * run.step)
+    return values, _direction(run, values, steps * run.step)
 
 
-def _way(run: Run, values: Mapping[str, float], time: float) -> float | None:
+def _direction(run: Run, values: Mapping[str, float], time: float) -> float | None:
     """Direction of a free vane at a time [s], 0 if it is stuck; None if the ankle is prescribed."""
     if run.program.angle is not None:
         return None
@@ -112,36 +112,35 @@ def equilibrium(scenario: Scenario) -> Point:
     The ankle rests at its angle at the end of the run, and all states of chambers and valve are constant. The actuator
     torque is the last value of the reference, or, for a constant command, the command is given instead.
     """
-    whole = plan_run(scenario)
-    if whole.leg is not None and whole.program.shank is not CONSTANT:
+    planned = plan_run(scenario)
+    if planned.leg is not None and planned.program.shank is not CONSTANT:
         raise ScenarioError(f"{scenario.name}: no equilibrium while the shank of the leg moves; give --at a time")
-    values, _ = _after(scenario, whole, whole.step_count)
+    values, _ = _after(scenario, planned, planned.step_count)
     values["angular_velocity"] = 0.0
     is_open_loop = scenario.controller.is_open_loop
     if scenario.controlled != TORQUE and not is_open_loop:
         line = f"reference.of = '{scenario.controlled}': an equilibrium is found for a torque; give --at a time"
         raise ScenarioError(f"{scenario.name}: {line}")
     end = np.array([scenario.run.duration])
-    wanted = None if is_open_loop else float(profile_values(scenario.reference, end)[0][0])
-    run = without_slew_limit(whole)
-    held = None if run.program.angle is not None else 0.0
-    steady = _steady(run, held, values, wanted)
+    torque = None if is_open_loop else float(profile_values(scenario.reference, end)[0][0])
+    run = without_slew_limit(planned)
+    rest = None if run.program.angle is not None else 0.0
+    steady = _steady(run, rest, values, torque)
     if steady is None:
-        if wanted is None:
+        if torque is None:
             line = f"no equilibrium found for the command {values['command']:g}"
             raise ScenarioError(f"{scenario.name}: {line}; give --at a time")
-        line = f"no equilibrium at {wanted:.4g} N m, the last value of the reference"
-        open_way = 1.0 if (wanted > 0.0) != scenario.device.supply.is_vacuum else -1.0
-        full = dict.fromkeys(("command", *opening_names(values)), open_way)
-        most = _steady(run, held, {**values, **full}, None)
+        line = f"no equilibrium at {torque:.4g} N m, the last value of the reference"
+        full = 1.0 if (torque > 0.0) != scenario.device.supply.is_vacuum else -1.0
+        fully_open = values | dict.fromkeys(("command", *opening_names(values)), full)
+        most = _steady(run, rest, fully_open, None)
         if most is not None:
-            at = run.plant, most["angle"], most["pressure_1"], most["pressure_2"]
-            torque = run.program.actuator.torque(*at)
-            line += f": with the valve fully open the actuator comes to {torque:.4g} N m"
-        other = " or hold the ankle" if held is not None else ""
-        raise ScenarioError(f"{scenario.name}: {line}; set another reference{other}, or give --at a time")
-    way = _way(run, steady, scenario.run.duration)
-    if way:
+            most_torque = run.program.actuator.torque(run.plant, most["angle"], most["pressure_1"], most["pressure_2"])
+            line += f": with the valve fully open the actuator comes to {most_torque:.4g} N m"
+        remedy = " or hold the ankle" if rest is not None else ""
+        raise ScenarioError(f"{scenario.name}: {line}; set another reference{remedy}, or give --at a time")
+    direction = _direction(run, steady, scenario.run.duration)
+    if direction:
         raise ScenarioError(
             f"{scenario.name}: no equilibrium: at {np.degrees(values['angle']):.4g} deg the torque accelerates the "
             f"vane; give --at a time, or another reference torque"
@@ -150,33 +149,35 @@ def equilibrium(scenario: Scenario) -> Point:
     steady |= {name: 0.0 for name in ("command", *opening_names(steady)) if abs(steady[name]) < STEADY}
     # What the valve takes from its command at once was no unknown.
     at_rest = numbers(valve_at(run, functions_in(run), steady).state)
-    return Point(None, steady | dict(zip(valve_states(run.program), at_rest, strict=True)), way)
+    return Point(None, steady | dict(zip(valve_states(run.program), at_rest, strict=True)), direction)
 
 
-def _steady(run: Run, held: float | None, values: Mapping[str, float], wanted: float | None) -> dict[str, float] | None:
+def _steady(
+    run: Run, direction: float | None, values: Mapping[str, float], torque: float | None
+) -> dict[str, float] | None:
     """Return a steady state with a torque [N m], or with the present command; None if none is found."""
     # Where the search begins: at the end of the run, then about the pressures that have the torque.
     starts = [dict(values)]
-    lowest, torque = run.plant.atmospheric_pressure, wanted or 0.0
-    surplus = abs(torque) / run.plant.torque_constant
+    lowest, target = run.plant.atmospheric_pressure, torque or 0.0
+    surplus = abs(target) / run.plant.torque_constant
     for size in _FIRST_COMMANDS:
-        command = values["command"] if wanted is None else size if torque >= 0.0 else -size
+        command = values["command"] if torque is None else size if target >= 0.0 else -size
         pressures = [1.001 * lowest + (surplus if is_fed else 0.0) for is_fed in (command > 0.0, command < 0.0)]
-        fed = {"pressure_1": pressures[0], "pressure_2": pressures[1], "command": command}
-        starts.append({**values, **fed, **dict.fromkeys(opening_names(values), command)})
-    plant = plant_of(run, held, values)
-    # The unknowns are all states, and the command where a torque is wanted.
-    names = [*plant.at(values).rates, *([] if wanted is None else ["command"])]
+        start = {"pressure_1": pressures[0], "pressure_2": pressures[1], "command": command}
+        starts.append({**values, **start, **dict.fromkeys(opening_names(values), command)})
+    plant = plant_of(run, direction, values)
+    # The unknowns are all states, and the command if a torque is given.
+    names = [*plant.at(values).rates, *([] if torque is None else ["command"])]
 
     def imbalance(values: Mapping[str, float]) -> Floats:
         """Time derivatives divided by the size of their states [1/s], and the torque error [N m]."""
-        found = plant.at(values)
+        state = plant.at(values)
         # So that pascals and openings count alike.
-        rates = [rate / size_of(name) for name, rate in found.rates.items()]
-        return np.array([*rates, *([] if wanted is None else [found.outputs["torque"] - wanted])])
+        rates = [rate / size_of(name) for name, rate in state.rates.items()]
+        return np.array([*rates, *([] if torque is None else [state.outputs["torque"] - torque])])
 
-    reached = (_newton(imbalance, names, start) for start in starts)
-    return next((steady for steady in reached if steady is not None), None)
+    roots = (_newton(imbalance, names, start) for start in starts)
+    return next((root for root in roots if root is not None), None)
 
 
 def opening_names(values: Mapping[str, float]) -> list[str]:
@@ -192,7 +193,7 @@ def _newton(
     values = dict(start)
     residual = function(values)
 
-    def along(name: str) -> Floats:
+    def slopes_of(name: str) -> Floats:
         """Slopes of the function with respect to a value (rows,)."""
         side, size = side_of(name, values, None), size_of(name)
         return one_sided_slopes(lambda value: function({**values, name: value}), values[name], side, size)[0]
@@ -201,7 +202,7 @@ def _newton(
         largest = float(np.max(np.abs(residual)))
         if largest < STEADY:
             return values if abs(values["command"]) <= 1.0 + STEADY else None
-        slopes = np.array([along(name) for name in names]).T
+        slopes = np.array([slopes_of(name) for name in names]).T
         if not (np.isfinite(largest) and np.isfinite(slopes).all()):
             return None
         # Least squares instead of a solver that refuses: in a dead band the slopes are singular.

@@ -39,31 +39,31 @@ def sides_of(run: Run, point: Point, joint: JointNames) -> dict[str, str]:
     """Return in words the side of each limit at the operating point, by component; ``joint`` names the joint."""
     at, plant = point.values, run.plant
     openings = valve_at(run, functions_in(run), at).openings
-    room, first, second = plant.atmospheric_pressure, at["pressure_1"], at["pressure_2"]
+    atmosphere, pressure_1, pressure_2 = plant.atmospheric_pressure, at["pressure_1"], at["pressure_2"]
     paths = {
-        "source to chamber 1": (at["supply_pressure"], first, openings.source_1),
-        "chamber 1 to atmosphere": (first, room, openings.vent_1),
-        "source to chamber 2": (at["dorsiflexion_pressure"], second, openings.source_2),
-        "chamber 2 to atmosphere": (second, room, openings.vent_2),
+        "source to chamber 1": (at["supply_pressure"], pressure_1, openings.source_1),
+        "chamber 1 to atmosphere": (pressure_1, atmosphere, openings.vent_1),
+        "source to chamber 2": (at["dorsiflexion_pressure"], pressure_2, openings.source_2),
+        "chamber 2 to atmosphere": (pressure_2, atmosphere, openings.vent_2),
     }
-    said = {name: _regime(plant.valve_curve, *values) for name, values in paths.items()}
-    said["leak over the vane"] = _regime(plant.leak_curve, first, second, 1.0)
+    regimes = {name: _regime(plant.valve_curve, *values) for name, values in paths.items()}
+    regimes["leak over the vane"] = _regime(plant.leak_curve, pressure_1, pressure_2, 1.0)
     motion = {
         None: "prescribed",
         0.0: "at rest",
         1.0: f"slides in {joint.positive}",
         -1.0: f"slides in {joint.negative}",
     }
-    vane = motion[point.way]
-    if point.way == 0.0:
+    vane = motion[point.direction]
+    if point.direction == 0.0:
         is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max
         vane = "against a stop" if is_at_stop else "sticks: friction holds it"
     valve = "closed"
     if any(openings):
         chamber = 1 if openings.source_1 > 0.0 else 2
-        is_vacuum = min(at["supply_pressure"], at["dorsiflexion_pressure"]) < room
+        is_vacuum = min(at["supply_pressure"], at["dorsiflexion_pressure"]) < atmosphere
         valve = f"{'evacuates' if is_vacuum else 'feeds'} chamber {chamber}, open by {max(openings):.4g}"
-    return {"valve": valve, joint.name: vane, **said}
+    return {"valve": valve, joint.name: vane, **regimes}
 
 
 def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: float) -> str:
@@ -108,27 +108,27 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
 
 def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     """Return the linear model at an operating point, with one-sided slopes on the sides given by ``side_of``."""
-    values, plant = dict(point.values), plant_of(run, point.way, point.values, point.time or 0.0)
+    values, plant = dict(point.values), plant_of(run, point.direction, point.values, point.time or 0.0)
     here = plant.at(values)
     slopes = {name: _both_slopes(plant, values, name) for name in (*here.rates, *plant.inputs)}
     # What the valve takes from its command at once is no state: nothing but the output that shows it asks for it.
     rows, idle = [*(f"rate of {state}" for state in here.rates), *here.outputs], []
     for name in (name for name in here.rates if name.startswith(VALVE)):
-        others = [row != name for row in rows]
-        if not any(np.any(side[others]) for side in slopes[name][:2]):
+        other_rows = [row != name for row in rows]
+        if not any(np.any(side[other_rows]) for side in slopes[name][:2]):
             idle.append(name)
     states, outputs = ([name for name in names if name not in idle] for names in (here.rates, here.outputs))
     columns = [*states, *plant.inputs]
     is_row = [name not in idle for name in (*here.rates, *here.outputs)]
-    taken, beyond, errors = (np.array([slopes[name][part] for name in columns]).T[is_row] for part in (0, 1, 2))
+    near, far, errors = (np.array([slopes[name][index] for name in columns]).T[is_row] for index in (0, 1, 2))
     count = len(states)
-    a, b, c, d = taken[:count, :count], taken[:count, count:], taken[count:, :count], taken[count:, count:]
+    a, b, c, d = near[:count, :count], near[:count, count:], near[count:, :count], near[count:, count:]
     sides = sides_of(run, point, scenario.device.joint)
     if not np.any(b[:, 0]) and not np.any(d[:, 0]):
         sides["valve"] += f"; {DEAF}"
     sizes = np.array([size_of(name) for name in columns])
-    largest = np.max(np.maximum(np.abs(taken), np.abs(beyond)) * sizes, axis=1, keepdims=True)
-    is_kink = np.any(np.abs(taken - beyond) * sizes > ON_THE_EDGE * largest + 10.0 * errors * sizes, axis=0)
+    largest = np.max(np.maximum(np.abs(near), np.abs(far)) * sizes, axis=1, keepdims=True)
+    is_kink = np.any(np.abs(near - far) * sizes > ON_THE_EDGE * largest + 10.0 * errors * sizes, axis=0)
     kinks = [name for name, differs in zip(columns, is_kink.tolist(), strict=True) if differs]
     return LinearModel(
         scenario=scenario,
@@ -142,7 +142,7 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
         d=d,
         rates=np.array([here.rates[name] for name in states]),
         sides=sides,
-        edges=tuple(SlopeKink(name, side_of(name, values, point.way) > 0.0) for name in kinks),
+        edges=tuple(SlopeKink(name, side_of(name, values, point.direction) > 0.0) for name in kinks),
         delays=OmittedDelays(run.command_delay, run.signal_delay, run.period),
     )
 
@@ -153,10 +153,11 @@ def _both_slopes(plant: LinearisedPlant, values: Mapping[str, float], name: str)
     The first are the slopes on the side of ``side_of``, the second on the other side, the third the error estimates.
     """
 
-    def moved(value: float) -> Floats:
-        found = plant.at({**values, name: value})
-        return np.array([*found.rates.values(), *found.outputs.values()])
+    def rates_and_outputs(value: float) -> Floats:
+        state = plant.at({**values, name: value})
+        return np.array([*state.rates.values(), *state.outputs.values()])
 
-    side, size = side_of(name, values, plant.way), size_of(name)
-    (taken, error), (beyond, other) = (one_sided_slopes(moved, values[name], way, size) for way in (side, -side))
-    return taken, beyond, error + other
+    side, size = side_of(name, values, plant.direction), size_of(name)
+    slopes, error = one_sided_slopes(rates_and_outputs, values[name], side, size)
+    slopes_beyond, error_beyond = one_sided_slopes(rates_and_outputs, values[name], -side, size)
+    return slopes, slopes_beyond, error + error_beyond

@@ -20,10 +20,10 @@ RESOLUTION = 1.0e-6
 _SMALLEST_TRAVEL = 1.0e-3
 _FIRST_ANGLE, _LAST_ANGLE, _SAME_ANGLE = 20.0, 130.0, 0.5
 """First and last angle of figure 7, and the tolerance for the same angle [deg]."""
-_CLEAR = 0.05
-_SAME = 0.01
-_NOTABLE_TIME = 2.0e-3
+_CLEAR, _SAME = 0.05, 0.01
 """Fractions of the pressure range: smallest clear change, and tolerance for a level that is reached or kept."""
+_NOTABLE_TIME = 2.0e-3
+"""Shortest time [s] between a full chamber 1 and breakaway that is noted as a difference."""
 _SLOWED = 0.5
 """Ratio of a slow rate of fall to the steepest rates before and after, up to which the fall has slowed."""
 _LARGEST_RISE = 1.0 * PASCALS_PER_PSI
@@ -85,9 +85,9 @@ def step_observations(recording: Recording, levels: SupplyLevels, events: StepEv
     No statement holds if the vane does not move.
     """
     if events is None:
-        return [observation(identifier, False, "the vane does not move from rest to rest") for identifier in _SAID]
+        return [observation(identifier, False, "the vane does not move from rest to rest") for identifier in _TESTS]
     step = _Step(recording, levels, events)
-    return [observation(identifier, *judge(step)) for identifier, judge in _SAID.items()]
+    return [observation(identifier, *judge(step)) for identifier, judge in _TESTS.items()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +121,8 @@ class _Step:
 def _turns(step: _Step) -> tuple[bool, str]:
     start, end = (float(np.degrees(step.recording["angle"][index])) for index in (0, -1))
     holds = abs(start - _FIRST_ANGLE) < _SAME_ANGLE and abs(end - _LAST_ANGLE) < _SAME_ANGLE
-    taken = 1e3 * (step.events.stop_time - step.events.breakaway_time)
-    return holds, f"from {start:.1f} to {end:.1f} deg in {taken:.0f} ms"
+    duration = 1e3 * (step.events.stop_time - step.events.breakaway_time)
+    return holds, f"from {start:.1f} to {end:.1f} deg in {duration:.0f} ms"
 
 
 def _rises(step: _Step) -> tuple[bool, str, str]:
@@ -159,13 +159,16 @@ def _falls_in_motion(step: _Step) -> tuple[bool, str, str]:
     first, last = float(pressure[peak]), float(pressure[lowest])
     holds = first - last > _CLEAR * step.levels.range
     evidence = f"from {step.gauge(first)} psig down to {step.gauge(last)} psig at {step.milliseconds(lowest)}"
-    late, again = first - float(pressure[step.events.breakaway]), float(pressure[step.events.stop]) - last
+    rise_after_breakaway = first - float(pressure[step.events.breakaway])
+    rise_before_stop = float(pressure[step.events.stop]) - last
     differences = []
-    if late >= _SAME * step.levels.range:
+    if rise_after_breakaway >= _SAME * step.levels.range:
         longer = 1e3 * (step.recording.time[peak] - step.events.breakaway_time)
-        differences.append(f"from breakaway it goes on rising for {longer:.0f} ms, by {late / PASCALS_PER_PSI:.1f} psi")
-    if again >= _SAME * step.levels.range:
-        differences.append(f"it rises again by {again / PASCALS_PER_PSI:.1f} psi before the stop")
+        differences.append(
+            f"from breakaway it goes on rising for {longer:.0f} ms, by {rise_after_breakaway / PASCALS_PER_PSI:.1f} psi"
+        )
+    if rise_before_stop >= _SAME * step.levels.range:
+        differences.append(f"it rises again by {rise_before_stop / PASCALS_PER_PSI:.1f} psi before the stop")
     return holds, evidence, ", and ".join(differences)
 
 
@@ -199,9 +202,11 @@ def _slows(step: _Step) -> tuple[bool, str, str]:
     holds = rate[slowest] <= _SLOWED * min(before, after) and rise <= _LARGEST_RISE
     first, least, last = (value / (1e3 * PASCALS_PER_PSI) for value in (before, rate[slowest], after))
     slowed = f"rises by {-least:.2f} psi/ms" if least < 0.0 else f"falls by {least:.2f} psi/ms"
-    said = (f"falls by {first:.2f} psi/ms at first", f"{slowed} at {step.milliseconds(slowest)}")
     difference = f"it does more than slow: it rises by {rise / PASCALS_PER_PSI:.1f} psi"
-    evidence = f"{', '.join(said)}, falls by up to {last:.1f} psi/ms later"
+    evidence = (
+        f"falls by {first:.2f} psi/ms at first, {slowed} at {step.milliseconds(slowest)}, falls by up to "
+        f"{last:.1f} psi/ms later"
+    )
     return bool(holds), evidence, difference if rise >= _SAME * step.levels.range else ""
 
 
@@ -211,13 +216,15 @@ def _to_atmosphere(step: _Step) -> tuple[bool, str]:
 
 
 def _builds_up(step: _Step) -> tuple[bool, str]:
-    first, last = (float(step.recording["pressure_1"][at] - step.recording["pressure_2"][at]) for at in (0, -1))
+    first, last = (
+        float(step.recording["pressure_1"][index] - step.recording["pressure_2"][index]) for index in (0, -1)
+    )
     # From full pressure one way to full pressure the other way: the range twice.
     holds = abs(last - first - 2.0 * step.levels.range) < 2.0 * _SAME * step.levels.range
     return holds, f"from {first / PASCALS_PER_PSI:.1f} to {last / PASCALS_PER_PSI:.1f} psi"
 
 
-_SAID: dict[str, Callable[[_Step], tuple[bool, str] | tuple[bool, str, str]]] = {
+_TESTS: dict[str, Callable[[_Step], tuple[bool, str] | tuple[bool, str, str]]] = {
     "vane_turns_through_its_range": _turns,
     "pressure_1_rises_until_breakaway": _rises,
     "pressure_1_falls_in_motion": _falls_in_motion,

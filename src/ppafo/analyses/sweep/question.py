@@ -99,7 +99,7 @@ def sweep_into_folder(
     if metric is None:
         raise StudyError(f"statistic '{statistic}': needs a metric, for example --metric rms_error")
     from ppafo.analyses.sweep.statistic import estimate
-    from ppafo.storage.result_folder import check_owned_folder, marked_folder
+    from ppafo.storage.owned_folder import check_owned_folder, marked_folder
 
     chosen = study_of(study, overrides)
     folder = Path(out or Path("out") / f"{chosen.name}-{metric}")

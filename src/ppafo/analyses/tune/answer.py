@@ -14,7 +14,6 @@ from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, GainResult, Sear
 from ppafo.metrics.metric import controlled_in
 from ppafo.metrics.tracking import ONE_INSTANT
 from ppafo.model.controlled import CONTROLLED, TORQUE
-from ppafo.parameters.overrides import over
 from ppafo.report.display_units import metric_words
 from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import TIME, Kind, of_metric
@@ -22,7 +21,7 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLACK, BLUE, COLOURS, GREY, VERMILION
 from ppafo.simulation.tracking.pair_step import coarse_pair
-from ppafo.studies.distributions import fraction_text
+from ppafo.studies.intervals import fraction_text
 from ppafo.units import percentage, without_exponent
 from ppafo.units.shown import in_units, quantity_of_unit
 from ppafo.wording import count_of
@@ -44,19 +43,19 @@ def task_panels(before: GainResult, after: GainResult) -> list[Panel]:
     controlled = controlled_in(recording) or CONTROLLED[TORQUE]
     words, unit = controlled.words, controlled.level.unit
     level = Kind(words[:1].upper() + words[1:], unit, quantity_of_unit(unit))
-    followed = _courses(controlled.channel, before, after)
+    followed = _traces(controlled.channel, before, after)
     if controlled.reference in recording:
         dashed = {"linestyle": "--", "linewidth": 1.2}
         reference = recording[controlled.reference]
         followed.append(Mark("line", recording.time, reference, label="reference", colour=BLACK, style=dashed))
     return [
         Panel(TIME, level, followed, legend="above"),
-        Panel(TIME, _COMMAND, _courses("command", before, after), legend=""),
-        Panel(TIME, _GAS, _courses("supplied_mass", before, after), legend=""),
+        Panel(TIME, _COMMAND, _traces("command", before, after), legend=""),
+        Panel(TIME, _GAS, _traces("supplied_mass", before, after), legend=""),
     ]
 
 
-def _courses(channel: str, before: GainResult, after: GainResult) -> list[Mark]:
+def _traces(channel: str, before: GainResult, after: GainResult) -> list[Mark]:
     """Return the marks of a channel over time, before and after."""
     style = {"linewidth": 1.3, "drawstyle": "steps-post" if channel == "command" else "default"}
     marks = []
@@ -91,15 +90,15 @@ def search_panels(
         for start in starts
         for row, gain in enumerate(searched)
     ]
-    first = [float(np.clip(gain.fraction(gain.before), -_BEYOND, 1.0 + _BEYOND)) for gain in searched]
-    found = [gain.fraction(after.gains[gain.path]) for gain in searched]
+    previous = [float(np.clip(gain.fraction(gain.before), -_BEYOND, 1.0 + _BEYOND)) for gain in searched]
+    tuned = [gain.fraction(after.gains[gain.path]) for gain in searched]
     dots: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 7}
     ticks: dict[str, Any] = {"linestyle": "", "marker": "|", "markersize": 11}
     marks = (
         *(Mark("line", [0.0, 1.0], [row, row], colour=GREY, style={"linewidth": 1.0}) for row in rows),
         Mark("line", ends, np.tile(rows, len(starts)), colour=GREY, style=ticks),
-        Mark("line", first, rows, label="before", colour=VERMILION, style={**dots, "marker": "s"}),
-        Mark("line", found, rows, label="after", colour=BLUE, style=dots),
+        Mark("line", previous, rows, label="before", colour=VERMILION, style={**dots, "marker": "s"}),
+        Mark("line", tuned, rows, label="after", colour=BLUE, style=dots),
     )
 
     def name_gains(axes: "Axes") -> None:
@@ -118,42 +117,11 @@ _DIFFERENT = 0.1
 _SEARCH_CAPTION = "Above: the best objective so far in each start. Below: where the gains lie between their bounds."
 
 
-@in_units(lambda problem, *_: problem.scenario.device.shown)
-def finding_of(
-    problem: Problem,
-    scales: dict[str, float],
-    before: GainResult,
-    after: GainResult,
-    starts: list[SearchStart],
-    runs: int,
-) -> Finding[Tuned]:
-    """Return the result of a tuning as a finding.
-
-    It has passed if the gains satisfy all constraints, also over fresh draws. ``scales`` are the scales of the goals
-    [SI], ``starts`` are sorted with the best first, ``runs`` is the number of all simulated runs.
-    """
-    scenario, spread = problem.scenario, problem.spread
-    bounds = {gain.path: gain.bound_reached(after.gains[gain.path]) for gain in problem.searched}
-    reached = {path: bound for path, bound in bounds.items() if bound is not None}
-    tuned = Tuned(
-        tuning=problem.name,
-        scenario=scenario.name,
-        verdict=verdict(problem, before, after),
-        is_feasible=after.is_feasible,
-        overrides=list(over(problem.overrides, problem.lines(after.gains), valve=scenario.device.valve_name)),
-        bounds_reached=reached,
-        scales=scales,
-        goals=list(problem.goals),
-        constraints=list(problem.constraints),
-        robust=None if spread is None else {"study": spread.study or None, "measure": spread.measure},
-        effort=problem.effort.model_dump(),
-        before=before,
-        after=after,
-        starts=starts,
-        runs=runs,
-        remarks=_remarks(problem, after, starts, runs, reached),
-        problem=problem,
-    )
+@in_units(lambda tuned: tuned.problem.scenario.device.shown)
+def finding_of(tuned: Tuned) -> Finding[Tuned]:
+    """Return the result of a tuning as a finding; it has passed if the gains satisfy all constraints."""
+    problem, before, after = tuned.problem, tuned.before, tuned.after
+    scenario, reached = problem.scenario, tuned.bounds_reached
     rows = []
     for gain in problem.searched:
         numbers = (gain.before, after.gains[gain.path], gain.minimum, gain.maximum)
@@ -186,7 +154,7 @@ def finding_of(
             Section(
                 "The search",
                 remarks=tuned.remarks,
-                panels=partial(search_panels, problem, before, after, starts),
+                panels=partial(search_panels, problem, before, after, tuned.starts),
                 name="search",
                 caption=_SEARCH_CAPTION,
                 size=(5.4, max(2.2, 0.9 + 0.3 * len(problem.searched))),
@@ -283,45 +251,45 @@ def _metric_columns(problem: Problem, before: GainResult, after: GainResult) -> 
     ]
 
 
-def _remarks(
+def remarks_of(
     problem: Problem, after: GainResult, starts: Sequence[SearchStart], runs: int, reached: Mapping[str, str]
 ) -> list[str]:
     """Return remarks on the course of the search and on open points."""
     settled = sum(start.is_settled for start in starts)
-    said = [
+    remarks = [
         f"{count_of(len(starts), 'start')}, {sum(start.candidates for start in starts):,} "
         f"candidates, {runs:,} runs; {settled} of {len(starts)} converged before the maximum number of "
         "generations"
     ]
     if coarse := coarse_pair(problem.scenario):
-        said.append(coarse)
+        remarks.append(coarse)
     for path, bound in reached.items():
-        said.append(
+        remarks.append(
             f"{path} ended at its {bound}: a better value may lie beyond; widen the bounds if the device allows it"
         )
-    apart = agreement(starts)
-    if apart > _DIFFERENT:
-        said.append(
-            f"starts whose objectives agree within 1 % differ by up to {100.0 * apart:.0f} % of the range between "
+    difference = agreement(starts)
+    if difference > _DIFFERENT:
+        remarks.append(
+            f"starts whose objectives agree within 1 % differ by up to {100.0 * difference:.0f} % of the range between "
             "the bounds: the objective does not determine the gains uniquely"
         )
     spread = problem.spread
     if spread is not None:
         drawn = f"study '{spread.study}'" if spread.study else "the sensor noise"
-        said.append(
+        remarks.append(
             f"every candidate ran over the same {spread.draws} draws of {drawn}; 'fresh' is over {FRESH_DRAWS:,} "
             "draws that the search did not use"
         )
     fractions = ", ".join(f"{name} {fraction_text(fraction)}" for name, fraction in after.share_of_noise.items())
     if fractions:
-        said.append(f"fraction of the variance over the fresh draws that is due to sensor noise: {fractions}")
+        remarks.append(f"fraction of the variance over the fresh draws that is due to sensor noise: {fractions}")
     broken = [
         f"{constraint.metric} {constraint.words}, it is {_number(constraint.metric, after.judged[constraint.metric])}"
         for constraint in problem.constraints
         if after.fresh and not constraint.is_kept(after.judged[constraint.metric])
     ]
     printed = after.fresh or after.values
-    said += [
+    remarks += [
         f"the loop oscillates on the hold, and {name} is one instant of that: what counts is "
         f"{_number(name, judged)}, {metric_words(ONE_INSTANT[name][0])}"
         for name, judged in after.judged.items()
@@ -329,7 +297,7 @@ def _remarks(
     ]
     if after.fresh and after.fresh_share_without_value:
         broken.append(f"{percentage(after.fresh_share_without_value, 2)} of the runs fail, oscillate or lack a metric")
-    return [*said, *(f"violated on fresh draws: {text}" for text in broken)]
+    return [*remarks, *(f"violated on fresh draws: {text}" for text in broken)]
 
 
 def _number(name: str, value: float | None) -> str:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -223,11 +223,19 @@ class Problem:
         """Return name, scenario and searched parameters."""
         return f"Tuning '{self.name}' of '{self.scenario.name}': {', '.join(gain.path for gain in self.searched)}"
 
+    def with_seed(self, seed: int) -> "Problem":
+        """Return the problem with another random seed of the search."""
+        effort, spread = self.effort.model_copy(update={"seed": seed}), self.spread
+        # Noise alone follows the seed of the search; draws of a study keep the seed of the study.
+        if spread is not None and not spread.study:
+            spread = replace(spread, seed=seed)
+        return replace(self, effort=effort, spread=spread)
+
     @property
     def metrics(self) -> tuple[str, ...]:
         """Metrics of the goals and constraints, without duplicates."""
-        wanted = [*(goal.metric for goal in self.goals), *(goal.metric for goal in self.constraints)]
-        return tuple(dict.fromkeys(wanted))
+        names = [*(goal.metric for goal in self.goals), *(constraint.metric for constraint in self.constraints)]
+        return tuple(dict.fromkeys(names))
 
     @property
     def before(self) -> Gains:

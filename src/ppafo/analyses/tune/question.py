@@ -1,4 +1,4 @@
-"""The question which gains are best: its arguments."""
+"""Command and function ``tune``: arguments of a tuning."""
 
 from __future__ import annotations
 
@@ -52,45 +52,16 @@ def tune(
     pid-gains: objective 1 before, 0.008313 after (-99.2 %)
     """
     name_plugins(plugins)
-    from dataclasses import replace
-
     from ppafo.analyses.tune.answer import finding_of
     from ppafo.analyses.tune.problem import Problem, load_tuning
-    from ppafo.analyses.tune.result import FRESH_DRAWS
-    from ppafo.analyses.tune.solve import REFINEMENTS, crossed, judge, rows_of_gains, scales_of, search, setting_of
+    from ppafo.analyses.tune.solve import solve_tuning
     from ppafo.errors import StudyError
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
-    from ppafo.studies.distributions import Floats
-    from ppafo.studies.sampling import NOISE_DRAWS
-    from ppafo.study.runs import RunCounter, Runs, with_companions
 
     if isinstance(tuning, Problem) and overrides:
         raise StudyError("a loaded Problem takes no overrides; give them to load_tuning")
     problem = tuning if isinstance(tuning, Problem) else load_tuning(tuning, overrides)
     if seed is not None:
-        problem = replace(problem, effort=problem.effort.model_copy(update={"seed": seed}))
-        # Noise alone follows the seed of the search; draws of a study keep the seed of the study.
-        if problem.spread is not None and not problem.spread.study:
-            problem = replace(problem, spread=replace(problem.spread, seed=seed))
+        problem = problem.with_seed(seed)
     warn_of_coarse_pairs([problem.scenario])
-    effort, spread = problem.effort, problem.spread
-    candidates = effort.candidates_per_gain * len(problem.searched) * (effort.generations + 1) * effort.starts
-    expected = candidates + REFINEMENTS * len(problem.searched) * effort.starts + 3
-    if spread is not None:
-        expected = spread.draws * expected + 2 * (FRESH_DRAWS + NOISE_DRAWS * spread.uncertainty.has_noise)
-    metrics = with_companions(problem.metrics, problem.scenario)
-    runs = Runs(problem.scenario, metrics, RunCounter(expected, progress), problem.gauge, threads)
-    draws = {} if spread is None else spread.uncertainty.random_columns(0, spread.draws, spread.seed)
-    scales = scales_of(problem, rows_of_gains(runs, problem, problem.before, draws))
-
-    def costs(fractions: Floats) -> Floats:
-        values = {gain.path: gain.value(fractions[:, column]) for column, gain in enumerate(problem.searched)}
-        return judge(crossed(runs, problem, values, draws), problem, scales).cost
-
-    before = [gain.fraction(gain.before) for gain in problem.searched]
-    starts = search(costs, before, effort)
-    first, last = (
-        setting_of(runs, problem, scales, gains, draws)
-        for gains in (problem.before, problem.gains(starts[0].fractions))
-    )
-    return finding_of(problem, scales, first, last, starts, runs.count)
+    return finding_of(solve_tuning(problem, threads, progress))

@@ -6,16 +6,18 @@ violation is better; a candidate with a failed run is worse than all others (Deb
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.analyses.tune.answer import remarks_of, verdict
 from ppafo.analyses.tune.problem import Gains, Problem, SearchEffort, Spread
-from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, GainResult, SearchStart, UnreachableDraws
+from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, GainResult, SearchStart, Tuned, UnreachableDraws
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.metrics import METRICS
+from ppafo.parameters.overrides import over
+from ppafo.progress import Report
 from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import absolute
@@ -23,13 +25,91 @@ from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
 from ppafo.simulation.tracking.metered import shortfall
-from ppafo.studies.distributions import Floats, noise_interval
-from ppafo.studies.sampling import with_new_noise
+from ppafo.studies.distributions import Floats
+from ppafo.studies.intervals import noise_interval
+from ppafo.studies.sampling import NOISE_DRAWS, with_new_noise
 from ppafo.studies.study import with_overrides
-from ppafo.study.runs import FAILED, Runs, oscillating, settled, tracking_violation
+from ppafo.study.runs import (
+    FAILED,
+    RunCounter,
+    Runs,
+    oscillating,
+    scenario_runs,
+    settled,
+    tracking_violation,
+    with_companions,
+)
 
 UNUSABLE = 1.0e12
 """Lowest cost of a candidate with a failed run; the fraction of failed runs is added."""
+_TOLERANCE = 1.0e-3
+"""Relative spread of the candidates' costs below which a start has converged."""
+_REFINEMENTS = 60
+"""Largest number of candidates of the simplex for each gain."""
+_SIMPLEX_SIZES = (0.01, 0.1)
+"""Smallest and largest initial size of the simplex, as a fraction of the range."""
+MINIMUM_ERRORS = ("peak_error", "rms_error_hold")
+"""Error metrics that cannot be smaller than the torque shortfall of the supply at the largest reference."""
+_NOISE_CONFIDENCE = 0.95
+"""Confidence level of the interval of the noise share."""
+Costs = Callable[[Floats], Floats]
+"""Function from fractions of the ranges (candidates, gains) to costs (candidates,)."""
+
+
+def solve_tuning(problem: Problem, threads: int | None, progress: Report | None) -> Tuned:
+    """Return the result of a tuning: search, and evaluation of the gains before and after."""
+    spread = problem.spread
+    metrics = with_companions(problem.metrics, problem.scenario)
+    runs = scenario_runs(
+        problem.scenario, metrics, RunCounter(_largest_runs(problem), progress), problem.gauge, threads
+    )
+    draws = {} if spread is None else spread.uncertainty.random_columns(0, spread.draws, spread.seed)
+    scales = _scales(problem, _metrics_of_gains(runs, problem, problem.before, draws))
+
+    def costs(fractions: Floats) -> Floats:
+        values = {gain.path: gain.value(fractions[:, column]) for column, gain in enumerate(problem.searched)}
+        return judge(_metrics_of_candidates(runs, problem, values, draws), problem, scales).cost
+
+    starts = search(costs, [gain.fraction(gain.before) for gain in problem.searched], problem.effort)
+    before, after = (
+        _evaluate(runs, problem, scales, gains, draws) for gains in (problem.before, problem.gains(starts[0].fractions))
+    )
+    bounds = {gain.path: gain.bound_reached(after.gains[gain.path]) for gain in problem.searched}
+    reached = {path: bound for path, bound in bounds.items() if bound is not None}
+    valve = problem.scenario.device.valve_name
+    return Tuned(
+        tuning=problem.name,
+        scenario=problem.scenario.name,
+        verdict=verdict(problem, before, after),
+        is_feasible=after.is_feasible,
+        overrides=list(over(problem.overrides, problem.lines(after.gains), valve=valve)),
+        bounds_reached=reached,
+        scales=scales,
+        goals=list(problem.goals),
+        constraints=list(problem.constraints),
+        robust=None if spread is None else {"study": spread.study or None, "measure": spread.measure},
+        effort=problem.effort.model_dump(),
+        before=before,
+        after=after,
+        starts=starts,
+        runs=runs.count,
+        remarks=remarks_of(problem, after, starts, runs.count, reached),
+        problem=problem,
+    )
+
+
+def _largest_runs(problem: Problem) -> int:
+    """Return the number of runs of a tuning in which no start converges early."""
+    effort, gains, spread = problem.effort, len(problem.searched), problem.spread
+    # The first candidates are a generation of their own.
+    runs_of_start = gains * (effort.candidates_per_gain * (effort.generations + 1) + _REFINEMENTS)
+    # Beside the candidates, the gains before run for the scales and for their result, and the gains found once.
+    in_search = effort.starts * runs_of_start + 3
+    if spread is None:
+        return in_search
+    # Both results run over fresh draws too, and the first of these again with other noise.
+    fresh = FRESH_DRAWS + NOISE_DRAWS * spread.uncertainty.has_noise
+    return spread.draws * in_search + 2 * fresh
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,22 +173,12 @@ def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float])
         objective += goal.weight * bad_ends(known[goal.metric], spread, goal.weight > 0.0) / scales[goal.metric]
     for constraint in problem.constraints:
         reached = bad_ends(known[constraint.metric], spread, constraint.is_most)
-        beyond = reached - constraint.limit if constraint.is_most else constraint.limit - reached
+        excess = reached - constraint.limit if constraint.is_most else constraint.limit - reached
         # As a fraction of the limit, so that constraints in different units add up; a limit of 0 has no fractions.
-        violation += np.maximum(0.0, beyond) / (abs(constraint.limit) or 1.0)
+        violation += np.maximum(0.0, excess) / (abs(constraint.limit) or 1.0)
     # A loop that does not follow its reference violates a constraint that holds in every tuning.
     off = np.maximum(0.0, bad_ends(runs.off, spread, True))
     return _CandidateScores(objective=objective, violation=violation, off=off, without_value=failing)
-
-
-Costs = Callable[[Floats], Floats]
-"""Function from fractions of the ranges (candidates, gains) to costs (candidates,)."""
-_TOLERANCE = 1.0e-3
-"""Relative spread of the candidates' costs below which a start has converged."""
-REFINEMENTS = 60
-"""Largest number of candidates of the simplex for each gain."""
-_REACH = (0.01, 0.1)
-"""Smallest and largest initial size of the simplex, as a fraction of the range."""
 
 
 @on_one_thread
@@ -120,50 +190,34 @@ def search(costs: Costs, before: Sequence[float], effort: SearchEffort) -> list[
     method of Nelder and Mead (1965). Both use only comparisons of costs.
     """
     seeds = np.random.SeedSequence(effort.seed).spawn(effort.starts)
-    finished = [_start(costs, before, effort, np.random.default_rng(seed)) for seed in seeds]
+    finished = [_search_from_start(costs, before, effort, np.random.default_rng(seed)) for seed in seeds]
     return sorted(finished, key=lambda start: start.cost)
 
 
-def _start(costs: Costs, before: Sequence[float], effort: SearchEffort, random: np.random.Generator) -> SearchStart:
+def _search_from_start(
+    costs: Costs, before: Sequence[float], effort: SearchEffort, random: np.random.Generator
+) -> SearchStart:
     from scipy.optimize import differential_evolution, minimize
 
-    course: list[float] = []
-    tried = 0
+    batches: list[Floats] = []
 
-    def generation(columns: Floats) -> Floats:
-        nonlocal tried
+    def batch_costs(columns: Floats) -> Floats:
         # SciPy has a candidate in each column, the costs one in each row.
-        fractions = np.clip(np.atleast_2d(columns.T), 0.0, 1.0)
-        outcomes = costs(fractions)
-        tried += len(fractions)
-        course.append(min([float(np.min(outcomes)), *course[-1:]]))
-        return outcomes
-
-    is_settled = False
-
-    def stop(intermediate_result: Any) -> bool:
-        nonlocal is_settled
-        energies = intermediate_result.population_energies
-        least, most = np.min(energies), np.max(energies)
-        if most >= UNUSABLE or least < INFEASIBLE <= most:
-            return False
-        # Where all break a constraint, what counts is by how much they break it.
-        beyond = energies - INFEASIBLE if least >= INFEASIBLE else energies
-        is_settled = float(np.std(beyond)) <= _TOLERANCE * abs(float(np.mean(beyond)))
-        return is_settled
+        batches.append(costs(np.clip(np.atleast_2d(columns.T), 0.0, 1.0)))
+        return batches[-1]
 
     # SciPy refuses a first candidate beyond the bounds.
     is_within = all(0.0 <= fraction <= 1.0 for fraction in before)
     result = differential_evolution(
-        generation,
+        batch_costs,
         [(0.0, 1.0)] * len(before),
         x0=np.asarray(before) if is_within else None,
         init="latinhypercube",
         popsize=effort.candidates_per_gain,
         maxiter=effort.generations,
-        # No test of SciPy's own: ``stop`` decides, which knows what a broken constraint adds to the costs.
+        # No test of SciPy's own: ``_is_settled`` decides, which knows what a broken constraint adds to the costs.
         tol=0.0,
-        callback=stop,
+        callback=lambda intermediate_result: _is_settled(intermediate_result.population_energies),
         # SciPy's polishing would take derivatives of a cost that jumps where a constraint breaks.
         polish=False,
         # A whole generation at a time, so that it is one ensemble.
@@ -171,39 +225,51 @@ def _start(costs: Costs, before: Sequence[float], effort: SearchEffort, random: 
         vectorized=True,
         rng=random,
     )
-    generations = len(course)
+    generations = len(batches)
     # In a flat valley generations come to within a hundredth of the best, and hardly nearer.
-    reach = np.clip(np.std(result.population, axis=0), *_REACH)
-    corners = [result.x, *(result.x + np.diag(np.where(result.x + reach > 1.0, -reach, reach)))]
+    size = np.clip(np.std(result.population, axis=0), *_SIMPLEX_SIZES)
+    corners = [result.x, *(result.x + np.diag(np.where(result.x + size > 1.0, -size, size)))]
     refined = minimize(
-        lambda fractions: float(generation(fractions[:, None])[0]),
+        lambda fractions: float(batch_costs(fractions[:, None])[0]),
         result.x,
         method="Nelder-Mead",
         bounds=[(0.0, 1.0)] * len(before),
         options={
             "initial_simplex": np.array(corners),
-            "maxfev": REFINEMENTS * len(before),
+            "maxfev": _REFINEMENTS * len(before),
             "xatol": _TOLERANCE,
             "fatol": _TOLERANCE * _TOLERANCE * abs(float(result.fun)),
         },
     )
-    # The course has the generations, and where the simplex ended.
-    course[generations:] = course[-1:]
-    return SearchStart(tuple(map(float, refined.x)), float(refined.fun), tried, tuple(course), is_settled)
+    best = np.minimum.accumulate([np.min(batch) for batch in batches]).tolist()
+    return SearchStart(
+        fractions=tuple(map(float, refined.x)),
+        cost=float(refined.fun),
+        candidates=sum(map(len, batches)),
+        # The simplex adds one cost, where it ended.
+        generations=(*best[:generations], best[-1]),
+        is_settled=_is_settled(result.population_energies),
+    )
 
 
-MINIMUM_ERRORS = ("peak_error", "rms_error_hold")
-"""Error metrics that cannot be smaller than the torque shortfall of the supply at the largest reference."""
-_NOISE_CONFIDENCE = 0.95
-"""Confidence level of the interval of the noise share."""
+def _is_settled(costs: Floats) -> bool:
+    """Return whether the costs of a generation have converged."""
+    least, most = np.min(costs), np.max(costs)
+    if most >= UNUSABLE or least < INFEASIBLE <= most:
+        return False
+    # Where all break a constraint, what counts is by how much they break it.
+    excess = costs - INFEASIBLE if least >= INFEASIBLE else costs
+    return float(np.std(excess)) <= _TOLERANCE * abs(float(np.mean(excess)))
 
 
-def rows_of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> CandidateMetrics:
+def _metrics_of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> CandidateMetrics:
     """Run one set of gains over the draws and return its metrics."""
-    return crossed(runs, problem, {gain.path: np.array([gains[gain.path]]) for gain in problem.searched}, draws)
+    return _metrics_of_candidates(
+        runs, problem, {gain.path: np.array([gains[gain.path]]) for gain in problem.searched}, draws
+    )
 
 
-def crossed(
+def _metrics_of_candidates(
     runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: Mapping[str, Floats]
 ) -> CandidateMetrics:
     """Run every candidate with every draw and return the metrics.
@@ -226,7 +292,7 @@ def crossed(
     )
 
 
-def scales_of(problem: Problem, before: CandidateMetrics) -> dict[str, float]:
+def _scales(problem: Problem, before: CandidateMetrics) -> dict[str, float]:
     """Return the scale of each goal: the given one, or the value of the metric before tuning."""
     # By default each goal is 1 before tuning: goals in different units then weigh as much as their weights say.
     scales = {}
@@ -243,43 +309,48 @@ def scales_of(problem: Problem, before: CandidateMetrics) -> dict[str, float]:
     return scales
 
 
-def setting_of(
+def _evaluate(
     runs: Runs, problem: Problem, scales: Mapping[str, float], gains: Gains, draws: Mapping[str, Floats]
 ) -> GainResult:
     """Return the result of a set of gains over the draws of the search, over fresh draws and on the nominal device."""
     spread = problem.spread
-    again = seen = rows_of_gains(runs, problem, gains, draws)
+    in_search = _metrics_of_gains(runs, problem, gains, draws)
+    over_fresh = in_search
     fresh: dict[str, Floats] = {}
     noise: dict[str, ConfidenceInterval] = {}
     if spread is not None:
         # Draws that follow those of the search: the gains were not chosen on them.
         fresh = spread.uncertainty.random_columns(spread.draws, FRESH_DRAWS, spread.seed)
-        again = rows_of_gains(runs, problem, gains, fresh)
+        over_fresh = _metrics_of_gains(runs, problem, gains, fresh)
         if spread.uncertainty.has_noise:
-            other = rows_of_gains(runs, problem, gains, with_new_noise(fresh)).metrics
-            shares = {name: noise_interval(again.metrics[name][0], other[name][0], _NOISE_CONFIDENCE) for name in other}
-            noise = {name: share for name, share in shares.items() if share is not None}
-    judged, rejudged = (judge(each, problem, scales) for each in (seen, again))
+            renoised = _metrics_of_gains(runs, problem, gains, with_new_noise(fresh)).metrics
+            for name, values in renoised.items():
+                share = noise_interval(over_fresh.metrics[name][0], values[0], _NOISE_CONFIDENCE)
+                if share is not None:
+                    noise[name] = share
+    scores, fresh_scores = (judge(metrics, problem, scales) for metrics in (in_search, over_fresh))
     result = simulate(scenario_with(problem, gains))
     return GainResult(
         gains=gains,
-        values=_values(seen.metrics, problem),
-        fresh={} if spread is None else _values(again.metrics, problem),
-        judged=_values(again.judged, problem),
-        objective=float(judged.objective[0]),
-        violation=float(judged.violation[0]),
-        off=float(max(judged.off[0], rejudged.off[0])),
-        share_without_value=float(judged.without_value[0]),
-        fresh_violation=float(rejudged.violation[0]),
-        fresh_share_without_value=float(rejudged.without_value[0]),
-        torque_ceiling=_ceiling(problem, gains, fresh, again),
+        values=_values(in_search.metrics, problem),
+        fresh={} if spread is None else _values(over_fresh.metrics, problem),
+        judged=_values(over_fresh.judged, problem),
+        objective=float(scores.objective[0]),
+        violation=float(scores.violation[0]),
+        off=float(max(scores.off[0], fresh_scores.off[0])),
+        share_without_value=float(scores.without_value[0]),
+        fresh_violation=float(fresh_scores.violation[0]),
+        fresh_share_without_value=float(fresh_scores.without_value[0]),
+        torque_ceiling=_unreachable_draws(problem, gains, fresh, over_fresh),
         share_of_noise=noise,
         metrics=result.metrics,
         result=result,
     )
 
 
-def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: CandidateMetrics) -> UnreachableDraws:
+def _unreachable_draws(
+    problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: CandidateMetrics
+) -> UnreachableDraws:
     """Return the draws in which the supply limits the torque, and the violated constraints that this explains."""
     base = scenario_with(problem, gains)
     columns = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
@@ -295,11 +366,17 @@ def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: 
             continue
         # An error is never below what the supply lacks: where that alone is too much, no gains can keep the limit.
         is_mean = spread is None or spread.fraction is None
-        least = np.mean(lacking, axis=1) if is_mean else bad_ends(lacking, spread, True)
-        is_out_of_reach = constraint.metric in MINIMUM_ERRORS and is_most and not constraint.is_kept(float(least[0]))
+        smallest_error = np.mean(lacking, axis=1) if is_mean else bad_ends(lacking, spread, True)
+        is_out_of_reach = (
+            constraint.metric in MINIMUM_ERRORS and is_most and not constraint.is_kept(float(smallest_error[0]))
+        )
         # Else the draws that lack nothing must keep it alone; a standard deviation needs two of them.
-        rest = values[:, lacking[0] == 0.0]
-        if is_out_of_reach or rest.shape[1] < 2 or constraint.is_kept(float(bad_ends(rest, spread, is_most)[0])):
+        within_reach = values[:, lacking[0] == 0.0]
+        if (
+            is_out_of_reach
+            or within_reach.shape[1] < 2
+            or constraint.is_kept(float(bad_ends(within_reach, spread, is_most)[0]))
+        ):
             explained.append(constraint.metric)
     return UnreachableDraws(float(np.mean(lacking > 0.0)), tuple(explained) if lacking.any() else ())
 

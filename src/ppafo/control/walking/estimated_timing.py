@@ -12,17 +12,16 @@ The learnt stride is a ring buffer: its first knot is the next one, its last kno
 
 from typing import Annotated, NamedTuple
 
-from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.control.walking.timing import (
+from ppafo.control.walking.fractional_timing import (
     CLOCK_START,
     AnchorWeight,
     Delays,
     GaitClock,
-    GaitTime,
-    TimingKind,
     next_clock,
-    place_in_stride,
+    phase_time,
 )
+from ppafo.control.walking.phases import PhaseRules, PhaseState
+from ppafo.control.walking.timing import GaitTime, TimingKind
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.sensors import GaitMeasurement
 
@@ -105,30 +104,30 @@ def misfit(stride: LearntStride, window: Window, rules: EstimatedRules, shift: i
     """Mean square misfit [-] between the window and the learnt stride shifted by ``shift`` knots."""
     total = 0.0
     for back in range(WINDOW):
-        place, knot = WINDOW - 1 - back, (KNOTS - 1 - back + shift) % KNOTS
-        angle = (window.angle[place] - stride.angle[knot]) / rules.angle_scale
-        heel = (window.heel_force[place] - stride.heel_force[knot]) / rules.force_scale
-        toe = (window.toe_force[place] - stride.toe_force[knot]) / rules.force_scale
+        index, knot = WINDOW - 1 - back, (KNOTS - 1 - back + shift) % KNOTS
+        angle = (window.angle[index] - stride.angle[knot]) / rules.angle_scale
+        heel = (window.heel_force[index] - stride.heel_force[knot]) / rules.force_scale
+        toe = (window.toe_force[index] - stride.toe_force[knot]) / rules.force_scale
         total += angle * angle + heel * heel + toe * toe
     return total / (3.0 * WINDOW)
 
 
 def finer_shift(stride: LearntStride, window: Window, rules: EstimatedRules, shift: int) -> float:
     """Fractional part of the shift [knots] in addition to ``shift``, by one Gauss-Newton step of at most one knot."""
-    # The cost of a shift is one more residual, and 1e-12 keeps a flat stride without trust from dividing by 0.
-    along, square = -rules.clock_trust * shift, 1.0e-12 + rules.clock_trust
+    # The cost of a shift is one more residual; 1e-12 avoids a division by 0 for a flat stride without trust.
+    gradient, curvature = -rules.clock_trust * shift, 1.0e-12 + rules.clock_trust
     for back in range(WINDOW):
-        place, knot = WINDOW - 1 - back, (KNOTS - 1 - back + shift) % KNOTS
+        index, knot = WINDOW - 1 - back, (KNOTS - 1 - back + shift) % KNOTS
         after, before = (knot + 1) % KNOTS, (knot + KNOTS - 1) % KNOTS
         angle_slope = 0.5 * (stride.angle[after] - stride.angle[before]) / rules.angle_scale
         heel_slope = 0.5 * (stride.heel_force[after] - stride.heel_force[before]) / rules.force_scale
         toe_slope = 0.5 * (stride.toe_force[after] - stride.toe_force[before]) / rules.force_scale
-        angle = (window.angle[place] - stride.angle[knot]) / rules.angle_scale
-        heel = (window.heel_force[place] - stride.heel_force[knot]) / rules.force_scale
-        toe = (window.toe_force[place] - stride.toe_force[knot]) / rules.force_scale
-        along += angle_slope * angle + heel_slope * heel + toe_slope * toe
-        square += angle_slope * angle_slope + heel_slope * heel_slope + toe_slope * toe_slope
-    return max(-1.0, min(1.0, along / square))
+        angle = (window.angle[index] - stride.angle[knot]) / rules.angle_scale
+        heel = (window.heel_force[index] - stride.heel_force[knot]) / rules.force_scale
+        toe = (window.toe_force[index] - stride.toe_force[knot]) / rules.force_scale
+        gradient += angle_slope * angle + heel_slope * heel + toe_slope * toe
+        curvature += angle_slope * angle_slope + heel_slope * heel_slope + toe_slope * toe_slope
+    return max(-1.0, min(1.0, gradient / curvature))
 
 
 def estimated_shift(stride: LearntStride, window: Window, rules: EstimatedRules) -> float:
@@ -139,9 +138,9 @@ def estimated_shift(stride: LearntStride, window: Window, rules: EstimatedRules)
         for side in range(2):
             shift = distance if side == 0 else -distance
             # The trust in the clock is a cost of shifts, so that a flat misfit moves nothing.
-            found = misfit(stride, window, rules, shift) + rules.clock_trust * shift * shift / (3.0 * WINDOW)
-            best = shift if found < least else best
-            least = min(found, least)
+            cost = misfit(stride, window, rules, shift) + rules.clock_trust * shift * shift / (3.0 * WINDOW)
+            best = shift if cost < least else best
+            least = min(cost, least)
     fits = least < rules.largest_misfit
     return (best + finer_shift(stride, window, rules, best)) / KNOTS if fits else 0.0
 
@@ -160,9 +159,8 @@ def next_stride(stride: LearntStride, measurement: GaitMeasurement, weight: floa
 
 def knots_passed(fraction: float, next_knot: float) -> float:
     """Distance in knots from the next knot to a fraction of the stride [turns], from minus to plus half a stride."""
-    within = fraction - 1.0 if fraction >= 1.0 else fraction
-    ahead = within * KNOTS - next_knot
-    # From minus to plus half a stride, across its end.
+    in_stride = fraction - 1.0 if fraction >= 1.0 else fraction
+    ahead = in_stride * KNOTS - next_knot
     ahead = ahead - KNOTS if ahead > 0.5 * KNOTS else ahead
     return ahead + KNOTS if ahead <= -0.5 * KNOTS else ahead
 
@@ -173,7 +171,7 @@ def is_learnt(rules: EstimatedRules, clock: EstimatedClock) -> bool:
 
 
 def passed_knot(
-    rules: EstimatedRules, clock: EstimatedClock, at: GaitClock, learnt: float, measurement: GaitMeasurement
+    rules: EstimatedRules, clock: EstimatedClock, gait_clock: GaitClock, learnt: float, measurement: GaitMeasurement
 ) -> EstimatedClock:
     """Clock after passing a knot: the stride is learnt, and the clock corrected by a part of the estimated shift."""
     ready = is_learnt(rules, clock)
@@ -185,23 +183,23 @@ def passed_knot(
         toe_force=(*clock.window.toe_force[1:], measurement.toe_force),
         moved=(*clock.window.moved[1:], clock.moved),
     )
-    # A clock that was set anew by more than a knot runs after it, and its window is not of one piece.
-    together = knots_passed(at.fraction, clock.next_knot) < 1.0
-    filled = clock.filled + 1.0 if together else 0.0
-    # What the clock has moved in the mean since the readings of the window is corrected already.
+    # After a correction by more than a knot the readings of the window are not consecutive.
+    is_consecutive = knots_passed(gait_clock.fraction, clock.next_knot) < 1.0
+    filled = clock.filled + 1.0 if is_consecutive else 0.0
+    # The mean correction of the clock since the readings of the window is part of the shift already.
     corrected = 0.0
-    for place in range(WINDOW):
-        corrected += window.moved[WINDOW - 1] - window.moved[place]
+    for index in range(WINDOW):
+        corrected += window.moved[WINDOW - 1] - window.moved[index]
     corrected = corrected / WINDOW
     shift = estimated_shift(stride, window, rules) - corrected if ready & (filled >= WINDOW) else 0.0
-    # No further back than the strike; a clock that a strike left before it stays there until it gets to it.
-    moved = max(rules.estimate_weight * shift, min(0.0, -at.fraction))
-    following = clock.next_knot + 1.0
+    # No further back than the strike; a clock that is still before a detected strike is not moved back at all.
+    moved = max(rules.estimate_weight * shift, min(0.0, -gait_clock.fraction))
+    next_knot = clock.next_knot + 1.0
     return EstimatedClock(
-        clock=at._replace(fraction=at.fraction + moved),
+        clock=gait_clock._replace(fraction=gait_clock.fraction + moved),
         stride=stride,
         window=window,
-        next_knot=following - KNOTS if following >= KNOTS else following,
+        next_knot=next_knot - KNOTS if next_knot >= KNOTS else next_knot,
         filled=filled,
         learnt=learnt,
         moved=clock.moved + moved,
@@ -219,24 +217,24 @@ def follow(
 ) -> EstimatedClock:
     """Clock after a sample taken every ``period`` [s]: fractional timing until a stride is learnt, then estimated."""
     ready = is_learnt(rules, clock) & (clock.filled >= WINDOW)
-    # Once estimated, single events no longer move the clock, and the strike only a little.
+    # An estimated clock is not corrected by events other than the strike, and by this only a little.
     weight, strike_weight = 0.0 if ready else rules.anchor_weight, KEEPS if ready else 1.0
-    at = next_clock(rules.delays, phase_rules, clock.clock, before, phase, weight, strike_weight, period)
-    # A stride that is not good begins the learning anew, until it is done.
-    # In the stride before the time of a stride was known for the second time the clock may have waited.
+    gait_clock = next_clock(rules.delays, phase_rules, clock.clock, before, phase, weight, strike_weight, period)
+    # Strides count from the second known stride time on: before, the clock may have waited.
     ends = (before.strikes < phase.strikes) & (clock.clock.strides.counted > 1.5)
     time = clock.clock.strides.mean_time
-    good = (abs(before.since_strike - time) < EVEN * time) & (phase.heel.loaded > 0.5)
-    counted = (clock.learnt + 1.0 if good else 0.0) if ends else clock.learnt
+    is_good = (abs(before.since_strike - time) < EVEN * time) & (phase.heel.loaded > 0.5)
+    # Learning restarts after a bad stride, until enough strides are learnt.
+    counted = (clock.learnt + 1.0 if is_good else 0.0) if ends else clock.learnt
     learnt = clock.learnt if is_learnt(rules, clock) else counted
-    if knots_passed(at.fraction, clock.next_knot) >= 0.0:
-        return passed_knot(rules, clock, at, learnt, measurement)
-    return clock._replace(clock=at, learnt=learnt)
+    if knots_passed(gait_clock.fraction, clock.next_knot) >= 0.0:
+        return passed_knot(rules, clock, gait_clock, learnt, measurement)
+    return clock._replace(clock=gait_clock, learnt=learnt)
 
 
 def gait_time(rules: EstimatedRules, clock: EstimatedClock, phase: PhaseState) -> GaitTime:
     """Time since the heel strike [s], advanced by the delay of the valve."""
-    return place_in_stride(clock.clock, rules.delays.valve_delay, phase)
+    return phase_time(clock.clock, rules.delays.valve_delay, phase)
 
 
 ESTIMATED = TimingKind(

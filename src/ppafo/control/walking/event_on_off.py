@@ -12,7 +12,7 @@ from ppafo.control.torque_loop import REACH
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.assistance import timed_phase
 from ppafo.control.walking.fault_checks import SafetyRules
-from ppafo.control.walking.observer import LINE_QUANTITIES
+from ppafo.control.walking.nominal_device import LINE_QUANTITIES
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts

@@ -23,7 +23,7 @@ from ppafo.control.walking.fault_flags import (
     STILL_TOE,
     raised,
 )
-from ppafo.control.walking.observer import LINE_QUANTITIES, NominalDevice
+from ppafo.control.walking.nominal_device import LINE_QUANTITIES, NominalDevice
 from ppafo.control.walking.phases import PhaseState, lifts
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
@@ -221,15 +221,15 @@ HALF = 0.5
 
 def time_unchanged(last: float, reading: float, since: float, moves: bool, period: float) -> float:
     """Time for which a reading has been bitwise constant [s], counted while another quantity ``moves``."""
-    # Equal to the last bit: a live sensor has noise, or at least moves by a step.
-    kept = since + period if moves else since
-    return kept if reading == last else 0.0
+    # Equal to the last bit: the reading of a live sensor has noise, or changes by a converter step.
+    unchanged = since + period if moves else since
+    return unchanged if reading == last else 0.0
 
 
 def slow_reading(last: float, reading: float, is_first: bool, period: float) -> float:
     """Reading filtered with ``SLOW_TIME``, in the unit of the reading; the first reading initialises the filter."""
-    followed = last + (reading - last) * period / (period + SLOW_TIME)
-    return reading if is_first else followed
+    filtered = last + (reading - last) * period / (period + SLOW_TIME)
+    return reading if is_first else filtered
 
 
 def next_readings(
@@ -241,10 +241,10 @@ def next_readings(
     changes, and the resolution of a converter keeps a reading constant for long. Nobody stands still on the toes alone,
     or lands for long; a wearer whose toes are lifted by the device may stand on the heel alone.
     """
-    # An ankle at exactly 0 rad does not occur: 0 marks that nothing was read yet.
+    # An angle of 0 marks that there was no reading yet: the angle of an ankle is never exactly 0 rad.
     is_first = last.angle == 0.0
-    # An angle that was the same before the strike belongs to the stride before.
-    same_angle = min(last.angle_unchanged, before.since_strike)
+    # The time before the last strike belongs to the previous stride.
+    unchanged_angle = min(last.angle_unchanged, before.since_strike)
     slow_heel = slow_reading(last.slow_heel, measurement.heel_force, is_first, period)
     slow_toe = slow_reading(last.slow_toe, measurement.toe_force, is_first, period)
     slow_angle = slow_reading(last.slow_angle, measurement.angle, is_first, period)
@@ -253,11 +253,6 @@ def next_readings(
     heel_moves = abs(measurement.heel_force - slow_heel) > MOVES
     toe_moves = abs(measurement.toe_force - slow_toe) > MOVES
     turns = abs(measurement.angle - slow_angle) > TURNS
-    beside_heel, beside_toe, beside_angle = (
-        toe_moves | turns | steps,
-        heel_moves | turns | steps,
-        heel_moves | toe_moves | steps,
-    )
     return LastReadings(
         heel_force=measurement.heel_force,
         toe_force=measurement.toe_force,
@@ -265,10 +260,14 @@ def next_readings(
         pressure_1=measurement.pressure_1,
         pressure_2=measurement.pressure_2,
         heel_unchanged=time_unchanged(
-            last.heel_force, measurement.heel_force, last.heel_unchanged, beside_heel, period
+            last.heel_force, measurement.heel_force, last.heel_unchanged, toe_moves | turns | steps, period
         ),
-        toe_unchanged=time_unchanged(last.toe_force, measurement.toe_force, last.toe_unchanged, beside_toe, period),
-        angle_unchanged=time_unchanged(last.angle, measurement.angle, same_angle, beside_angle, period),
+        toe_unchanged=time_unchanged(
+            last.toe_force, measurement.toe_force, last.toe_unchanged, heel_moves | turns | steps, period
+        ),
+        angle_unchanged=time_unchanged(
+            last.angle, measurement.angle, unchanged_angle, heel_moves | toe_moves | steps, period
+        ),
         slow_heel=slow_heel,
         slow_toe=slow_toe,
         slow_angle=slow_angle,
@@ -281,10 +280,10 @@ def range_flag(rules: SafetyRules, measurement: GaitMeasurement, thin: float) ->
     force = force | (min(measurement.heel_force, measurement.toe_force) < rules.lowest_force)
     angle = (measurement.angle < rules.lowest_angle) | (measurement.angle > rules.highest_angle)
     # A foot far in plantarflexion compresses a full chamber 2 to any pressure: no fault of the sensor.
-    squeezed = measurement.angle > SQUEEZING_ANGLE
+    is_compressed = measurement.angle > SQUEEZING_ANGLE
     pressure = min(measurement.pressure_1, measurement.pressure_2) < rules.lowest_pressure
     pressure = pressure | (thin > THIN_TIME) | (measurement.pressure_1 > rules.highest_pressure)
-    pressure = pressure | ((measurement.pressure_2 > rules.highest_pressure) & (not squeezed))
+    pressure = pressure | ((measurement.pressure_2 > rules.highest_pressure) & (not is_compressed))
     return min(raised(FORCE_RANGE, force), raised(ANGLE_RANGE, angle), raised(PRESSURE_RANGE, pressure))
 
 
@@ -308,14 +307,14 @@ def still_flag(rules: SafetyRules, readings: LastReadings, before: PhaseState, p
     longest = max(rules.frozen_time, DWELLS * phase.stride_time)
     heel = (readings.heel_unchanged > longest) & (phase.heel.loaded > 0.5)
     toe = (readings.toe_unchanged > longest) & (phase.toe.loaded > 0.5)
-    # At the strike the angle may have been the same for all of a slow swing.
+    # Only the time since the strike: an angle may be constant in all of a slow swing.
     angle = min(readings.angle_unchanged, phase.since_strike) > max(rules.frozen_time, TURNS_BACK * phase.stride_time)
-    whole = (before.phase == SWING) & (phase.phase != SWING)
-    whole = whole & (before.since_strike > HALF * phase.stride_time) & (before.since_strike < phase.stride_time / HALF)
+    ends = (before.phase == SWING) & (phase.phase != SWING)
+    ends = ends & (before.since_strike > HALF * phase.stride_time) & (before.since_strike < phase.stride_time / HALF)
     return min(
         raised(FROZEN_HEEL, heel & (phase.toe.loaded != before.toe.loaded)),
         raised(FROZEN_TOE, toe & (phase.heel.loaded != before.heel.loaded)),
-        raised(FROZEN_ANGLE, whole & (readings.angle_unchanged > MOST * before.since_strike)),
+        raised(FROZEN_ANGLE, ends & (readings.angle_unchanged > MOST * before.since_strike)),
         raised(STILL_HEEL, heel),
         raised(STILL_TOE, toe),
         raised(STILL_ANGLE, angle & (not lifts(phase.phase))),
@@ -336,26 +335,28 @@ def next_landing(
     In a ``steady`` walk (1) a strike is doubtful if the foot has already turned up at the strike. A lifted foot also
     turns up in the air, but turns down again on its heel.
     """
-    angle, swings = readings.angle, phase.phase == SWING
-    # Lowest and highest begin anew with each swing and each stance.
-    lower = (swings != (before.phase == SWING)) | (angle < last.lowest)
-    highest = max(last.highest - FADES * period, angle) if swings else last.highest
+    angle, is_swing = readings.angle, phase.phase == SWING
+    # Each swing and each stance has its own lowest and highest angle.
+    is_lowest = (is_swing != (before.phase == SWING)) | (angle < last.lowest)
+    highest = max(last.highest - FADES * period, angle) if is_swing else last.highest
     strikes = (before.phase == SWING) & (phase.phase == LANDING)
-    # The slow angle remembers where the foot was a moment ago, even where the swing's highest has faded.
+    # The filtered angle still shows a recent high angle when the highest angle of the swing has decayed.
     turned_up = max(last.highest, readings.slow_angle) - angle > TURNED_UP
     in_doubt = (angle if turned_up & (steady > 0.5) else 0.0) if strikes else last.in_doubt
     # Turning down after the strike clears the doubt, and so does turning up from a lower angle.
-    lands = (angle > in_doubt + TURNS_DOWN) | ((phase.phase == LANDING) & (not lower) & (angle > last.lowest + IS_FLAT))
+    lands = (angle > in_doubt + TURNS_DOWN) | (
+        (phase.phase == LANDING) & (not is_lowest) & (angle > last.lowest + IS_FLAT)
+    )
     is_late = (before.phase == LANDING) & (last.in_doubt - angle > IS_FLAT)
     flat = lifts(before.phase) & (phase.phase == MID_STANCE)
-    # Toes that still carry hold the foot; in the air one that is pushed turns down to its stop within 60 ms.
+    # Loaded toes hold the foot; in the air a pushed foot turns down to its stop within 60 ms.
     leaves = (before.phase == PUSH_OFF) & (phase.phase == SWING)
-    # Late by more than the limit counts, clearly in time resets, between both nothing is known.
+    # A late toe-off is counted, a timely one resets the count, and one between both limits changes nothing.
     counted = last.late_toes + 1.0 if angle > rules.highest_toe_off_angle else last.late_toes
     counted = 0.0 if angle < rules.highest_toe_off_angle - IN_TIME else counted
     return LandingCheck(
-        lowest=angle if lower else last.lowest,
-        highest=angle if lower else highest,
+        lowest=angle if is_lowest else last.lowest,
+        highest=angle if is_lowest else highest,
         in_doubt=0.0 if lands else in_doubt,
         late=(last.late + 1.0 if is_late else 0.0) if flat else last.late,
         late_toes=counted if leaves else last.late_toes,
@@ -372,10 +373,10 @@ def holds_pressure(rules: SafetyRules, pressure: float, expected: float, slow: f
 
     The ankle compresses the gas of a vented chamber, which keeps that pressure until the gas has flowed out.
     """
-    # The ankle may compress what is left: only pressure beyond the expected counts.
-    gauge = max(expected - rules.nominal.nominal_atmospheric_pressure, 0.0)
-    above = pressure - (gauge if rules.nominal.nominal_flow > 0.0 else 0.0)
-    return (above > rules.filled_pressure) & (slow <= (1.0 + FALLS) * pressure)
+    # The ankle may compress the remaining gas: only pressure above the expected gauge pressure counts.
+    expected_gauge = max(expected - rules.nominal.nominal_atmospheric_pressure, 0.0)
+    excess = pressure - (expected_gauge if rules.nominal.nominal_flow > 0.0 else 0.0)
+    return (excess > rules.filled_pressure) & (slow <= (1.0 + FALLS) * pressure)
 
 
 def next_emptying(
@@ -386,11 +387,11 @@ def next_emptying(
     A vented chamber has no source, and only the ankle could compress it: a rising pressure is an old reading.
     """
     pressure, angle = measurement.pressure_2, measurement.angle
-    lower = (vented <= rules.follow_time) | (pressure < last.lowest)
+    is_lowest = (vented <= rules.follow_time) | (pressure < last.lowest)
     rises = (pressure > max(last.lowest + RISES, rules.filled_pressure)) & (vented < rules.follow_time + SHOWN)
     rises = rises & (angle < min(last.angle + COMPRESSES, SQUEEZING_ANGLE))
     return Emptying(
-        lowest=pressure if lower else last.lowest,
-        angle=angle if lower else last.angle,
-        rising=last.rising + period if rises & (not lower) else 0.0,
+        lowest=pressure if is_lowest else last.lowest,
+        angle=angle if is_lowest else last.angle,
+        rising=last.rising + period if rises & (not is_lowest) else 0.0,
     )

@@ -56,29 +56,29 @@ Knots = Annotated[tuple[float, ...], KNOTS]
 EMPTY = (0.0,) * KNOTS
 
 
-def near(place: float, knot: float) -> float:
+def near(position: float, knot: float) -> float:
     """Weight [-] of a knot at a position, both in knots: 1 at the knot, decreasing linearly to 0 at its neighbours."""
-    return max(0.0, 1.0 - abs(place - knot))
+    return max(0.0, 1.0 - abs(position - knot))
 
 
-def command_at(table: Knots, place: float) -> float:
+def command_at(table: Knots, position: float) -> float:
     """Command [-] at a position in knots: linear between knots, 0 outside of the table."""
-    command = table[0] * near(place, 0.0)
+    command = table[0] * near(position, 0.0)
     for knot in range(1, KNOTS):
-        command = command + table[knot] * near(place, float(knot))
+        command = command + table[knot] * near(position, float(knot))
     return command
 
 
 def next_knot(knot: float, weight: float, step: float, forgetting: float) -> float:
     """Command [-] of a knot after a weighted sample: reduced by forgetting, changed by a step, within -1 to 1."""
-    # No command is larger, and a knot beyond it would take strides to come back.
+    # Commands have these limits; a larger knot would take strides to return.
     return max(-1.0, min(1.0, knot + weight * (step - forgetting * knot)))
 
 
-def place_in_table(profile: TorqueProfile, since_strike: float, stride_time: float) -> float:
+def table_position(profile: TorqueProfile, since_strike: float, stride_time: float) -> float:
     """Position in the table, in knots, for a time since the heel strike and a stride time, both [s]."""
-    begun = since_strike / stride_time - profile.peak_time + profile.rise_time
-    return begun / (profile.rise_time + profile.fall_time) * (KNOTS - 1.0)
+    since_start = since_strike / stride_time - profile.peak_time + profile.rise_time
+    return since_start / (profile.rise_time + profile.fall_time) * (KNOTS - 1.0)
 
 
 def learn(
@@ -94,35 +94,35 @@ def learn(
 
     The weights of the samples of one stride add up to 1 at each knot.
     """
-    # A sample counts by its share of the time that the stride spends on a knot.
+    # The weight of a sample is its duration divided by the time of a knot.
     knot_time = (profile.rise_time + profile.fall_time) * stride_time / (KNOTS - 1.0)
-    # Learnt where the error was made, a lead before: the torque follows the command late.
-    place = place_in_table(profile, since_strike - rules.lead, stride_time)
-    return next_table(table, place, duration / knot_time, rules.learning_gain * error, rules.forgetting)
+    # The torque lags behind the command: an error is due to the command a lead before.
+    position = table_position(profile, since_strike - rules.lead, stride_time)
+    return next_table(table, position, duration / knot_time, rules.learning_gain * error, rules.forgetting)
 
 
-def next_table(table: Knots, place: float, weight: float, step: float, forgetting: float) -> Knots:
+def next_table(table: Knots, position: float, weight: float, step: float, forgetting: float) -> Knots:
     """Table after a sample at a position in knots.
 
     The two neighbouring knots change, each by its part of the sample's ``weight`` [-] and of ``step`` [-].
     """
     return (
-        next_knot(table[0], near(place, 0.0) * weight, step, forgetting),
-        next_knot(table[1], near(place, 1.0) * weight, step, forgetting),
-        next_knot(table[2], near(place, 2.0) * weight, step, forgetting),
-        next_knot(table[3], near(place, 3.0) * weight, step, forgetting),
-        next_knot(table[4], near(place, 4.0) * weight, step, forgetting),
-        next_knot(table[5], near(place, 5.0) * weight, step, forgetting),
-        next_knot(table[6], near(place, 6.0) * weight, step, forgetting),
-        next_knot(table[7], near(place, 7.0) * weight, step, forgetting),
-        next_knot(table[8], near(place, 8.0) * weight, step, forgetting),
-        next_knot(table[9], near(place, 9.0) * weight, step, forgetting),
-        next_knot(table[10], near(place, 10.0) * weight, step, forgetting),
-        next_knot(table[11], near(place, 11.0) * weight, step, forgetting),
-        next_knot(table[12], near(place, 12.0) * weight, step, forgetting),
-        next_knot(table[13], near(place, 13.0) * weight, step, forgetting),
-        next_knot(table[14], near(place, 14.0) * weight, step, forgetting),
-        next_knot(table[15], near(place, 15.0) * weight, step, forgetting),
+        next_knot(table[0], near(position, 0.0) * weight, step, forgetting),
+        next_knot(table[1], near(position, 1.0) * weight, step, forgetting),
+        next_knot(table[2], near(position, 2.0) * weight, step, forgetting),
+        next_knot(table[3], near(position, 3.0) * weight, step, forgetting),
+        next_knot(table[4], near(position, 4.0) * weight, step, forgetting),
+        next_knot(table[5], near(position, 5.0) * weight, step, forgetting),
+        next_knot(table[6], near(position, 6.0) * weight, step, forgetting),
+        next_knot(table[7], near(position, 7.0) * weight, step, forgetting),
+        next_knot(table[8], near(position, 8.0) * weight, step, forgetting),
+        next_knot(table[9], near(position, 9.0) * weight, step, forgetting),
+        next_knot(table[10], near(position, 10.0) * weight, step, forgetting),
+        next_knot(table[11], near(position, 11.0) * weight, step, forgetting),
+        next_knot(table[12], near(position, 12.0) * weight, step, forgetting),
+        next_knot(table[13], near(position, 13.0) * weight, step, forgetting),
+        next_knot(table[14], near(position, 14.0) * weight, step, forgetting),
+        next_knot(table[15], near(position, 15.0) * weight, step, forgetting),
     )
 
 
@@ -176,12 +176,12 @@ def update(
         assessment.request.torque - torque if pushes else 0.0,
         period * assessment.acts if pushes else 0.0,
     )
-    place = place_in_table(profile, since_strike, phase.stride_time)
-    ahead = command_at(table, place) if pushes else 0.0
+    position = table_position(profile, since_strike, phase.stride_time)
+    feedforward = command_at(table, position) if pushes else 0.0
     law = state.law._replace(
         slope=state.law.slope * assessment.continues, started=state.law.started * assessment.continues
     )
-    opening, law = damped_command(parameters.law, law, assessment.request.torque, torque, ahead, period)
+    opening, law = damped_command(parameters.law, law, assessment.request.torque, torque, feedforward, period)
     command = beyond_dead_band(opening, parameters.dead_band)
     command, watch = assistance.valve_command(assessment, command, period)
     following: EventDampedLearningState = parts.state(

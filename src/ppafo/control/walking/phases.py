@@ -52,15 +52,15 @@ def lifts(phase: float) -> bool:
     return phase < 1.5
 
 
-def next_switch(rules: PhaseRules, switch: DebouncedSensor, force: float, period: float) -> DebouncedSensor:
+def next_sensor(rules: PhaseRules, sensor: DebouncedSensor, force: float, period: float) -> DebouncedSensor:
     """Debounced sensor after a sample of its force [N], taken every ``period`` [s]."""
-    # Between both thresholds the switch stays as it is.
-    indicated = 0.0 if force < rules.unload_threshold else switch.loaded
+    # Between both thresholds the state is kept.
+    indicated = 0.0 if force < rules.unload_threshold else sensor.loaded
     indicated = 1.0 if force > rules.load_threshold else indicated
-    # A change counts once it has lasted for the debounce time; until then the old state holds.
-    against = switch.contradicted + period if indicated != switch.loaded else 0.0
-    switches = against >= rules.debounce and indicated != switch.loaded
-    return DebouncedSensor(indicated if switches else switch.loaded, 0.0 if switches else against)
+    # A change counts once it has lasted for the debounce time.
+    contradicted = sensor.contradicted + period if indicated != sensor.loaded else 0.0
+    changes = contradicted >= rules.debounce and indicated != sensor.loaded
+    return DebouncedSensor(indicated if changes else sensor.loaded, 0.0 if changes else contradicted)
 
 
 def next_phase(rules: PhaseRules, state: PhaseState, heel: float, toe: float, passed: float) -> float:
@@ -75,9 +75,9 @@ def next_phase(rules: PhaseRules, state: PhaseState, heel: float, toe: float, pa
     rises = on_toe and not on_heel
     after_mid_stance = SWING if leaves_ground else (PUSH_OFF if late and rises else MID_STANCE)
     after_push_off = SWING if leaves_ground else (PUSH_OFF if rises else MID_STANCE)
-    found = after_swing if phase == SWING else after_landing
-    found = after_mid_stance if phase == MID_STANCE else found
-    return after_push_off if phase == PUSH_OFF else found
+    following = after_swing if phase == SWING else after_landing
+    following = after_mid_stance if phase == MID_STANCE else following
+    return after_push_off if phase == PUSH_OFF else following
 
 
 def timed_phase_state(
@@ -87,23 +87,23 @@ def timed_phase_state(
 
     ``passed`` is the estimated time since the heel strike [s], which decides when the push-off may start.
     """
-    heel = next_switch(rules, state.heel, heel_force, period)
-    toe = next_switch(rules, state.toe, toe_force, period)
-    since = state.since_strike + period
-    known = state.stride_time if state.stride_time > 0.0 else rules.first_stride_time
-    phase = next_phase(rules, state._replace(stride_time=known), heel.loaded, toe.loaded, passed)
+    heel = next_sensor(rules, state.heel, heel_force, period)
+    toe = next_sensor(rules, state.toe, toe_force, period)
+    since_strike = state.since_strike + period
+    stride_time = state.stride_time if state.stride_time > 0.0 else rules.first_stride_time
+    phase = next_phase(rules, state._replace(stride_time=stride_time), heel.loaded, toe.loaded, passed)
     # A foot that lands on its toes, or with a lost heel sensor, begins a stride too.
     strikes = state.phase == SWING and phase != SWING
-    # Half and twice the known time: a stop or a missed strike does not teach a stride time.
-    plausible = state.strikes > 0.5 and since > 0.5 * known and since < 2.0 * known
-    learnt = known + rules.stride_weight * (since - known) if plausible else known
+    # Times outside of half and twice the mean are stops or missed strikes.
+    is_plausible = state.strikes > 0.5 and since_strike > 0.5 * stride_time and since_strike < 2.0 * stride_time
+    mean = stride_time + rules.stride_weight * (since_strike - stride_time) if is_plausible else stride_time
     return PhaseState(
         phase=phase,
         heel=heel,
         toe=toe,
         in_phase=0.0 if phase != state.phase else state.in_phase + period,
-        since_strike=0.0 if strikes else since,
-        stride_time=learnt if strikes else known,
+        since_strike=0.0 if strikes else since_strike,
+        stride_time=mean if strikes else stride_time,
         strikes=state.strikes + (1.0 if strikes else 0.0),
     )
 

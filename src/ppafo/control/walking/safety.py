@@ -97,7 +97,7 @@ LIFT_STRIDES = 1.0
 """Good strides in a row after which a paused device holds the foot up again."""
 
 STANDS_UP = 0.5
-"""Assistance resumes after sitting once heel and toes have been loaded for this time [s]."""
+"""Time [s] with heel and toes loaded after which a sitting wearer has stood up, and assistance resumes."""
 
 STEADY = 0.1
 """Largest relative deviation of a usual stride from the stride time."""
@@ -118,8 +118,8 @@ CARRIES = 100.0
 """Force [N] in a stance below which rolling is not checked: the foot of a sitting wearer carries less."""
 
 SITS_DOWN = 1.0
-"""Time after a strike, in stride times, from which a foot may leave the ground without rolling over its toes, when the
-wearer sits down. A step starts earlier, and nobody sits down so soon."""
+"""Time after a strike, in stride times, after which a foot may leave the ground without rolling over its toes: the
+wearer then sits down. The foot of a walking wearer leaves the ground earlier, and sitting down takes longer."""
 
 MINIMUM_OPENING = 0.1
 """Commands smaller than this may lie within the overlap of a valve and do not count as an opening."""
@@ -130,29 +130,29 @@ def next_stance(
 ) -> Stance:
     """Stance after a sample of ``period`` [s]; a strike starts a new one."""
     angle, heel_force, toe_force = measurement.angle, measurement.heel_force, measurement.toe_force
-    # A strike is known some samples late: what loads the foot before belongs to the next stance.
-    swings = phase.phase == SWING
-    strikes = (before.phase == SWING) & (not swings)
-    # In the swing the largest force of the last stance is kept: it scales what leaving the ground means.
-    larger = last.largest if swings else max(heel_force, toe_force)
-    largest = larger if strikes else max(last.largest, larger)
-    rolls = (not swings) & (toe_force - heel_force > ROLLS * largest)
+    is_swing = phase.phase == SWING
+    strikes = (before.phase == SWING) & (not is_swing)
+    # Forces in the swing do not count: a strike is detected some samples late, and its first forces belong to the
+    # next stance. The largest force of the last stance is kept, as a scale for leaving the ground.
+    force = last.largest if is_swing else max(heel_force, toe_force)
+    largest = force if strikes else max(last.largest, force)
+    rolls = (not is_swing) & (toe_force - heel_force > ROLLS * largest)
     heel, toe = phase.heel.loaded, phase.toe.loaded
-    both = min(heel, toe) > 0.5
-    one = (phase.phase != SWING) & (min(heel, toe) < 0.5)
-    # The angle while the heel carries is the reference from which the ankle turns.
-    flat = ((phase.phase == MID_STANCE) & (heel > 0.5)) | (last.flat_angle <= 0.0)
-    flat_angle = angle if flat else last.flat_angle
+    both_loaded = min(heel, toe) > 0.5
+    is_apart = (not is_swing) & (min(heel, toe) < 0.5)
+    # The ankle turns from its angle while the heel is loaded.
+    is_flat = ((phase.phase == MID_STANCE) & (heel > 0.5)) | (last.flat_angle <= 0.0)
+    flat_angle = angle if is_flat else last.flat_angle
     turns = abs(angle - flat_angle) > RESTS
     return Stance(
         heel_seen=heel if strikes else max(last.heel_seen, heel),
         toe_seen=toe if strikes else max(last.toe_seen, toe),
-        together=last.together + period if both else 0.0,
-        apart=last.apart + period if one else 0.0,
+        together=last.together + period if both_loaded else 0.0,
+        apart=last.apart + period if is_apart else 0.0,
         flat_angle=flat_angle,
-        turned=1.0 if turns | ((last.turned > 0.5) & (not flat)) else 0.0,
+        turned=1.0 if turns | ((last.turned > 0.5) & (not is_flat)) else 0.0,
         largest=largest,
-        rolled=1.0 if rolls | ((last.rolled > 0.5) & (not flat)) else 0.0,
+        rolled=1.0 if rolls | ((last.rolled > 0.5) & (not is_flat)) else 0.0,
     )
 
 
@@ -164,7 +164,8 @@ def gait_flag(rules: fault_checks.SafetyRules, before: PhaseState, phase: PhaseS
     returns = (phase.heel.loaded > before.heel.loaded) | (phase.toe.loaded > before.toe.loaded)
     # Not at the first strike: a walk may begin with a lifted foot.
     skips_toes = (before.phase == LANDING) & (phase.phase == SWING) & (phase.strikes > 1.5)
-    # Sitting down unloads both alike, and may turn the ankle then, but late; the first step may begin anywhere.
+    # A wearer who sits down unloads heel and toes alike and may turn the ankle, but late in the stance. The first
+    # stance is not checked: it may begin anywhere.
     leaves = (phase.phase == SWING) & (stance.turned > 0.5) & (stance.largest > CARRIES)
     leaves = leaves & (phase.since_strike < SITS_DOWN * phase.stride_time) & (phase.strikes > 1.5)
     return min(
@@ -179,8 +180,8 @@ def steady_flag(rules: fault_checks.SafetyRules, before: PhaseState, phase: Phas
     """Fault flag of forces or an angle [rad] that contradict a stride after one of the usual duration."""
     flat = phase.since_strike > rules.flat_from * phase.stride_time
     flat = flat & (phase.since_strike < rules.flat_to * phase.stride_time)
-    enters = (before.phase == SWING) & (phase.phase != SWING)
-    short = enters & (before.in_phase < rules.shortest_swing * phase.stride_time)
+    strikes = (before.phase == SWING) & (phase.phase != SWING)
+    short = strikes & (before.in_phase < rules.shortest_swing * phase.stride_time)
     bent = (angle < rules.lowest_flat_angle) | (angle > rules.highest_flat_angle)
     return min(
         raised(fault_flags.NOT_FLAT, flat & (phase.toe.loaded < 0.5)),
@@ -191,7 +192,7 @@ def steady_flag(rules: fault_checks.SafetyRules, before: PhaseState, phase: Phas
 
 
 def valve_flag(
-    rules: fault_checks.SafetyRules, now: SafetyState, phase: PhaseState, measurement: GaitMeasurement
+    rules: fault_checks.SafetyRules, state: SafetyState, phase: PhaseState, measurement: GaitMeasurement
 ) -> float:
     """Fault flag of a pressure that contradicts the command of the valve, by limits that do not depend on the device.
 
@@ -203,19 +204,19 @@ def valve_flag(
     but does vent. Chamber 2 expands then: a pressure still measured in it is delayed, as is one that rises after
     venting.
     """
-    valve_times = now.valve_times
-    # Filled for longer than any device needs, and still no pressure.
+    valve_times = state.valve_times
+    # No pressure although the chamber was filled for longer than any device needs.
     no_rise_1 = (valve_times.filling_1 > rules.fill_time) & (measurement.pressure_1 < rules.filled_pressure)
     no_rise_2 = (valve_times.filling_2 > rules.fill_time) & (measurement.pressure_2 < rules.filled_pressure)
     stands = (phase.phase == MID_STANCE) & (phase.heel.loaded > 0.5)
-    expected_1, expected_2 = now.observer.chamber_1.pressure, now.observer.chamber_2.pressure
-    left = fault_checks.holds_pressure(rules, measurement.pressure_1, expected_1, now.slow_pressure_1)
-    left = left | fault_checks.holds_pressure(rules, measurement.pressure_2, expected_2, now.slow_pressure_2)
-    held = stands & (valve_times.venting > rules.vent_time) & left
-    late = (valve_times.venting > LATE * rules.vent_time) & (measurement.pressure_2 > rules.filled_pressure)
-    no_fall = held | (stands & late) | (now.emptying.rising > fault_checks.LASTS)
-    found = min(raised(fault_flags.NO_RISE, no_rise_1 | no_rise_2), raised(fault_flags.NO_FALL, no_fall))
-    return raised(fault_flags.PRESSURE_SENSOR, held) if rules.nominal.nominal_flow > 0.0 else found
+    expected_1, expected_2 = state.observer.chamber_1.pressure, state.observer.chamber_2.pressure
+    constant = fault_checks.holds_pressure(rules, measurement.pressure_1, expected_1, state.slow_pressure_1)
+    constant = constant | fault_checks.holds_pressure(rules, measurement.pressure_2, expected_2, state.slow_pressure_2)
+    stays = stands & (valve_times.venting > rules.vent_time) & constant
+    delayed = (valve_times.venting > LATE * rules.vent_time) & (measurement.pressure_2 > rules.filled_pressure)
+    no_fall = stays | (stands & delayed) | (state.emptying.rising > fault_checks.LASTS)
+    flag = min(raised(fault_flags.NO_RISE, no_rise_1 | no_rise_2), raised(fault_flags.NO_FALL, no_fall))
+    return raised(fault_flags.PRESSURE_SENSOR, stays) if rules.nominal.nominal_flow > 0.0 else flag
 
 
 def next_good_strides(state: SafetyState, before: PhaseState, phase: PhaseState, flag: float) -> float:
@@ -223,13 +224,13 @@ def next_good_strides(state: SafetyState, before: PhaseState, phase: PhaseState,
 
     -1 after a flag, so that the rest of the stride does not count.
     """
-    enters = (before.phase == SWING) & (phase.phase != SWING)
-    usual = (before.since_strike > fault_checks.HALF * phase.stride_time) & (
+    strikes = (before.phase == SWING) & (phase.phase != SWING)
+    is_usual = (before.since_strike > fault_checks.HALF * phase.stride_time) & (
         before.since_strike < phase.stride_time / fault_checks.HALF
     )
-    good = usual & (min(state.stance.heel_seen, state.stance.toe_seen) > 0.5)
-    # A stride is judged where the next one begins.
-    counted = (state.good_strides + 1.0 if good else 0.0) if enters else state.good_strides
+    is_good = is_usual & (min(state.stance.heel_seen, state.stance.toe_seen) > 0.5)
+    # A stride is assessed at the strike that ends it.
+    counted = (state.good_strides + 1.0 if is_good else 0.0) if strikes else state.good_strides
     return -1.0 if flag > fault_flags.NO_FLAG else counted
 
 
@@ -243,10 +244,10 @@ def next_memory(
 ) -> SafetyState:
     """Safety state with the states of the checks after a sample of ``period`` [s]; the level is unchanged."""
     readings = fault_checks.next_readings(state.readings, measurement, before, phase, period)
-    enters = (before.phase == SWING) & (phase.phase != SWING)
+    strikes = (before.phase == SWING) & (phase.phase != SWING)
     on_toes = (state.stance.heel_seen < 0.5) & (before.strikes > 0.5)
-    usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
-    steady = (1.0 if usual else 0.0) if enters else state.steady
+    is_usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
+    steady = (1.0 if is_usual else 0.0) if strikes else state.steady
     # Chamber 2 is joined to the atmosphere while chamber 1 is fed, and while both vent.
     vented = state.valve_times.filling_1 + state.valve_times.venting
     thin = min(measurement.pressure_1, measurement.pressure_2) < fault_checks.THIN
@@ -254,7 +255,7 @@ def next_memory(
         readings=readings,
         landing=fault_checks.next_landing(rules, state.landing, readings, before, phase, steady, period),
         stance=next_stance(state.stance, before, phase, measurement, period),
-        toe_strides=(state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides,
+        toe_strides=(state.toe_strides + 1.0 if on_toes else 0.0) if strikes else state.toe_strides,
         steady=steady,
         observer=observer.next_observer(
             rules.nominal,
@@ -287,8 +288,8 @@ def found_flag(
     nominal, pressure_1, pressure_2 = rules.nominal, measurement.pressure_1, measurement.pressure_2
     steady = steady_flag(rules, before, phase, measurement.angle)
     late = max(now.landing.late, now.landing.late_toes) > fault_checks.LATE_STRIDES
-    # The numbers of the flags are in order of urgency: the least one comes first, whichever check raised it.
-    found = min(
+    # The numbers of the flags are in order of urgency: the smallest is the most urgent, whichever check raised it.
+    flag = min(
         observer.found_cause(nominal, now.observer, measurement.angle, pressure_1, pressure_2, period),
         valve_flag(rules, now, phase, measurement),
         fault_checks.range_flag(rules, measurement, now.thin),
@@ -299,7 +300,7 @@ def found_flag(
         raised(fault_flags.TOE_STRIDES, now.toe_strides > rules.most_toe_strides),
         raised(fault_flags.LATE_FORCES, late),
     )
-    return found if found < NOT_RAISED else fault_flags.NO_FLAG
+    return flag if flag < NOT_RAISED else fault_flags.NO_FLAG
 
 
 def monitor(
@@ -314,15 +315,15 @@ def monitor(
     now = next_memory(rules, state, before, phase, measurement, period)
     flag = found_flag(rules, state.readings, now, before, phase, measurement, period)
     good_strides = next_good_strides(state, before, phase, flag)
-    # A swing without end is sitting: standing up shows that both forces are sound.
-    resting = (state.level == PAUSED) & (state.finding.fault_flag == fault_flags.ENDLESS_PHASE)
-    # A stop lasts; else help comes back step by step: the foot is lifted again before it is pushed.
+    # An endless swing is sitting: standing up shows that both force sensors are sound.
+    is_sitting = (state.level == PAUSED) & (state.finding.fault_flag == fault_flags.ENDLESS_PHASE)
+    # Assistance resumes in steps, except after a stop: the foot is lifted before it is pushed.
     resumes = (state.level < STOPPED) & (good_strides >= rules.resume_strides)
     lifted = LIFTS if (state.level == PAUSED) & (good_strides >= LIFT_STRIDES) else state.level
-    allowed = HELPS if resumes | (resting & (now.stance.together > STANDS_UP)) else lifted
-    # A flag of this sample outweighs what good strides would allow.
+    allowed = HELPS if resumes | (is_sitting & (now.stance.together > STANDS_UP)) else lifted
+    # A flag of this sample has priority over good strides.
     level = max(allowed, fault_flags.level_of(flag))
-    # Only a rise of the level vents; a lower level gives help back.
+    # Only a higher level vents; a lower level is more assistance.
     vents = level > state.level
     return now._replace(
         level=level,
@@ -361,7 +362,7 @@ def safe_command(state: SafetyState, phase: float, command: float, period: float
     """Valve command [-], ``VENT`` where no action is permitted, and the safety state that records it for a time [s]."""
     sent = command if permits(state, phase) else VENT
     vents = sent > VENTS_ABOVE
-    # How long a chamber has been fed counts by the opening: half open takes twice as long.
+    # The time for which a chamber is fed is weighted by the opening: half open takes twice as long.
     opening = 0.0 if vents else max(-1.0, min(1.0, sent))
     valve_times = ValveTimes(
         feed_time(state.valve_times.filling_1, opening, period),

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.estimated_timing import ESTIMATED
-from ppafo.control.walking.timing import FRACTIONAL, THRESHOLDS, TimingKind, TimingParts
+from ppafo.control.walking.fractional_timing import FRACTIONAL
+from ppafo.control.walking.timing import THRESHOLDS, TimingKind, TimingParts
 from ppafo.errors import ScenarioError
 from ppafo.kinds import Kinds
 from ppafo.model.binding import frame_of, made_of, parts_of

@@ -5,7 +5,7 @@ The settings of the observer give the assumed dead volumes and the assumed mean 
 
 from typing import Any
 
-from ppafo.control.walking.observer import NominalDevice, believed_volumes, mean_volumes
+from ppafo.control.walking.nominal_device import NominalDevice, believed_volumes, mean_volumes
 from ppafo.engine.scheme.motion import clamp_angle
 from ppafo.model.actuators.kind import Chambers
 from ppafo.model.binding import made_of

@@ -12,7 +12,8 @@ from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import exported
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.library import Library, Switch, c_identifier
-from ppafo.exports.c_library.preparation import VANE_PREPARATION, Preparation
+from ppafo.exports.c_library.preparation import VANE_PREPARATION
+from ppafo.exports.c_library.prepared import Preparation
 from ppafo.exports.c_library.readme import words_of, words_of_walk
 from ppafo.exports.c_library.settings import relations_of, settings_of
 from ppafo.model.catalog import ordered_effects
@@ -86,7 +87,7 @@ def walk_library(configuration: Scenario) -> Library:
     """Return a library whose settings are all numbers of a walk; ScenarioError for a walk that cannot be exported."""
     from ppafo.exports.c_library.walk_preparation import (
         WALK_PREPARATION,
-        check_can_leave,
+        check_can_be_exported,
         links_of_walk,
         relations_of_walk,
         settings_of_walk,
@@ -95,7 +96,7 @@ def walk_library(configuration: Scenario) -> Library:
     from ppafo.walking.planning import plan_walk
 
     # Before anything is planned: what cannot be exported should be said at once.
-    check_can_leave(configuration)
+    check_can_be_exported(configuration)
     program = exported(batch_of(plan_walk(configuration)).program)
     settings, links = settings_of_walk(configuration), links_of_walk(configuration)
     failing = {sensor: fault for sensor, fault in walk_of(configuration).faults.items() if fault.kind}

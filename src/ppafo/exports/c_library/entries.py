@@ -13,7 +13,7 @@ from ppafo.errors import ProgramError
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.library import ExportParameter, c_identifier
-from ppafo.exports.c_library.preparation import Preparation
+from ppafo.exports.c_library.prepared import Preparation
 from ppafo.model.declaration import PlainFunction, quantities_of
 from ppafo.parameters.graph import Graph, LinkFunction
 

@@ -10,7 +10,7 @@ from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import ExportedProgram
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.library import ExportParameter, Library, LibraryApi, c_identifier
-from ppafo.exports.c_library.walk_preparation import check_can_leave
+from ppafo.exports.c_library.walk_preparation import check_can_be_exported
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.valves.kind import VENT
 from ppafo.parameters.graph import outside
@@ -291,7 +291,7 @@ def _commanded(_motion: Motion, scenario: Scenario) -> Scenario:
 @_commanded.register
 def _commanded_walk(motion: WalkMotion, walk: Scenario) -> Scenario:
     # Sensors are there that nothing reads.
-    check_can_leave(walk)
+    check_can_be_exported(walk)
     step = step_counts(1.0, walk.run.step, 1.0, walk.controller.period).step
     # What fails with the controller, a shut-off valve and a slow valve go by its samples, and so do commands then.
     goes_by_samples = bool(motion.shut_off) or not {"controller", "valve"}.isdisjoint(motion.broken)

@@ -7,18 +7,19 @@ name becomes a field, every number is a scalar, and a function over runs is call
 import ast
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from types import FunctionType
-from typing import Any
+from typing import Any, NamedTuple
 
-from ppafo.engine.entries import HEADER, INLINE, indent
+from ppafo.engine.entries import HEADER, INLINE, indent, without_origins
 from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, HANDED
 from ppafo.engine.linking import link_program
 from ppafo.engine.loop_text import LOOP_ARRAYS, LOOP_NUMBERS, lane_loop, run_loop
 from ppafo.engine.program import Program
+from ppafo.engine.replacements import Replacements
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_of, struct_of_numbers
 from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, Further, places_of
@@ -65,7 +66,7 @@ class _ForOneRun(ast.NodeTransformer):
 
 def _collector() -> SourceCollector:
     """Return a collector that also accepts functions applied to columns in Python, specialised for one run."""
-    return SourceCollector(INLINE, for_one_run, links=dict(FOR_ONE_RUN))
+    return SourceCollector(INLINE, for_one_run, replacements=Replacements(everywhere=dict(FOR_ONE_RUN)))
 
 
 LOOP_TYPES: tuple[Type, ...] = (
@@ -95,7 +96,7 @@ def c_text_of_run(
 
     collector = _collector()
     program, structs = exported.program, Structs()
-    link_program(program, collector)
+    link_program(program, collector.replacements)
     entries = [metrics_entry(exported, collector, structs)] if exported.metrics else []
     entries += [add(collector, structs) for add in further]
     steps = _steps_of(exported, collector)
@@ -167,18 +168,37 @@ def _names_around() -> frozenset[str]:
 _FUNCTION = re.compile(r"^(?:static )?[\w ]+\b\*?(\w+)\(", re.MULTILINE)
 
 
-def c_text(
-    exported: ExportedProgram, title: str, settings: Sequence[str], further: Further | None, together: int
-) -> str:
-    """Return all functions of an exported program in C; ``further`` may add one that takes the named ``settings``.
+class ComposedLibrary(NamedTuple):
+    """Composed functions of an exported program, before their translation to C."""
+
+    text: str
+    documents: Mapping[str, str]
+    """Docstrings by the names of functions and classes in the text."""
+
+
+def composed_library(exported: ExportedProgram, further: Further | None, together: int) -> ComposedLibrary:
+    """Compose all functions of an exported program; ``further`` may add one that takes settings.
 
     Each lane loop is written twice: for one run, and with the suffix ``TOGETHER`` for ``together`` runs at once.
     """
-    from ppafo.translation.c99 import c_source, documents_of
-    from ppafo.translation.walk import walk_module
+    from ppafo.translation.c99 import documents_of
 
     collector = _collector()
-    composed = _composed_text(exported, collector, further, together)
+    link_program(exported.program, collector.replacements)
+    arrays = Arrays()
+    entries = [metrics_entry(exported, collector, arrays), *([] if further is None else [further(collector, arrays)])]
+    steps = _steps_of(exported, collector)
+    loops = [lane_loop(step, COMPILED, name, ARGUMENTS, lanes=1) for name, step in steps.items()]
+    loops += [lane_loop(step, COMPILED, name + TOGETHER, ARGUMENTS, together) for name, step in steps.items()]
+    text = "\n\n".join([HEADER, collector.text(), *loops, *entries, ""])
+    return ComposedLibrary(text, documents_of(collector) | {"Readings": Readings.__doc__ or ""})
+
+
+def c_text(exported: ExportedProgram, composed: ComposedLibrary, title: str, settings: Sequence[str]) -> str:
+    """Return the composed functions of an exported program in C, after the places of its numbers and ``settings``."""
+    from ppafo.translation.c99 import c_source
+    from ppafo.translation.walk import walk_module
+
     state = list(places_of(exported.program.state_rows()).values())
     parameter = list(places_of(exported.program.parameter_rows()).values())
     alone = [name.replace("AT_", "PARAMETER_", 1) for name in parameter]
@@ -207,28 +227,14 @@ def c_text(
         _enumeration("Places of the settings.", places["settings"]),
         _enumeration("Places of the metrics.", places["found"]),
     ]
-    documents = documents_of(collector) | {"Readings": Readings.__doc__ or ""}
-    return "\n".join([*counted, c_source(walk_module(composed), documents, title, places)])
+    return "\n".join([*counted, c_source(walk_module(composed.text), composed.documents, title, places)])
 
 
-def outline_of(exported: ExportedProgram, settings: Sequence[str], further: Further | None, together: int) -> str:
-    """Return the complete input of ``c_text`` except the title: equal outlines give equal code."""
-    composed = _composed_text(exported, _collector(), further, together)
+def outline_of(exported: ExportedProgram, composed: ComposedLibrary, settings: Sequence[str]) -> str:
+    """Return the complete input of ``c_text`` except title and source positions: equal outlines give equal code."""
     places = [places_of(exported.program.state_rows()), places_of(exported.program.parameter_rows())]
     names = [*places, [kind.name for kind in exported.metrics], list(settings)]
-    return f"{names!r}\n{composed}"
-
-
-def _composed_text(
-    exported: ExportedProgram, collector: SourceCollector, further: Further | None, together: int
-) -> str:
-    link_program(exported.program, collector)
-    arrays = Arrays()
-    entries = [metrics_entry(exported, collector, arrays), *([] if further is None else [further(collector, arrays)])]
-    steps = _steps_of(exported, collector)
-    loops = [lane_loop(step, COMPILED, name, ARGUMENTS, lanes=1) for name, step in steps.items()]
-    loops += [lane_loop(step, COMPILED, name + TOGETHER, ARGUMENTS, together) for name, step in steps.items()]
-    return "\n\n".join([HEADER, collector.text(), *loops, *entries, ""])
+    return f"{names!r}\n{without_origins(composed.text)}"
 
 
 def _stepping(program: Program, prefix: str) -> list[str]:

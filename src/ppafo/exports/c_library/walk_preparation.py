@@ -11,15 +11,13 @@ from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library.library import ExportParameter, Relation, c_identifier
 from ppafo.exports.c_library.preparation import (
-    Preparation,
-    PreparedLane,
     counted,
-    named,
     set_gas,
     set_plant,
     set_timing,
     start,
 )
+from ppafo.exports.c_library.prepared import Preparation, PreparedLane, names_of
 from ppafo.exports.c_library.settings import declared_settings, export_parameters
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
@@ -56,7 +54,7 @@ from ppafo.walking.preparation import (
     walk_step_counts,
     with_leg,
 )
-from ppafo.walking.task_sequence import flat_foot
+from ppafo.walking.task_sequence_plan import flat_foot
 from ppafo.walking.wearer import WEARER, leg_parameters
 
 _FORCES = ("force_bandwidth", "force_noise", "force_resolution", "lost_share")
@@ -75,7 +73,7 @@ _RELATIONS = (
 """Relations between two numbers of a walk file; relations with a third number or the gait are left to the caller."""
 
 
-def check_can_leave(configuration: Scenario) -> None:
+def check_can_be_exported(configuration: Scenario) -> None:
     """Raise ScenarioError if a walk cannot be exported."""
     if walk_of(configuration).person:
         raise ScenarioError(
@@ -92,18 +90,27 @@ def check_can_leave(configuration: Scenario) -> None:
 def settings_of_walk(configuration: Scenario) -> tuple[ExportParameter, ...]:
     """Return every number of a walk in SI units, by the path used in overrides."""
     run, control = configuration.run, _control(configuration)
-    of_run = {"run.duration": run.duration, "run.step": run.step, "run.output_interval": record_interval(run.duration)}
-    times = of_run | {"controller.period": configuration.controller.period}
-    declared = (
-        declared_settings(configuration) | control | {f"run.{quantity.name}": quantity for quantity in (*RUN, STEP)}
+    times = {
+        "run.duration": run.duration,
+        "run.step": run.step,
+        "run.output_interval": record_interval(run.duration),
+        "controller.period": configuration.controller.period,
+    }
+    declared = {
+        **declared_settings(configuration),
+        **control,
+        **{f"run.{quantity.name}": quantity for quantity in (*RUN, STEP)},
+    }
+    # The structures of libraries have the device first, then the times of the run, the wearer and the controller.
+    run_times = (path for path in times if path.startswith("run."))
+    wearer = (f"wearer.{quantity.name}" for quantity in (*WEARER, PERSON))
+    ordered = dict.fromkeys(
+        (*device_numbers(configuration.device), *run_times, *wearer, "controller.period", *control, *declared)
     )
     # What fails of the plant, with its shut-off valve, is written out in the source; persons are drawn in Python.
-    fixed = ("shut_off.", *(f"faults.{part}." for part in walk_of(configuration).broken), f"wearer.{PERSON.name}")
-    # The structures of libraries have the times behind the device.
-    wearer = (f"wearer.{quantity.name}" for quantity in (*WEARER, PERSON))
-    paths = dict.fromkeys((*device_numbers(configuration.device), *of_run, *wearer, *times, *control, *declared))
-    known = {path: declared[path] for path in paths if path in declared and not path.startswith(fixed)}
-    return export_parameters(configuration, known, times)
+    constant = ("shut_off.", *(f"faults.{part}." for part in walk_of(configuration).broken), f"wearer.{PERSON.name}")
+    settings = {path: declared[path] for path in ordered if path in declared and not path.startswith(constant)}
+    return export_parameters(configuration, settings, times)
 
 
 def _control(configuration: Scenario) -> dict[str, Quantity]:
@@ -143,8 +150,8 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
 def put_walking_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set leg, gait, and the plant with both; the heel rocker has been fitted to the gait beforehand."""
     gait = walk_of(parts.scenario).gait
-    lane["wearer"] = parts.row("Wearer", named(WEARER))(
-        *(getattr(settings, name) for name in parts.names("wearer", named(WEARER)))
+    lane["wearer"] = parts.row("Wearer", names_of(WEARER))(
+        *(getattr(settings, name) for name in parts.setting_names("wearer", names_of(WEARER)))
     )
     lane["rocker"] = rocker_on_heel(
         fit_rocker(gait)[0], fit_rocker(gait)[1], fit_rocker(gait)[2], settings.wearer_heel_lever
@@ -182,7 +189,7 @@ def set_walk_sensors(parts: Preparation, lane: PreparedLane, settings: Any) -> N
             )
     lane.gait_sensors = gait_sensors(
         parts.row("SensorNumbers", (*_FORCES, *_OTHERS))(
-            *(getattr(settings, name) for name in parts.names("sensors", (*_FORCES, *_OTHERS)))
+            *(getattr(settings, name) for name in parts.setting_names("sensors", (*_FORCES, *_OTHERS)))
         ),
         settings.controller_period,
         *(lane[f"{sensor}_fault"] for sensor in walk_of(parts.scenario).faults),

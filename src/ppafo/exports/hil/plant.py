@@ -8,6 +8,7 @@ from ppafo.engine.loading import backend_described
 from ppafo.engine.run import Run, batch_of
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil import wire
+from ppafo.exports.hil.ports import BITS_PER_BYTE
 from ppafo.model.controlled import TORQUE
 from ppafo.parameters.plant import venting_valve
 from ppafo.simulation.plan import plan_run
@@ -57,7 +58,7 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> CompiledPlant:
 
 def check_baud(baud: int, rate: int) -> None:
     """Raise ScenarioError if a serial line is too slow for the samples."""
-    bits = wire.sample_length(CHANNELS_SENT) * wire.BITS_OF_A_BYTE
+    bits = wire.sample_length(CHANNELS_SENT) * BITS_PER_BYTE
     if baud < bits * rate:
         raise ScenarioError(
             f"{argument_text('baud')} {baud}: {rate} samples per second need {bits * rate} baud; use a faster line, "

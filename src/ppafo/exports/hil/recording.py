@@ -13,6 +13,7 @@ import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.exports.hil import wire
+from ppafo.exports.hil.ports import Port
 from ppafo.signals import CHANNELS as KNOWN
 from ppafo.signals import Channel, Recording, RecordingKind
 from ppafo.storage.comma_separated import mark_of
@@ -245,7 +246,7 @@ def _difference(later: int, earlier: int) -> int:
 
 
 def record(
-    port: wire.Port,
+    port: Port,
     label: str,
     duration: float | None,
     patience: float,

@@ -55,61 +55,61 @@ class HardwareRun:
 
     plant: CompiledPlant
     result: Result
-    exchange: LinkTraffic
+    traffic: LinkTraffic
     machine: HostComputer
 
     @property
-    def sent_late(self) -> list[float]:
+    def delays(self) -> list[float]:
         """Delays [s] of the sent samples; the samples after a stop are not sent."""
-        return [row.sent_late for row in self.exchange.rows if row.sent_late is not None]
+        return [row.delay for row in self.traffic.rows if row.delay is not None]
 
     @property
-    def answered_after(self) -> list[float]:
+    def response_times(self) -> list[float]:
         """Response times [s] of the answered samples."""
-        return [row.answered_after for row in self.exchange.rows if row.answered_after is not None]
+        return [row.response_time for row in self.traffic.rows if row.response_time is not None]
 
     @property
     def is_good(self) -> bool:
         """True if the run is complete and the plant was not vented."""
-        return self.result.status.is_completed and not self.exchange.vented
+        return self.result.status.is_completed and not self.traffic.vent_reason
 
     def document(self) -> dict[str, Any]:
         """Content of ``link.json``, in SI units."""
-        exchange, late, after = self.exchange, self.sent_late, self.answered_after
+        traffic, late, after = self.traffic, self.delays, self.response_times
         return {
             "rate": round(1.0 / self.plant.period),
             "samples": len(late),
             "answered": len(after),
             "missed": len(late) - len(after),
-            "longest_silence": longest_silence(exchange.rows) * self.plant.period,
+            "longest_silence": longest_silence(traffic.rows) * self.plant.period,
             "sent_late": spread(late),
             "answered_after": spread(after),
-            "stood_still": list(exchange.stood_still),
-            "taken": exchange.taken,
-            "refused": dict(exchange.refused),
-            "ignored": dict(exchange.ignored),
-            "strangers": exchange.strangers,
-            "is_real_time": exchange.is_real_time,
-            "vented": exchange.vented or None,
-            "vented_at": exchange.vented_at,
-            "is_stopped": exchange.is_stopped,
-            "failure": exchange.failure or None,
+            "stood_still": list(traffic.pauses),
+            "taken": traffic.accepted,
+            "refused": dict(traffic.refused),
+            "ignored": dict(traffic.ignored),
+            "strangers": traffic.strangers,
+            "is_real_time": traffic.is_real_time,
+            "vented": traffic.vent_reason or None,
+            "vented_at": traffic.vented_at,
+            "is_stopped": traffic.is_stopped,
+            "failure": traffic.failure or None,
             "plant": self.plant.compiled_by,
             "machine": {name: getattr(self.machine, name) for name in HostComputer.__slots__},
         }
 
     def text(self) -> str:
         """Summary of the run as text."""
-        exchange, machine, late, after = self.exchange, self.machine, self.sent_late, self.answered_after
-        others = [*exchange.ignored.items(), ("of somebody else", exchange.strangers)]
-        silence = longest_silence(exchange.rows) * self.plant.period
+        traffic, machine, late, after = self.traffic, self.machine, self.delays, self.response_times
+        others = [*traffic.ignored.items(), ("of somebody else", traffic.strangers)]
+        silence = longest_silence(traffic.rows) * self.plant.period
         loads = "".join(
             f", load {load:.2f} {when}"
             for load, when in ((machine.load_before, "before"), (machine.load_after, "after"))
             if load is not None
         )
-        still = exchange.stood_still
-        stood = f"stood still {len(still)} times, {sum(still):.3g} s in all" if still else "never stood still"
+        pauses = traffic.pauses
+        pause_text = f"stood still {len(pauses)} times, {sum(pauses):.3g} s in all" if pauses else "never stood still"
         lines = [
             f"samples    {len(late)} sent, {len(after)} answered, {len(late) - len(after)} missed; "
             f"longest silence {silence * _PER_THOUSAND:.3g} ms",
@@ -117,18 +117,18 @@ class HardwareRun:
                 (
                     f"answers    {described_spread(after)}",
                     f"sent late  {described_spread(late)}",
-                    f"time       {stood}",
+                    f"time       {pause_text}",
                 )
-                if exchange.is_real_time
+                if traffic.is_real_time
                 else ("time       in lock step with the answers",)
             ),
-            f"dropped    {wire.described_refusals(exchange.refused, others)}",
+            f"dropped    {wire.described_refusals(traffic.refused, others)}",
             f"machine    {machine.cores} cores{loads}; {machine.system}, Python {machine.python}",
             f"plant      {self.plant.compiled_by}",
         ]
-        if exchange.vented:
-            lines.append(f"VENTED     at {exchange.vented_at:.6g} s: {exchange.vented}")
-        return "\n".join([*lines, *([f"port       {exchange.failure}"] if exchange.failure else [])])
+        if traffic.vent_reason:
+            lines.append(f"VENTED     at {traffic.vented_at:.6g} s: {traffic.vent_reason}")
+        return "\n".join([*lines, *([f"port       {traffic.failure}"] if traffic.failure else [])])
 
     def files(self) -> dict[str, bytes]:
         """Additional files of the result by name."""
@@ -136,30 +136,30 @@ class HardwareRun:
         buffer = io.StringIO()
         writer = csv.writer(buffer, lineterminator="\n")
         writer.writerow(LOG_COLUMNS)
-        for row in self.exchange.rows:
+        for row in self.traffic.rows:
             stamp = "" if row.controller_time is None else repr(row.controller_time / wire.MICROSECONDS)
-            times = ("" if value is None else repr(value) for value in (row.sent_late, row.answered_after))
+            times = ("" if value is None else repr(value) for value in (row.delay, row.response_time))
             writer.writerow([row.sequence, repr(row.due), *times, repr(row.command), stamp, int(row.is_vented)])
-        found = {
+        files = {
             "log.csv": buffer.getvalue().encode(),
             "link.json": f"{json_text(self.document())}\n".encode(),
         }
-        if self.exchange.is_real_time:
+        if self.traffic.is_real_time:
             figure = render_figure(self.plot(), ("png", "svg"))
-            found |= {f"link.{form}": content for form, content in figure.items()}
-        vented_at = self.exchange.vented_at
+            files |= {f"link.{form}": content for form, content in figure.items()}
+        vented_at = self.traffic.vented_at
         if vented_at is not None and len(before := self.result.recording.time[self.result.recording.time < vented_at]):
             # A fit wants the part in which the controller acted.
-            found["until-vented.csv"] = marked_csv_bytes(self.result.recording.between(0.0, float(before[-1])))
-        return found
+            files["until-vented.csv"] = marked_csv_bytes(self.result.recording.between(0.0, float(before[-1])))
+        return files
 
     def plot_signals(self) -> "Figure":
         """Figure of the signals of the run, with the reason of venting below."""
-        exchange, status = self.exchange, self.result.status
+        traffic, status = self.traffic, self.result.status
         vented = (
             ""
-            if exchange.vented_at is None
-            else f"vented (command 2) from {exchange.vented_at:.6g} s on: {exchange.vented}"
+            if traffic.vented_at is None
+            else f"vented (command 2) from {traffic.vented_at:.6g} s on: {traffic.vent_reason}"
         )
         remark = vented if status.is_completed else status.message
         with shown_in(self.plant.scenario.device.shown):
@@ -168,17 +168,17 @@ class HardwareRun:
     def plot(self) -> "Figure":
         """Histograms of sending delays and response times."""
         period, load = self.plant.period * _PER_THOUSAND, self.machine.load_after
-        sent_late, answered_after = self.sent_late, self.answered_after
+        delays, response_times = self.delays, self.response_times
         beside = "" if load is None else f"; load {load:.2f} on {self.machine.cores} cores"
         with house_style():
             figure, ((late, after),) = figure_of_free_panels(
                 (7.2, 3.3), FigureMargins(0.75, 0.2, 0.8, 0.85, 0.5, 0.7), 1, 2
             )
             figure.text(0.017, 0.97, f"{self.plant.scenario.name}: the link", va="top", fontsize=13, fontweight="bold")
-            missed = f"{len(sent_late) - len(answered_after)} of {len(sent_late)} samples missed"
+            missed = f"{len(delays) - len(response_times)} of {len(delays)} samples missed"
             figure.text(0.017, 0.03, f"Dashed: one sample, {period:g} ms. {missed}{beside}", va="bottom", fontsize=9)
-            _histogram(late, sent_late, "Samples, after they were due")
-            _histogram(after, answered_after, "Answers, after their sample")
+            _histogram(late, delays, "Samples, after they were due")
+            _histogram(after, response_times, "Answers, after their sample")
             late.set_ylabel("Samples")
             for axes in (late, after):
                 axes.axvline(period, color=VERMILION, linewidth=1.0, linestyle="--")
@@ -209,7 +209,7 @@ def longest_silence(rows: Sequence[LogRow]) -> int:
     """Return the largest number of consecutive samples that were sent and not answered."""
     longest = current = 0
     for row in rows:
-        current = current + 1 if row.answered_after is None and row.sent_late is not None else 0
+        current = current + 1 if row.response_time is None and row.delay is not None else 0
         longest = max(longest, current)
     return longest
 

@@ -3,15 +3,18 @@
 The plant runs in this process; docs/decisions/0022-processor-and-hardware-in-the-loop.md explains the reasons.
 """
 
+import gc
 import os
 import platform
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from ppafo.engine.run import batch_of
-from ppafo.exports.hil import wire
-from ppafo.exports.hil.loop import Bench, LoopPacing, without_collections
+from ppafo.exports.hil.loop import Bench
+from ppafo.exports.hil.pacing import LoopPacing
 from ppafo.exports.hil.plant import CompiledPlant
+from ppafo.exports.hil.ports import Port
 from ppafo.exports.hil.result import HardwareRun, HostComputer
 from ppafo.simulation.sampled import SampledRun
 from ppafo.simulation.simulate import result_of
@@ -24,7 +27,7 @@ _LARGEST_RUN = 2**16 - 1
 
 def run_plant(
     plant: CompiledPlant,
-    port: wire.Port,
+    port: Port,
     pace: Callable[[float], LoopPacing],
     patience: float = PATIENCE,
     is_stopped: Callable[[], bool] = lambda: False,
@@ -37,25 +40,39 @@ def run_plant(
     """
     # Not from a seed: packets of an earlier run that are still under way must have another number.
     number = random.SystemRandom().randint(0, _LARGEST_RUN) if run is None else run
-    load_before = load_now()
+    load_before = _load_now()
     # Built before the clock starts: arrays and programs take milliseconds.
     sampled = SampledRun(batch_of(plant.run), plant.module)
-    with without_collections():
+    with _without_collections():
         exchange = Bench(sampled, plant.period, port, pace(plant.period), number).run(patience, is_stopped)
     machine = HostComputer(
         system=f"{platform.system()} {platform.machine()}",
         cores=os.cpu_count() or 1,
         python=platform.python_version(),
         load_before=load_before,
-        load_after=load_now(),
+        load_after=_load_now(),
     )
     result = result_of(plant.scenario, plant.run, sampled.result())
     return HardwareRun(plant, result, exchange, machine)
 
 
-def load_now() -> float | None:
+def _load_now() -> float | None:
     """Mean number of running processes over the last minute [-]; None if the system does not provide it."""
     try:
         return os.getloadavg()[0]
     except (AttributeError, OSError):
         return None
+
+
+@contextmanager
+def _without_collections() -> Iterator[None]:
+    """Disable Python's garbage collection, which takes milliseconds, within a ``with`` block."""
+    was_on = gc.isenabled()
+    # Now, so that nothing is left to collect for long.
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()

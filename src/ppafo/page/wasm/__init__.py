@@ -1,9 +1,9 @@
-"""WebAssembly modules of scenarios and walks, for pages that simulate: interface and description.
+"""WebAssembly modules of scenarios and walks, for pages that simulate: interface and programs.
 
-``module_of(scenario)`` returns the ``wasm`` bytes and a ``description``, plain data for JSON on each setting, channel
-and metric. A module imports nothing. It needs 128-bit vectors, which every browser in use supports; without them
-``WebAssembly.validate`` returns false. All numbers are 64-bit floats in SI units, pressures absolute. All arguments
-and results are 32-bit integers; pointers are byte offsets from the start of ``memory``.
+``module_of(scenario)`` returns the ``wasm`` bytes and a ``description`` of settings, channels and metrics
+(``description.py``). A module imports nothing. It needs 128-bit vectors, which every browser in use supports; without
+them ``WebAssembly.validate`` returns false. All numbers are 64-bit floats in SI units, pressures absolute. All
+arguments and results are 32-bit integers; pointers are byte offsets from the start of ``memory``.
 
 Memory
     ``reserve(bytes)`` returns a 16-byte aligned pointer to a block of this size, or 0 if memory is exhausted. The
@@ -33,250 +33,37 @@ Statuses: 0 completed, 1 diverged, 2 diverged in too many parts of a step, 3 ref
 Every sample of every channel is bit-identical to ``ppafo.simulate`` for the same settings. Metrics differ by rounding,
 as in an ensemble. Each instance has its own memory; create one for each worker. A module is compiled from a C
 translation unit by ziglang, or taken from an earlier compilation of the same text.
-
-Description of a module as plain data for JSON: settings with range, unit and origin, channels and metrics.
-
-::
-
-    {"name": ..., "title": ..., "version": ..., "kind": "scenario" or "walk",
-     "document": the scenario or walk as its file has it, without overrides,
-     "overrides": overrides of the scenario or walk,
-     "settings": [{"key": "valve.area", "group": "valve", "name": "area", "unit": "m^2", "value": 1.26e-05,
-                   "minimum": 0.0 or null, "is_minimum_allowed": true, "maximum": 0.01 or null, "is_whole": false,
-                   "display": {"unit": "mm^2", "factor": 1e-06, "zero": 0.0}, "description": ..., "origin": "published",
-                   "source": ..., "note": ..., "half_width": 95 % interval in SI or null,
-                   "follows": key or null,
-                   "made": {"terms": [{"rule": ..., "sources": [keys]}], "gap": ..., "when_set": false} or null,
-                   "kept": "zero", "above zero" or null}, ...],
-     "channels": [{"name": "time", "unit": "s", "display": {...}, "description": ...}, ...],
-     "metrics": [{"name": ..., "unit": ..., "display": {...}, "description": ...}, ...],
-     "relations": [{"key": ..., "relation": "below", "at most", "at least" or "above", "other": key,
-                    "tolerance": 0.0, "is_share": true for a tolerance that is a fraction of the other}, ...]}
-
-``key=value unit`` is an override of the scenario, as in ``ppafo simulate --set``. A value in SI is ``zero`` plus
-``factor`` times the displayed value. ``origin`` is the origin stated by the parameter set (published, datasheet,
-derived, identified, fitted, assumed), ``task`` for a number of the scenario itself, ``default`` for a number that is
-not given, or ``changed`` for a number set by an override or a caller. A setting with ``follows`` equals the named
-setting until changed itself. A setting with ``made`` is the sum of a gap and of rules applied to other settings.
-``kept`` requires a setting to stay 0, or above 0; otherwise another program would be needed.
 """
 
-import contextlib
 import hashlib
 import importlib.util
 import json
-import math
 import re
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 from ppafo.engine.cache.texts import kept_bytes
 from ppafo.engine.package_key import COMPOSED, Key, package_key
-from ppafo.errors import PpafoError, ProgramError
+from ppafo.errors import ProgramError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.conditions import conditions_of, conditions_of_program
 from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, places_of
-from ppafo.exports.c_library.files import OUTPUTS, run_words
-from ppafo.exports.c_library.library import ExportParameter, Library, c_identifier
-from ppafo.model.controlled import CONTROLLED
-from ppafo.parameters import ParameterSet
-from ppafo.parameters.device import Device
-from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
-from ppafo.parameters.overrides import one_path, read_overrides
-from ppafo.parameters.parameter_set import SOURCE, atmospheric_pressure, entry_in_si
-from ppafo.report.display_units import display_unit
-from ppafo.simulation.building import parameter_set_of
-from ppafo.simulation.clock import TIMES
-from ppafo.simulation.declaration import LOCKED_ANGLE, SEED
-from ppafo.simulation.document import value_at
-from ppafo.simulation.motion_kind import VANE, WALK
-from ppafo.simulation.overrides import is_of_device
+from ppafo.exports.c_library.files import run_words
+from ppafo.exports.c_library.library import Library
+from ppafo.page.wasm.description import description_of
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.files import temporary_folder
 from ppafo.translation.compiling import asked, complaint
-from ppafo.units import split_pressure_kind, to_si
-from ppafo.units.shown import quantity_of_unit
 from ppafo.version import __version__
 
-_KINDS = {VANE: "scenario", WALK: "walk"}
-"""Name of each kind of simulation on a page."""
-_TASK = {"origin": "task", "source": "", "note": "", "half_width": None}
-_CHANGED = {**_TASK, "origin": "changed"}
-_DEFAULT = {**_TASK, "origin": "default"}
-
-
-def description_of(scenario: Scenario, library: Library) -> dict[str, Any]:
-    """Return the description of the module of a scenario or walk, in the form given in the module docstring."""
-    keys = {setting.name: setting.path for setting in library.settings}
-    origins, kept = _origins(scenario, library), _kept(library)
-    # Settings that have the number of another until they are changed by themselves.
-    follows = {path: links[0].sources[0] for path, links in library.links.items() if links[0].is_same}
-    # Settings that rules make of others until they are changed by themselves; a rule has the name of its function.
-    # The page has the rules of a loop of torque: gains in 1/Pa have others under these names, and stay as they are.
-    own = f"{scenario.controlled}." if CONTROLLED[scenario.controlled].unit.startswith("Pa") else ""
-    made = {
-        path: {
-            "terms": [
-                {
-                    "rule": f"{own}{term.function.__module__.rpartition('.')[2]}.{term.function.__name__}",
-                    "sources": list(term.sources),
-                }
-                for term in links[0].terms
-            ],
-            "gap": links[0].gap,
-            "when_set": links[0].when_set,
-        }
-        for path, links in library.links.items()
-        if any(term.function is not itself for term in links[0].terms)
-    }
-    program, atmosphere = library.program, scenario.device.supply.atmospheric_pressure
-    channels = {"time": ("s", "since the start"), **{name: OUTPUTS[name] for name in program.outputs}}
-    return {
-        "name": library.title,
-        "title": library.description,
-        "version": __version__,
-        "kind": _KINDS[scenario.motion.motion_kind.layout],
-        "document": dict(scenario.origin.content),
-        "overrides": list(scenario.origin.overrides),
-        "settings": [
-            {
-                **_setting(setting, atmosphere),
-                **origins[setting.path],
-                "follows": follows.get(setting.path),
-                "made": made.get(setting.path),
-                "kept": kept.get(setting.name),
-            }
-            for setting in library.settings
-        ],
-        "channels": [_shown(name, unit, said, atmosphere) for name, (unit, said) in channels.items()],
-        "metrics": [_shown(kind.name, kind.unit, kind.summary, atmosphere) for kind in program.metrics],
-        "relations": [
-            {
-                "key": keys[rule.name],
-                "relation": rule.relation,
-                "other": keys[rule.other],
-                "tolerance": rule.tolerance,
-                "is_share": rule.is_share,
-            }
-            for rule in library.relations
-        ],
-    }
-
-
-def _kept(library: Library) -> dict[str, str]:
-    """Settings, by C name, that must stay zero or above zero: the only positive setting of a switch is fixed."""
-    values = {setting.name: setting.value for setting in library.settings}
-    kept: dict[str, str] = {}
-    for names, is_above in library.switches:
-        above = [name for name in names if values[name] > 0.0]
-        if not is_above:
-            kept |= dict.fromkeys(names, "zero")
-        elif len(above) == 1:
-            kept[above[0]] = "above zero"
-    return kept
-
-
-def _setting(setting: ExportParameter, atmosphere: float) -> dict[str, Any]:
-    quantity = setting.quantity
-    group, _, name = setting.path.rpartition(".")
-    return {
-        "key": setting.path,
-        "group": group,
-        "name": name,
-        "unit": quantity.unit,
-        "value": setting.value,
-        "minimum": quantity.minimum if math.isfinite(quantity.minimum) else None,
-        "is_minimum_allowed": quantity.minimum_allowed,
-        "maximum": quantity.maximum if math.isfinite(quantity.maximum) else None,
-        "is_whole": name == SEED.name,
-        "display": display_of(quantity.unit, atmosphere, is_absolute=setting.path == ATMOSPHERE_PATH),
-        "description": quantity.summary or quantity.name,
-    }
-
-
-def _shown(name: str, unit: str, said: str, atmosphere: float) -> dict[str, Any]:
-    bare = "" if unit in ("-", "1") else unit
-    return {"name": name, "unit": bare, "display": display_of(bare, atmosphere, "gas mass"), "description": said}
-
-
-def display_of(unit: str, atmosphere: float, kilograms: str = "mass", is_absolute: bool = False) -> dict[str, Any]:
-    """Return the display unit of a quantity and its conversion: SI value = ``zero`` + ``factor`` * displayed value.
-
-    Pressures are gauge pressures relative to ``atmosphere`` [Pa], unless ``is_absolute``; ``kilograms`` is the kind of
-    quantity of a mass.
-    """
-    quantity = kilograms if unit == "kg" else quantity_of_unit(unit)
-    if not quantity:
-        return {"unit": unit, "factor": 1.0, "zero": 0.0}
-    shown = display_unit(quantity)
-    if quantity.startswith("pressure"):
-        is_change = quantity == "pressure change"
-        bare, kind = (shown, "") if is_change else split_pressure_kind(shown)
-        factor, is_absolute = to_si(1.0, f"{bare}_d", "Pa_d"), is_absolute or kind == "a"
-        return {
-            "unit": bare if is_change else f"{bare}_a" if is_absolute else f"{bare}_g",
-            "factor": factor,
-            "zero": 0.0 if is_change or is_absolute else atmosphere,
-        }
-    zero = to_si(0.0, shown, unit)
-    return {"unit": shown, "factor": to_si(1.0, shown, unit) - zero, "zero": zero}
-
-
-def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
-    """Return the origin of each setting's value, by path."""
-    origin, device = scenario.origin, scenario.device
-    # None where the set cannot be read any more.
-    parameter_set: ParameterSet | None = None
-    with contextlib.suppress(PpafoError):
-        parameter_set = parameter_set_of(origin)
-    assumed = {assumption.path: assumption.note for assumption in scenario.assumptions}
-    changed = {
-        c_identifier(one_path(override.typed, device.valve_name)) for override in read_overrides(origin.overrides)
-    }
-    origins: dict[str, dict[str, Any]] = {}
-    for setting in library.settings:
-        if setting.name in changed:
-            origins[setting.path] = dict(_CHANGED)
-        elif is_of_device(setting.path):
-            origins[setting.path] = dict(_of_set(parameter_set, device, setting, follows=setting.path in library.links))
-        else:
-            # Times and the angle of a locked vane have no key of their own in every file, and are the task's anyway.
-            is_given = value_at(origin.content, setting.path) is not None or setting.path in (*TIMES, LOCKED_ANGLE)
-            origins[setting.path] = dict(_TASK if is_given else _DEFAULT)
-        if setting.path in assumed and setting.name not in changed:
-            origins[setting.path] |= {"origin": "assumed", "note": assumed[setting.path]}
-    return origins
-
-
-def _of_set(
-    parameter_set: ParameterSet | None, device: Device, setting: ExportParameter, *, follows: bool
-) -> dict[str, Any]:
-    """Return the origin of a device number: from the set if unchanged, ``default`` if it ``follows`` another."""
-    if parameter_set is None:
-        return _CHANGED
-    path = setting.path
-    if path.startswith("valve."):
-        path = f"valves.{device.valve_name}.{path.removeprefix('valve.')}"
-    entry, declared = parameter_set.numbers.get(path), parameter_set.declarations().get(path)
-    if entry is None or declared is None:
-        return _DEFAULT if follows or setting.value == setting.quantity.default else _CHANGED
-    if entry_in_si(entry, declared, atmospheric_pressure(parameter_set)) != setting.value:
-        return _CHANGED
-    if entry.source == SOURCE:
-        return _TASK
-    unit, si, half = entry.unit, setting.quantity.unit, None
-    if si == "Pa_a":
-        # Half of an interval is a difference, also of a level.
-        unit, si = f"{unit[:-2]}_d", "Pa_d"
-    if entry.uncertainty is not None:
-        half = to_si(entry.uncertainty, unit, si)
-    return {"origin": entry.origin, "source": entry.source, "note": entry.note, "half_width": half}
-
+if TYPE_CHECKING:
+    from ppafo.exports.c_library.program import ComposedLibrary
 
 LANES = 8
 """Number of runs computed together; with more, their numbers would not fit the registers used by current browsers."""
@@ -302,7 +89,8 @@ _WRITERS = ("exports", "gait", "page", "parameters", "simulation", "translation"
 """Package folders that contribute to the C text of a module, in addition to the folders of a program."""
 WRITTEN_BY = (*COMPOSED, *_WRITERS)
 SHIPPED_KEYS = "shipped.json"
-"""File with the program digest of each bundled scenario and walk, and the package files for which it is valid."""
+"""File with the program digest of each bundled scenario and walk, by its description and by the outline of its text,
+and the package files for which these are valid."""
 _OF_THE_COMPUTER = "ppafo.translation.native"
 """Module whose values depend on the compilers and processor of this computer and enter no C text."""
 
@@ -313,30 +101,17 @@ def program_of(library: Library, scenario: Scenario) -> bytes:
     C text and module are cached on disk.
     """
     key = package_key(scenario, WRITTEN_BY)
+    shipped = {} if key is None else _shipped_digests(key)
     if key is None:
-        digest = _known_digest(library)
-    elif not (digest := _shipped_digest(key)):
+        digest = _known_digest(library, shipped)
+    elif not (digest := shipped.get(short_digest(key.described), "")):
         words = "\n".join([__version__, *FLAGS, key.words])
-        digest = kept_bytes("module", words, lambda: _known_digest(library).encode()).decode()
+        digest = kept_bytes("module", words, lambda: _known_digest(library, shipped).encode()).decode()
     prebuilt = prebuilt_programs().get(digest)
     if prebuilt is not None:
         return _PROGRAMS.joinpath(prebuilt).read_bytes()
     check_can_build()
-    return kept_bytes("wasm", f"{digest} {compiler_version()}", lambda: build(source_of(library)))
-
-
-def _shipped_digest(key: Key) -> str:
-    """Return the stored digest of a bundled scenario's C text; empty for others, and after any change of code."""
-    shipped = _shipped_keys()
-    is_as_shipped = key.files == shipped["files"] and all(
-        shipped["values"].get(module) == value for module, value in key.values.items() if module != _OF_THE_COMPUTER
-    )
-    return str(shipped["digests"].get(short_digest(key.described), "")) if is_as_shipped else ""
-
-
-def short_digest(described: str) -> str:
-    """Return a short hash of a scenario description."""
-    return hashlib.sha256(described.encode()).hexdigest()[:16]
+    return kept_bytes("wasm", f"{digest} {compiler_version()}", lambda: build(source_of(library, compose(library))))
 
 
 @cache
@@ -346,29 +121,61 @@ def _shipped_keys() -> dict[str, Any]:
     return keys
 
 
-def _known_digest(library: Library) -> str:
-    """Return the digest of a library's C text, which does not depend on the values of its settings."""
-    from ppafo.exports.c_library.program import outline_of  # most digests are kept
+def _shipped_digests(key: Key) -> Mapping[str, str]:
+    """Return the stored digests of C texts by scenario description and by outline; empty after any change of code."""
+    shipped = _shipped_keys()
+    is_as_shipped = key.files == shipped["files"] and all(
+        shipped["values"].get(module) == value for module, value in key.values.items() if module != _OF_THE_COMPUTER
+    )
+    digests: Mapping[str, str] = shipped["digests"] if is_as_shipped else {}
+    return digests
 
+
+def short_digest(described: str) -> str:
+    """Return a short hash of a scenario description or of an outline."""
+    return hashlib.sha256(described.encode()).hexdigest()[:16]
+
+
+def _known_digest(library: Library, shipped: Mapping[str, str]) -> str:
+    """Return the digest of a library's C text, which does not depend on the values of its settings.
+
+    ``shipped`` has digests by outline that are valid for the package as it is.
+    """
+    composed = compose(library)
+    outline = outline_of_unit(library, composed)
+    if digest := shipped.get(short_digest(outline)):
+        return digest
     # What decides the translation unit: what its functions are made from, and what translates them.
-    names = [setting.name for setting in library.settings]
-    outline = _unit(library, outline_of(library.program, names, library.further, LANES))
     translators = [*(files("ppafo.translation").iterdir()), *(files("ppafo.exports.c_library").iterdir()), __file__]
     contents = {Path(str(file)).name: Path(str(file)).read_bytes() for file in translators if Path(str(file)).is_file()}
     hashes = [f"{name} {hashlib.sha256(content).hexdigest()}" for name, content in sorted(contents.items())]
     return kept_bytes(
         "digest",
         "\n".join([__version__, *hashes, *FLAGS, template(__name__, "math.h"), outline]),
-        lambda: digest_of(source_of(library)).encode(),
+        lambda: digest_of(source_of(library, composed)).encode(),
     ).decode()
 
 
-def source_of(library: Library) -> str:
-    """Return the C translation unit of a library, which does not contain the values of settings."""
+def compose(library: Library) -> "ComposedLibrary":
+    """Return the functions of a library, composed from their Python sources."""
+    from ppafo.exports.c_library.program import composed_library  # most digests are kept
+
+    return composed_library(library.program, library.further, LANES)
+
+
+def outline_of_unit(library: Library, composed: "ComposedLibrary") -> str:
+    """Return the translation unit of a library with its functions still untranslated, which determines its C text."""
+    from ppafo.exports.c_library.program import outline_of
+
+    return _unit(library, outline_of(library.program, composed, [setting.name for setting in library.settings]))
+
+
+def source_of(library: Library, composed: "ComposedLibrary") -> str:
+    """Return the C translation unit of a composed library, which does not contain the values of settings."""
     from ppafo.exports.c_library.program import c_text
 
     names = [setting.name for setting in library.settings]
-    return _unit(library, c_text(library.program, _TITLE, names, library.further, LANES))
+    return _unit(library, c_text(library.program, composed, _TITLE, names))
 
 
 def _unit(library: Library, functions: str) -> str:

@@ -167,7 +167,7 @@ def test_a_remedy_that_is_said_was_tried() -> None:
     remarks = compare({"beyond": beyond, "paper": ppafo.load_scenario("torque-task-proportional")}).found.remarks
     said = next(text for text in remarks if text.startswith("beyond"))
     assert "with `supply.pressure = " in said
-    assert "it does, as a further run shows; it is not among the best" in said
+    assert "it follows, as a further run shows; it is not among the best" in said
 
 
 def test_mistakes_are_one_line() -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from ppafo.errors import ParameterError
-from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, json_schema, list_bottles, load_bottle
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, list_bottles, load_bottle
+from ppafo.parameters.bottles.declaration import json_schema
 
 TEXT = (resources.files("ppafo.parameters.bottles") / "files" / f"{PAPER_BOTTLE}.toml").read_text(encoding="utf-8")
 

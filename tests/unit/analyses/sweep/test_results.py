@@ -11,7 +11,7 @@ import pytest
 from ppafo.analyses.sweep.answer import finding_of, load_study_results
 from ppafo.analyses.sweep.results import StudyResults
 from ppafo.analyses.sweep.solve import describe, sorted_quantiles, sweep
-from ppafo.errors import DataError, StudyError
+from ppafo.errors import ArgumentError, DataError, StudyError
 from ppafo.report.style import render_figure
 
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.777, 0.95, 1.0)
@@ -83,7 +83,7 @@ def test_results_do_what_everything_solved_does(small_results: StudyResults, tmp
     page = (tmp_path / "saved" / "report.html").read_text(encoding="utf-8")
     assert "of their normal scores" in page
     assert "Sampled by sobol: 8 draws, seed 3." in page
-    with pytest.raises(LookupError, match="there is no figure 'pareto'; available: figure"):
+    with pytest.raises(ArgumentError, match="a result of 'sweep' has no figure 'pareto': available are figure"):
         finding.plot("pareto")
 
 

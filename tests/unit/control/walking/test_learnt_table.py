@@ -12,7 +12,7 @@ from ppafo.control.walking.learning import (
     command_at,
     learn,
     next_table,
-    place_in_table,
+    table_position,
 )
 
 PLACES = np.linspace(-2.0, KNOTS + 1.0, 701)
@@ -54,8 +54,8 @@ def test_knots_stay_commands_that_a_valve_can_carry_out() -> None:
 
 def test_the_table_lies_over_the_profile_and_learns_a_lead_later_than_it_is_read() -> None:
     profile = TorqueProfile(5.0, 0.5, 0.2, 0.1)
-    assert place_in_table(profile, 0.3 * 1.2, 1.2) == pytest.approx(0.0)
-    assert place_in_table(profile, 0.6 * 1.2, 1.2) == pytest.approx(KNOTS - 1.0)
+    assert table_position(profile, 0.3 * 1.2, 1.2) == pytest.approx(0.0)
+    assert table_position(profile, 0.6 * 1.2, 1.2) == pytest.approx(KNOTS - 1.0)
     rules = LearningRules(learning_gain=0.5, forgetting=0.0, lead=0.03)
     knot_time = 0.3 * 1.2 / (KNOTS - 1.0)
     since_strike = 0.3 * 1.2 + 6.0 * knot_time + rules.lead

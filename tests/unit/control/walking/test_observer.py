@@ -5,7 +5,7 @@ import math
 import pytest
 
 from ppafo.control.walking import fault_flags, observer
-from ppafo.control.walking.observer import NominalDevice
+from ppafo.control.walking.nominal_device import NominalDevice, volumes
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.valves.kind import VENT
 from ppafo.walking.loading import load_walk
@@ -63,7 +63,7 @@ def test_a_valve_that_is_not_known_leaves_the_observer_off() -> None:
 
 def found(nominal: NominalDevice, real: NominalDevice, commands: list[float], shown: float | None = None) -> float:
     """The first flag while a real device follows commands at a still angle; chamber 2 may show one pressure [Pa]."""
-    volume_1, volume_2 = observer.volumes(real, STANDS)
+    volume_1, volume_2 = volumes(real, STANDS)
     content_1, content_2 = ROOM * volume_1, ROOM * volume_2
     state, cause = observer.START, fault_flags.NOT_RAISED
     last = (ROOM, ROOM)
@@ -124,7 +124,7 @@ def test_gas_that_comes_or_stays_where_the_valve_vents_is_named() -> None:
     assert found(PAIR, PAIR, FILLS, 4.3e5) == fault_flags.VALVE_OPEN
     closes = PAIR._replace(nominal_flow=1.0e-9)
     half = [-1.0] * 60 + [VENT] * 200
-    volume = observer.volumes(PAIR, STANDS)[1]
+    volume = volumes(PAIR, STANDS)[1]
     state, content, cause = observer.START, ROOM * volume, fault_flags.NOT_RAISED
     for command in half:
         now = (ROOM, content / volume)
@@ -137,7 +137,7 @@ def test_gas_that_comes_or_stays_where_the_valve_vents_is_named() -> None:
 
 
 def test_a_closed_chamber_that_loses_gas_leaks() -> None:
-    volume = observer.volumes(SPOOL, STANDS)[1]
+    volume = volumes(SPOOL, STANDS)[1]
     state, content, cause = observer.START, ROOM * volume, fault_flags.NOT_RAISED
     for command in [-1.0] * 300 + [0.0] * 200:
         now = (ROOM, content / volume)
@@ -152,8 +152,8 @@ def test_a_closed_chamber_that_loses_gas_leaks() -> None:
 def test_no_movement_of_the_ankle_changes_a_content() -> None:
     state = observer.START._replace(command=0.0)
     for angle in (STANDS, FLEXES, math.radians(129.0), STANDS):
-        volume_1, volume_2 = observer.volumes(SPOOL, angle)
-        first, second = ROOM * observer.volumes(SPOOL, STANDS)[0], 3.0 * ROOM * observer.volumes(SPOOL, STANDS)[1]
+        volume_1, volume_2 = volumes(SPOOL, angle)
+        first, second = ROOM * volumes(SPOOL, STANDS)[0], 3.0 * ROOM * volumes(SPOOL, STANDS)[1]
         now = (first / volume_1, second / volume_2)
         state = observer.next_observer(SPOOL, state, angle, *now, angle, *now, PERIOD)
         assert state.chamber_2.content == pytest.approx(second)

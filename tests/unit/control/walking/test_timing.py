@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ppafo.control.walking import estimated_timing, phases, timing
-from ppafo.control.walking import timing as gait_clock
+from ppafo.control.walking import estimated_timing, fractional_timing, phases
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.control.walking.estimated_timing import EstimatedRules, LearntStride, Window
 from ppafo.control.walking.phases import PhaseRules
@@ -68,12 +67,12 @@ def late(clocks: list[Any], phase: Floats) -> Floats:
 
 
 def test_a_force_that_rises_evenly_is_detected_as_late_as_the_known_delays_say() -> None:
-    late_by = gait_clock.detection_delays(settings(timing.FRACTIONAL).delays, RULES, PERIOD)
+    late_by = fractional_timing.detection_delays(settings(fractional_timing.FRACTIONAL).delays, RULES, PERIOD)
     heel, toe = forces(np.arange(0.0, 1.0, PERIOD), 1.0)
     seen, times = phases.START, {}
     for sample, (on_heel, on_toe) in enumerate(zip(heel.tolist(), toe.tolist(), strict=True)):
         after = phases.timed_phase_state(RULES, seen, on_heel, on_toe, seen.since_strike + PERIOD, PERIOD)
-        marks = gait_clock.detected_events(seen, after)
+        marks = fractional_timing.detected_events(seen, after)
         times |= {name: sample * PERIOD for name, mark in marks._asdict().items() if mark > 0.5}
         seen = after
     for name, time in times.items():
@@ -83,12 +82,12 @@ def test_a_force_that_rises_evenly_is_detected_as_late_as_the_known_delays_say()
 
 def test_percent_of_gait_is_right_once_two_strides_were_seen() -> None:
     phase = np.arange(0.5, 8.0, PERIOD)
-    assert np.abs(late(followed(timing.FRACTIONAL, phase), phase)[3000:]).max() < 0.003
+    assert np.abs(late(followed(fractional_timing.FRACTIONAL, phase), phase)[3000:]).max() < 0.003
 
 
 def test_events_are_known_when_they_happen_and_not_when_they_are_detected() -> None:
     phase = np.arange(0.5, 8.0, PERIOD)
-    event = np.array([clock.event for clock in followed(timing.FRACTIONAL, phase)])
+    event = np.array([clock.event for clock in followed(fractional_timing.FRACTIONAL, phase)])
     for number, share in enumerate(TRUE.values()):
         known = np.flatnonzero((event[1:] == number) & (event[:-1] != number)) + 1
         true = np.flatnonzero(np.diff(np.floor(phase - share))) + 1
@@ -99,32 +98,35 @@ def test_events_are_known_when_they_happen_and_not_when_they_are_detected() -> N
 def test_the_clock_waits_for_who_stands() -> None:
     walking = np.arange(0.5, 5.25, PERIOD)
     phase = np.concatenate([walking, np.full(3000, 5.25)])
-    clock = followed(timing.FRACTIONAL, phase)[-1]
-    assert clock.fraction == pytest.approx(clock.come.heel_off + gait_clock.WAITS)
+    clock = followed(fractional_timing.FRACTIONAL, phase)[-1]
+    assert clock.fraction == pytest.approx(clock.event_fractions.heel_off + fractional_timing.WAITS)
 
 
 def test_a_strike_that_does_not_come_is_no_landing_for_ever() -> None:
     walking = np.arange(0.5, 5.9, PERIOD)
-    clocks = followed(timing.FRACTIONAL, np.concatenate([walking, np.full(500, 5.9)]))
+    clocks = followed(fractional_timing.FRACTIONAL, np.concatenate([walking, np.full(500, 5.9)]))
     swing = phases.START._replace(stride_time=1.0)
-    rules = settings(timing.FRACTIONAL)
-    lands = [timing.fractional_time(rules, clock, swing).lands for clock in clocks[-500:]]
+    rules = settings(fractional_timing.FRACTIONAL)
+    lands = [fractional_timing.fractional_time(rules, clock, swing).lands for clock in clocks[-500:]]
     assert lands[-1] == 0.0
-    assert sum(lands) * PERIOD == pytest.approx(gait_clock.WAITS, abs=2.0 * PERIOD)
+    assert sum(lands) * PERIOD == pytest.approx(fractional_timing.WAITS, abs=2.0 * PERIOD)
 
 
 def test_the_delay_of_the_valve_is_a_lead() -> None:
-    rules, clock = settings(timing.FRACTIONAL, valve_delay=0.03), gait_clock.CLOCK_START._replace(fraction=0.5)
+    rules, clock = (
+        settings(fractional_timing.FRACTIONAL, valve_delay=0.03),
+        fractional_timing.CLOCK_START._replace(fraction=0.5),
+    )
     stance = phases.START._replace(phase=MID_STANCE, stride_time=1.2)
-    assert timing.fractional_time(rules, clock, stance).since_strike == pytest.approx(0.5 * 1.2 + 0.03)
+    assert fractional_timing.fractional_time(rules, clock, stance).since_strike == pytest.approx(0.5 * 1.2 + 0.03)
 
 
 @pytest.mark.parametrize("even", [0.0, 1.0])
 def test_a_slow_valve_makes_no_strike_of_a_foot_that_hangs_after_an_odd_stride(even: float) -> None:
     """At 0.95 the clock waits there; 60 ms ahead is beyond the strike."""
-    strides = gait_clock.CLOCK_START.strides._replace(even=even)
-    clock = gait_clock.CLOCK_START._replace(fraction=0.95, strides=strides)
-    found = gait_clock.place_in_stride(clock, 0.06, phases.START._replace(stride_time=1.1))
+    strides = fractional_timing.CLOCK_START.strides._replace(even=even)
+    clock = fractional_timing.CLOCK_START._replace(fraction=0.95, strides=strides)
+    found = fractional_timing.phase_time(clock, 0.06, phases.START._replace(stride_time=1.1))
     assert found.lands == even
     assert (found.since_strike < 0.1) == (even > 0.5)
 
@@ -132,9 +134,9 @@ def test_a_slow_valve_makes_no_strike_of_a_foot_that_hangs_after_an_odd_stride(e
 @pytest.mark.parametrize("pace", [0.4, 0.5, 1.1, 2.4])
 @pytest.mark.parametrize("before", [0, 5])
 def test_the_second_stride_of_any_pace_sets_it_and_the_first_does_not(before: int, pace: float) -> None:
-    strides, found = gait_clock.CLOCK_START.strides, []
+    strides, found = fractional_timing.CLOCK_START.strides, []
     for taken in [1.1] * before + [pace, pace, pace]:
-        strides = gait_clock.next_strides(strides, True, True, True, taken, 1.1, 0.2)
+        strides = fractional_timing.next_strides(strides, True, True, True, taken, 1.1, 0.2)
         found.append(strides.mean_time)
     assert found[-3] == pytest.approx(1.1)
     assert found[-2:] == pytest.approx([pace, pace])
@@ -152,10 +154,13 @@ def test_the_time_since_a_strike_is_never_below_0_when_strides_become_quicker(ki
 def test_a_clock_that_a_strike_left_before_it_is_not_moved_where_nothing_is_estimated() -> None:
     rules, fraction = (
         settings(estimated_timing.ESTIMATED),
-        gait_clock.struck_fraction(0.9, 0.025, estimated_timing.KEEPS),
+        fractional_timing.struck_fraction(0.9, 0.025, estimated_timing.KEEPS),
     )
     assert fraction == pytest.approx(-0.075)
-    clock, at = estimated_timing.START._replace(next_knot=29.0), gait_clock.CLOCK_START._replace(fraction=fraction)
+    clock, at = (
+        estimated_timing.START._replace(next_knot=29.0),
+        fractional_timing.CLOCK_START._replace(fraction=fraction),
+    )
     measurement = GaitMeasurement(1.6, 1.0e5, 1.0e5, 0.0, 0.0, 0.0)
     found = estimated_timing.passed_knot(rules, clock, at, 0.0, measurement)
     assert (found.clock.fraction, found.moved) == (fraction, 0.0)
@@ -223,7 +228,7 @@ def test_an_estimate_follows_a_stride_that_becomes_quicker_before_it_ends() -> N
     steady = np.arange(0.5, 9.1, PERIOD)
     phase = np.concatenate([steady, 9.1 + np.arange(0.0, 0.85, 1.06 * PERIOD)])
     errors = {}
-    for kind in (timing.FRACTIONAL, estimated_timing.ESTIMATED):
+    for kind in (fractional_timing.FRACTIONAL, estimated_timing.ESTIMATED):
         errors[kind.name] = float(np.abs(late(followed(kind, phase, anchor_weight=0.0), phase)[-150:]).mean())
     assert errors["estimated"] < 0.7 * errors["fractional"]
 
@@ -240,7 +245,7 @@ def test_the_learnt_stride_is_the_gait_at_the_knots() -> None:
 def test_a_timing_changes_no_controller_without_a_time_in_the_stride() -> None:
     assert not keeps_time(WALKING_CONTROLLERS["off"])
     with pytest.raises(ScenarioError, match="uses no gait phase"):
-        with_timing(WALKING_CONTROLLERS["off"], timing.FRACTIONAL)
+        with_timing(WALKING_CONTROLLERS["off"], fractional_timing.FRACTIONAL)
     for kind in WALKING_CONTROLLERS.values():
         if keeps_time(kind):
             timed = [with_timing(kind, timing) for timing in TIMINGS.values()]

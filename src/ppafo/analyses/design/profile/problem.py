@@ -21,7 +21,7 @@ from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
-from ppafo.storage.result_folder import read_recording
+from ppafo.storage.reading import read_recording
 from ppafo.units import parse_quantity, split_quantity
 
 _TORQUE = "N m"
@@ -262,8 +262,8 @@ class SizingProblem:
     @property
     def torque_constant(self) -> float:
         """Torque constant of the actuator [m^3]."""
-        own = self.scenario.device.actuator.torque_constant
-        return own if self.actuator is None else self.actuator.values["torque_constant"]
+        constant = self.scenario.device.actuator.torque_constant
+        return constant if self.actuator is None else self.actuator.values["torque_constant"]
 
     @property
     def carried(self) -> tuple[Part, ...]:

@@ -1,0 +1,181 @@
+"""Argument values from text, as typed on the command line: numbers with and without a unit, times and tasks.
+
+The module imports nothing that is slow to load.
+"""
+
+import contextlib
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ppafo.errors import ArgumentError, UnitError
+from ppafo.units import SI, number_text, parse_quantity, split_number
+from ppafo.units.shown import units_beside
+
+NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCII)
+"""Number without a unit."""
+EXAMPLES = {
+    "kg": ("a mass", ("g", "kg")),
+    "m": ("a length", ("cm", "m")),
+    "s": ("a time", ("ms", "s", "min")),
+    "N m": ("a torque", ("N m",)),
+    "Pa_a": ("a pressure", ("psi_g", "kPa_a")),
+    "kg/s": ("a flow", ("g/s",)),
+    "m^3": ("a volume", ("cm^3",)),
+    "m/s": ("a speed", ("m/s", "km/h")),
+    "Hz": ("a frequency", ("Hz",)),
+    "rad": ("an angle", ("deg", "rad")),
+}
+"""Description and usual units of each quantity, by SI unit."""
+_SHOWN_AS_GIVEN = ("Pa_a", "N m", "kg/s", "m^3")
+"""SI units of quantities displayed in the unit in which they were given, since usage differs between laboratories."""
+MAXIMUM_DIGITS = 40
+"""Maximum number of digits of a whole number; a seed of 128 bits has 39."""
+
+
+@dataclass(frozen=True, slots=True)
+class NumberRange:
+    """Range of numbers from ``lowest`` (included) or ``above`` (excluded) to ``highest`` (included)."""
+
+    lowest: float = -math.inf
+    above: float = -math.inf
+    highest: float = math.inf
+
+    def __contains__(self, value: float) -> bool:
+        """Return True if a number is in the range; False for nan."""
+        return self.lowest <= value <= self.highest and value > self.above
+
+    def words(self, unit: str) -> str:
+        """Return the range as text, such as ``above 0 s, at most 3600 s``; empty for an unlimited range."""
+        limits = (("above", self.above), ("at least", self.lowest), ("at most", self.highest))
+        return ", ".join(f"{words} {limit:g} {unit}".rstrip() for words, limit in limits if math.isfinite(limit))
+
+
+ANY = NumberRange()
+ABOVE_ZERO = NumberRange(above=0.0)
+FROM_ZERO = NumberRange(lowest=0.0)
+
+
+class NumberWithUnit(float):
+    """Number in SI that remembers the unit in which it was given, for display."""
+
+    __slots__ = ("unit",)
+    unit: str
+
+    def __new__(cls, value: float, unit: str) -> "NumberWithUnit":
+        """Return the number with its unit."""
+        number = super().__new__(cls, value)
+        number.unit = unit
+        return number
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return the constructor and its arguments for copy and pickle."""
+        return NumberWithUnit, (float(self), self.unit)
+
+
+def whole_number(text: str) -> int:
+    """Return a whole number, 0 or more; ArgumentError for any other text."""
+    return _whole_from(text, 0)
+
+
+def counting_number(text: str) -> int:
+    """Return a whole number, 1 or more; ArgumentError for any other text."""
+    return _whole_from(text, 1)
+
+
+def _whole_from(text: str, lowest: int) -> int:
+    # Separators of digit groups are allowed; isdecimal alone would accept the digits of any script.
+    digits = text.replace("_", "").replace(",", "")
+    is_usable = digits.isascii() and digits.isdecimal() and len(digits) <= MAXIMUM_DIGITS
+    if not is_usable or int(digits) < lowest:
+        raise ArgumentError(f"{text}: must be a whole number, {lowest} or more, of at most {MAXIMUM_DIGITS} digits")
+    return int(digits)
+
+
+def number(text: str) -> float:
+    """Return a number without a unit; ArgumentError for any other text."""
+    try:
+        return float(number_text(text))
+    except ValueError as error:
+        raise ArgumentError(f"{text}: must be a number") from error
+
+
+def fraction(text: str) -> float:
+    """Return a number from 0 to 1 from a text such as ``0.02`` or ``2%``; ArgumentError for any other text."""
+    with contextlib.suppress(ValueError):
+        value = float(number_text(text.removesuffix("%"))) / (100.0 if text.endswith("%") else 1.0)
+        if 0.0 <= value <= 1.0:
+            return value
+    raise ArgumentError(f"{text}: must be a number from 0 to 1, or a percentage")
+
+
+def quantity(si_unit: str, allowed: NumberRange = ANY) -> Callable[[str], float]:
+    """Return a converter of texts with a unit, such as ``10 min``, to numbers in SI; ArgumentError for other texts.
+
+    A number without unit is refused with examples; a number outside the range is refused.
+    """
+
+    def value_of(text: str) -> float:
+        # The examples for a number without unit are the same number in usual units.
+        if si_unit in EXAMPLES and NUMBER.fullmatch(text.strip()):
+            description, units = EXAMPLES[si_unit]
+            examples = " or ".join(f"'{text.strip()} {unit}'" for unit in units)
+            raise ArgumentError(f"{text}: {description} needs its unit: {examples}")
+        try:
+            value = parse_quantity(text, si_unit)
+        except UnitError as error:
+            raise ArgumentError(f"{text}: {error}") from error
+        if value not in allowed:
+            raise ArgumentError(f"{text}: must be {allowed.words(si_unit)}")
+        return NumberWithUnit(value, split_number(text)[1]) if si_unit in _SHOWN_AS_GIVEN else value
+
+    return value_of
+
+
+def minutes(text: str) -> float:
+    """Return a time [min] from a number or a text with unit; ArgumentError for any other text."""
+    try:
+        value = float(text) if NUMBER.fullmatch(text) else parse_quantity(text, "s") / 60.0
+    except UnitError as error:
+        raise ArgumentError(f"{text!r}: must be a number of minutes, or a time such as '90 s': {error}") from error
+    if not 0.0 < value < math.inf:
+        raise ArgumentError(f"{text}: must be above 0 min, and finite")
+    return value
+
+
+def times(text: str) -> tuple[float, ...]:
+    """Return times [s] from a comma-separated list; ArgumentError for any other text."""
+    with contextlib.suppress(ValueError):
+        seconds = tuple(float(number_text(item)) for item in text.split(","))
+        if all(map(math.isfinite, seconds)):
+            return seconds
+    raise ArgumentError(f"{text!r}: must be times in seconds, separated by commas, such as 0.63,1.86")
+
+
+def task(text: str) -> tuple[str, list[str]]:
+    """Return a name and overrides from ``NAME:PATH=VALUE,...``; ArgumentError for any other text."""
+    name, colon, overrides = (item.strip() for item in text.partition(":"))
+    if not name or not colon or not overrides:
+        raise ArgumentError(f"{text}: is not of the form NAME:PATH=VALUE, for example 'slow:reference.ramp_time=2 s'")
+    return name, [item.strip() for item in overrides.split(",")]
+
+
+def point(text: str) -> float | str:
+    """Return a time [s], or ``equilibrium``; ArgumentError for any other text."""
+    if text.strip() == "equilibrium":
+        return "equilibrium"
+    try:
+        return quantity("s")(text)
+    except ArgumentError as error:
+        raise ArgumentError(f"{text!r}: must be a time such as '1.5 s', or 'equilibrium'") from error
+
+
+def units_given(by_si_unit: Mapping[str, float | None]) -> dict[str, str]:
+    """Return the units in which numbers were given, by SI unit; a pressure unit also sets the unit of differences."""
+    units: dict[str, str] = {}
+    for si_unit, value in by_si_unit.items():
+        if isinstance(value, NumberWithUnit) and value.unit != SI:
+            units |= units_beside(si_unit, value.unit)
+    return units

@@ -1,0 +1,141 @@
+"""Data of the preparation of a run: settings by their names in C, and rows of settings.
+
+``Preparation`` has all that does not depend on the numbers of the settings, ``PreparedLane`` all that does.
+"""
+
+from collections import namedtuple
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from ppafo.engine.program import Program
+from ppafo.engine.rows import leaf_paths, numbers, rebuilt
+from ppafo.engine.step.lane import Lane
+from ppafo.exports.c_library.library import c_identifier
+from ppafo.model.catalog import VALVES
+from ppafo.model.declaration import Quantity
+from ppafo.model.effects.kind import Effect
+from ppafo.model.gait import ShankSeries
+from ppafo.parameters.declaration import members
+from ppafo.parameters.device import Device, SonicOrifice
+from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES
+from ppafo.simulation.numbers import path_of_locked_angle
+from ppafo.simulation.plan import StepCounts
+from ppafo.simulation.scenario import Leg, Scenario, vane_motion
+
+VANE_ONLY_FIELDS = ("torque_constant", "displacement_per_radian")
+"""Parameters of the vane without meaning for an actuator of another shape."""
+
+
+class PreparedLane(Lane):
+    """Numbers of one run by group, and intermediate numbers of its preparation."""
+
+    counts_of_steps: StepCounts
+    tolerance: float  # error that a step may have, over the default [-]
+    needs_parts: bool  # True where the error decides about the parts of a step
+    step: float  # length of a step [s]
+    signal_delay: float  # of the slowest sensor of a walk [s]
+    signal_steps: float  # whole steps in the delay of the sensors [-]
+    command_steps: float  # whole steps in the dead time of the valve [-]
+    gas: Any
+    device: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Preparation:
+    """Scenario and program of a library: all data that does not depend on the settings."""
+
+    scenario: Scenario
+    program: Program
+
+    @property
+    def device(self) -> Device:
+        """Device of the scenario."""
+        return self.scenario.device
+
+    @property
+    def leg(self) -> Leg | None:
+        """Leg on a prescribed shank, attached to the vane; None for other motions and in a walk."""
+        return None if self.program.walks else vane_motion(self.scenario).leg
+
+    @property
+    def shank_numbers(self) -> dict[str, float]:
+        """Numbers of a shank prescribed by a gait, by path."""
+        assert self.leg is not None, "a shank is of a leg"
+        return dict(zip(leaf_paths(ShankSeries, "shank"), numbers(self.leg.curves), strict=True))
+
+    @property
+    def plant_without_leg(self) -> str:
+        """Variable name of the plant before a walking leg is added."""
+        return "bare" if self.program.walks else "plant"
+
+    @property
+    def plant_of_vane(self) -> str:
+        """Variable name of the plant before the shape of its actuator is set."""
+        return self.plant_without_leg if self.program.actuator.shape is None else f"vane_{self.plant_without_leg}"
+
+    @property
+    def vane_only_fields(self) -> tuple[str, ...]:
+        """Vane parameters without meaning for an actuator of another shape; empty for a vane."""
+        return () if self.program.actuator.shape is None else VANE_ONLY_FIELDS
+
+    @property
+    def locked_angle_setting(self) -> str:
+        """Name of the setting for the angle of a locked joint."""
+        return c_identifier(path_of_locked_angle(self.scenario) or LOCKED_ANGLE)
+
+    @property
+    def line_fields(self) -> list[str]:
+        """Settings of droop, largest flow and volume of each supply line, then ``relieving``, which is no setting."""
+        names = ("droop", "largest_flow", "volume")
+        return [*(c_identifier(f"{SUPPLY_LINE}.{line}.{name}") for line in SUPPLY_LINES for name in names), "relieving"]
+
+    @property
+    def valve_settings(self) -> list[str]:
+        """Names of the settings of the valve."""
+        return names_of(VALVES[self.device.valve.kind].quantities)
+
+    @property
+    def tables(self) -> list[Any]:
+        """Table of a measured actuator as a list; empty for other actuators."""
+        return [] if self.device.actuator.table is None else [self.device.actuator.table]
+
+    def setting_names(self, section: str, fields: Iterable[str] | None = None) -> list[str]:
+        """Return the C names of settings of a section: these ``fields``, else all numbers visible to effects."""
+        fields = names_of(members(section, self.device.actuator.kind)) if fields is None else fields
+        return [c_identifier(f"{section}.{name}") for name in fields]
+
+    def row(self, name: str, fields: Iterable[str]) -> Any:
+        """Return a NamedTuple class of settings with the given field names."""
+        new_class: Any = namedtuple
+        row = new_class(name, list(fields), module=__name__)
+        row.__doc__ = ""  # not the list of its fields, which stands in the library below it
+        return row
+
+    def section_row(self, name: str, *further: str) -> Any:
+        """Return a NamedTuple class of a device section as visible to effects, with ``further`` fields."""
+        fields = names_of(members(name, self.device.actuator.kind))
+        return self.row(name.title().replace("_", ""), [*fields, *further])
+
+    def effect_row(self, effect: Effect) -> Any:
+        """Return a NamedTuple class of the settings of an effect."""
+        return self.row(f"{effect.name.title().replace('_', '')}Settings", names_of(effect.quantities))
+
+    def orifice_row(self, section: str) -> Any:
+        """Return a NamedTuple class of an orifice in its given form."""
+        if self.is_sonic(section):
+            return self.row("SonicOrifice", ("sonic_conductance", "critical_ratio"))
+        return self.row("Orifice", ("area", "discharge_coefficient"))
+
+    def is_sonic(self, section: str) -> bool:
+        """True for an orifice in the form of ISO 6358."""
+        return isinstance(self.device.valve.orifice if section == "valve" else self.device.actuator.leak, SonicOrifice)
+
+    def constant(self, row: Any) -> Any:
+        """Return a NamedTuple of numbers that no setting changes, all as floats."""
+        return rebuilt(type(row), numbers(row))
+
+
+def names_of(quantities: Iterable[Quantity]) -> list[str]:
+    """Return the names of declared numbers."""
+    return [quantity.name for quantity in quantities]

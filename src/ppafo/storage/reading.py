@@ -1,0 +1,107 @@
+"""Reading of a recording, whatever it is in: a file of one of the known formats, a result folder, or a data frame."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from ppafo.arguments import Pressure, Word, checked
+from ppafo.arguments.door import argument_text
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import DataError, refused_as
+from ppafo.signals import Recording, recording_kind
+from ppafo.storage.comma_separated import read_csv
+from ppafo.storage.result_folder import CSV_FILE, NETCDF_FILE, RUN_FILE, read_document, read_stored
+
+if TYPE_CHECKING:
+    from pandas import DataFrame  # type: ignore[import-untyped]
+    from xarray import Dataset
+
+    from ppafo.storage.column_map import ColumnMap
+
+ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
+"""Column map, or the name of one: file, and the name of the map if the file has several."""
+
+TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log", ".asc")
+"""Suffixes of text tables."""
+
+
+@checked
+def read_recording(
+    path: "str | Path | DataFrame | Dataset",
+    *,
+    atmosphere: Pressure = STANDARD_ATMOSPHERE,
+    columns: ColumnsLike | None = None,
+) -> Recording:
+    """Return the recording in a ``.nc`` or ``.parquet`` file, a table of text such as ``.csv``, or a result folder.
+
+    A pandas DataFrame or an xarray Dataset is taken as well: columns ``name [unit]``, or units in its ``attrs``.
+
+    Arguments:
+        path: a file, a result folder, a pandas DataFrame or an xarray Dataset
+        atmosphere: pressure [Pa absolute] from which gauge pressure in a table counts
+        columns: a column map, or the name of one, ``logger.toml:bench``, for a table with other columns, signs or
+            separators and for a ``.mat`` file
+
+    Returns:
+        a Recording, its channels of shape (samples,) in SI units, pressures absolute
+
+    Raises:
+        DataError: a file that is not usable
+
+    >>> import ppafo
+    >>> folder = ppafo.simulate("step-response").save("step")
+    >>> ppafo.read_recording(folder).names[:3]
+    ('angle', 'angular_velocity', 'pressure_1')
+    """
+    if not isinstance(path, str | Path):
+        from ppafo.storage.frames import recording_of_frame  # a run reads no tables of others
+
+        return recording_of_frame(path, atmosphere=atmosphere)
+    file = Path(path)
+    if columns is not None:
+        from ppafo.storage.column_map import column_map_of
+        from ppafo.storage.foreign import read_foreign
+
+        column_map, map_name = column_map_of(columns)
+        return read_foreign(file, column_map, atmosphere=atmosphere, map_name=map_name)
+    if file.is_dir() and (file / RUN_FILE).exists():
+        return read_stored(file).recording
+    if file.is_dir():
+        if not (file / NETCDF_FILE).is_file():
+            raise DataError(f"{file}: contains no result of a walk or a simulation (no {NETCDF_FILE}, no {RUN_FILE})")
+        file /= NETCDF_FILE
+    if file.suffix == ".nc":
+        from ppafo.storage.netcdf_reading import read_netcdf
+        from ppafo.storage.trial_reading import check_can_be_read
+
+        # The HDF5 library can crash on a damaged file, or go round in it for ever, and would take this process with it.
+        check_can_be_read(file, read_netcdf, "h5py")
+        return read_netcdf(file)
+    if file.suffix.lower() in TEXT_SUFFIXES:
+        recording = read_csv(file, atmosphere=atmosphere)
+        run_file = file.parent / RUN_FILE
+        if file.name != CSV_FILE or not run_file.exists():
+            return recording
+        described = read_document(file.parent)["recording"]
+        with refused_as(DataError, run_file, DataError):
+            kind = recording_kind(str(described.get("kind", recording.kind)))
+        return replace(recording, label=str(described.get("label", recording.label)), kind=kind)
+    if file.suffix.lower() == ".parquet":
+        from ppafo.storage.frames import read_parquet
+
+        return read_parquet(file, atmosphere)
+    if file.suffix.lower() == ".mat":
+        raise DataError(
+            f"{file}: is a .mat file, whose variables have no units: name them in a column map, "
+            f"{argument_text('columns', 'FILE.toml:NAME')}"
+        )
+    if not file.exists():
+        raise DataError(f"{file}: no such file or folder")
+    from ppafo.storage.frames import remedy_for
+
+    named = argument_text("columns", "FILE.toml:NAME")
+    other = f"; a table of text of another suffix is read through a column map, {named}"
+    raise DataError(
+        f"{file}: is no .nc, .parquet or {', '.join(TEXT_SUFFIXES)} file and no result folder"
+        f"{remedy_for(file) or other}"
+    )
