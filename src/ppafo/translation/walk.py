@@ -85,7 +85,7 @@ class Expressions:
         assert kind is not None
         return converted(term, kind)
 
-    def whole(self, node: ast.expr) -> Term:
+    def integer(self, node: ast.expr) -> Term:
         """Return the term of an expression that must be an integer."""
         term = self.scalar(node, INT)
         if term.type != INT:
@@ -99,7 +99,7 @@ class Expressions:
         term = self.scalar(node)
         return term if term.type == BOOL else Term("!=", BOOL, (term, converted(Term("number", INT, (), 0), term.type)))
 
-    def part(self, node: ast.expr) -> slice:
+    def literal_slice(self, node: ast.expr) -> slice:
         """Return the slice of a tuple, whose bounds must be literals."""
         if not isinstance(node, ast.Slice) or node.step is not None:
             raise self.refused(node, f"'{ast.unparse(node)}' is not a part of a tuple")
@@ -107,7 +107,7 @@ class Expressions:
 
     def literal(self, node: ast.expr) -> int:
         """Return the value of an integer literal."""
-        number = _literal(self.whole(node))
+        number = _literal(self.integer(node))
         if number is None:
             raise self.refused(node, f"'{ast.unparse(node)}' must be a literal number")
         return number
@@ -141,11 +141,14 @@ class Expressions:
 
     def _of_subscript(self, node: ast.Subscript) -> Term:
         if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":
-            array, at = self.term(node.value.value), self.literal(node.slice)
-            if array.kind != "name" or not isinstance(array.type, Array) or at not in range(array.type.dimensions):
+            array, dimension = self.term(node.value.value), self.literal(node.slice)
+            kind = array.type
+            if array.kind != "name" or not isinstance(kind, Array) or dimension not in range(kind.dimensions):
                 raise self.refused(node, f"'{ast.unparse(node)}' is not an extent of an array")
             return (
-                Term("number", INT, (), array.type.shape[at]) if array.type.shape else Term("extent", INT, (array,), at)
+                Term("number", INT, (), kind.shape[dimension])
+                if kind.shape
+                else Term("extent", INT, (array,), dimension)
             )
         owner = self.term(node.value)
         if isinstance(owner.type, Array):
@@ -154,9 +157,9 @@ class Expressions:
             raise self.refused(node, f"'{ast.unparse(node.value)}' has no items")
         count = len(types_in(owner.type))
         if isinstance(node.slice, ast.Slice):
-            parts = tuple(typed.item_of(owner, number) for number in range(count)[self.part(node.slice)])
+            parts = tuple(typed.item_of(owner, number) for number in range(count)[self.literal_slice(node.slice)])
             return Term("build", Items(tuple(part.type for part in parts)), parts)
-        index = self.whole(node.slice)
+        index = self.integer(node.slice)
         number = _literal(index)
         if number is not None:
             if not -count <= number < count:
@@ -177,17 +180,17 @@ class Expressions:
                 raise self.refused(node.slice, problem)
             # Both bounds lie in it: what is beyond is not looked for.
             count = Term("extent", INT, (owner,), 0)
-            bounds = (self.from_start(self.whole(bound), count) for bound in (begin, end))
+            bounds = (self.from_start(self.integer(bound), count) for bound in (begin, end))
             return Term("part", Array(kind.dimensions), (owner, *bounds))
-        places = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         extents = kind.shape or (None,) * kind.dimensions
-        if len(places) != len(extents):
+        if len(indices) != len(extents):
             raise self.refused(node, f"'{ast.unparse(node)}' does not have {len(extents)} places")
-        given = []
-        for at, (coordinate, extent) in enumerate(zip(places, extents, strict=True)):
-            count = Term("extent", INT, (owner,), at) if extent is None else Term("number", INT, (), extent)
-            given.append(self.from_start(self.whole(coordinate), count))
-        return Term("element", FLOAT, (owner, *given))
+        terms = []
+        for dimension, (index, extent) in enumerate(zip(indices, extents, strict=True)):
+            count = Term("extent", INT, (owner,), dimension) if extent is None else Term("number", INT, (), extent)
+            terms.append(self.from_start(self.integer(index), count))
+        return Term("element", FLOAT, (owner, *terms))
 
     def from_start(self, index: Term, count: Term) -> Term:
         """Return an index counted from the start, because Python counts negative indices from the end."""
@@ -216,11 +219,10 @@ class Expressions:
             if not isinstance(element, ast.Starred):
                 parts.append(self.term(element))
                 continue
-            # With a star it stands for all that it holds.
-            whole = self.term(element.value)
-            if not isinstance(whole.type, Items | Row):
+            unpacked = self.term(element.value)
+            if not isinstance(unpacked.type, Items | Row):
                 raise self.refused(element, f"'{ast.unparse(element)}' is no tuple")
-            parts += [typed.item_of(whole, index) for index in range(len(types_in(whole.type)))]
+            parts += [typed.item_of(unpacked, index) for index in range(len(types_in(unpacked.type)))]
         return Term("build", Items(tuple(part.type for part in parts)), tuple(parts))
 
     def _of_unaryop(self, node: ast.UnaryOp) -> Term:
@@ -306,18 +308,18 @@ class Expressions:
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
         if any(isinstance(argument, ast.Starred) for argument in node.args):
             raise self.refused(node, f"'{ast.unparse(node)}' passes a tuple as arguments")
-        handed = self.types.get(name)
-        return handed.name if isinstance(handed, FunctionArgument) else name
+        argument_type = self.types.get(name)
+        return argument_type.name if isinstance(argument_type, FunctionArgument) else name
 
     def _of_call(self, node: ast.Call) -> Term:
         name = self.name_called(node)
         if name in self.rows:
             fields = self.rows[name]
-            stated = dict(zip(fields, map(self.term, node.args), strict=False))
-            stated |= {str(keyword.arg): self.term(keyword.value) for keyword in node.keywords}
-            if set(stated) != set(fields):
+            values = dict(zip(fields, map(self.term, node.args), strict=False))
+            values |= {str(keyword.arg): self.term(keyword.value) for keyword in node.keywords}
+            if set(values) != set(fields):
                 raise self.refused(node, f"'{ast.unparse(node)}' does not give every field")
-            parts = tuple(stated[name] for name in fields)
+            parts = tuple(values[name] for name in fields)
             return Term("build", Row(name, tuple(zip(fields, (part.type for part in parts), strict=True))), parts)
         if name in self.definitions:
             function, arguments = self.called(name, node)
@@ -328,58 +330,59 @@ class Expressions:
 
     def called(self, name: str, node: ast.Call) -> tuple[Function, tuple[Term, ...]]:
         """Return the called function of the module and the arguments passed to the function."""
-        takes = self.definitions[name].args
+        definition = self.definitions[name]
+        takes = definition.args
         names = [argument.arg for argument in (*takes.posonlyargs, *takes.args, *takes.kwonlyargs)]
-        placed = [argument.arg for argument in (*takes.posonlyargs, *takes.args)]
-        defaults = dict(zip(placed[::-1], takes.defaults[::-1], strict=False))
+        positional = [argument.arg for argument in (*takes.posonlyargs, *takes.args)]
+        defaults = dict(zip(positional[::-1], takes.defaults[::-1], strict=False))
         defaults |= {
             argument.arg: value for argument, value in zip(takes.kwonlyargs, takes.kw_defaults, strict=True) if value
         }
-        stated = {name: self.term(value) for name, value in defaults.items()}
+        values = {name: self.term(value) for name, value in defaults.items()}
         # Defaults first, then arguments by place, then by name: the last one holds.
-        stated |= dict(zip(names, map(self.term, node.args), strict=False))
-        stated |= {str(keyword.arg): self.term(keyword.value) for keyword in node.keywords}
+        values |= dict(zip(names, map(self.term, node.args), strict=False))
+        values |= {str(keyword.arg): self.term(keyword.value) for keyword in node.keywords}
         # What functions call each other with is known since they were composed; this is a call of the engine's own.
-        missing, own = [name for name in names if name not in stated], self.definitions[name]
-        if missing or len(node.args) > len(placed) or len(stated) > len(names):
+        missing = [name for name in names if name not in values]
+        if missing or len(node.args) > len(positional) or len(values) > len(names):
             problem = f"missing a required argument: '{missing[0]}'" if missing else "too many arguments"
             called = f"({', '.join(map(ast.unparse, node.args))})"
             problem = f"{{name}}({', '.join(names)}): the engine calls it with {called}: {problem}"
-            raise self.mistaken(own, problem)
-        types = tuple(stated[name].type for name in names)
+            raise self.mistaken(definition, problem)
+        types = tuple(values[name].type for name in names)
         # An array of known shape is a local one, which C hands over as a pointer of another type.
         if any(isinstance(kind, Array) and kind.shape for kind in types):
             raise self.refused(node, f"'{ast.unparse(node)}' passes an array expression")
-        return self.made(name, types), tuple(stated[name] for name in names if not is_empty(stated[name].type))
+        return self.made(name, types), tuple(values[name] for name in names if not is_empty(values[name].type))
 
     def built_in(self, name: str, node: ast.Call) -> Term:
         """Return the term of a call of a function available in every language."""
-        own = name.removeprefix("math.")
-        least = FLOAT if own in LIBRARY | {"sqrt", "float"} else INT
+        function = name.removeprefix("math.")
+        least = FLOAT if function in LIBRARY | {"sqrt", "float"} else INT
         known = FUNCTIONS | {"float", "int", "bool", "len"} | (self.library - {"pow"})
-        if own not in known or node.keywords:
-            raise self.refused(node, f"'{name}' is a function of a library{_INSTEAD.get(own, '')}")
-        if len(node.args) < 1 or (own in ("min", "max")) != (len(node.args) > 1):
+        if function not in known or node.keywords:
+            raise self.refused(node, f"'{name}' is a function of a library{_INSTEAD.get(function, '')}")
+        if len(node.args) < 1 or (function in ("min", "max")) != (len(node.args) > 1):
             raise self.refused(node, f"'{ast.unparse(node)}' with {len(node.args)} arguments")
         # Lengths of tuples are known: they become numbers.
-        if own == "len":
+        if function == "len":
             kind = self.term(node.args[0]).type
             if not isinstance(kind, Items | Row):
                 raise self.refused(node, f"'{ast.unparse(node.args[0])}' has no items")
             return Term("number", INT, (), len(types_in(kind)))
-        if own == "bool":
+        if function == "bool":
             return self.condition(node.args[0])
         made, *others = [self.scalar(argument, least) for argument in node.args]
         kind = made.type
-        if own in ("float", "int"):
-            return made if own == "float" or kind == INT else Term("convert", INT, (made,))
+        if function in ("float", "int"):
+            return made if function == "float" or kind == INT else Term("convert", INT, (made,))
         # Python's min returns the number as it is, an int or a float: C has one type for both.
         if any(other.type != kind for other in others):
             raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
         if not others:
-            return Term(own, kind, (made,))
+            return Term(function, kind, (made,))
         for other in others:
-            made = Term(own, kind, (made, other))
+            made = Term(function, kind, (made, other))
         return made
 
 
@@ -451,7 +454,7 @@ class _ModuleWalk:
     done: dict[tuple[str, tuple[Type, ...]], Function] = field(default_factory=dict)
     open: set[tuple[str, tuple[Type, ...]]] = field(default_factory=set)
     names: set[str] = field(default_factory=set)
-    found: dict[str, ScopeNames] = field(default_factory=dict)
+    scope_names: dict[str, ScopeNames] = field(default_factory=dict)
     module: Module = field(default_factory=list)
 
     def function(self, name: str, types: tuple[Type, ...]) -> Function:
@@ -463,13 +466,13 @@ class _ModuleWalk:
                 raise self.refused(definition, f"'{name}' calls itself")
             self.open.add(key)
             # Each choice of types is a function of its own, since C has no overloading.
-            number, own = 1, name
-            while own in self.names or (number > 1 and (own in self.definitions or own in self.rows)):
+            number, unique_name = 1, name
+            while unique_name in self.names or (number > 1 and unique_name in {*self.definitions, *self.rows}):
                 number += 1
-                own = f"{name}_{number}"
-            # The name is taken before the body is walked, in which the same function may be met for other types.
-            self.names.add(own)
-            self.done[key] = _FunctionWalk(self, definition).walked(own, types)
+                unique_name = f"{name}_{number}"
+            # Reserved before the body is walked, in which the same function may be met for other types.
+            self.names.add(unique_name)
+            self.done[key] = _FunctionWalk(self, definition).walked(unique_name, types)
             self.module.append(self.done[key])
         return self.done[key]
 
@@ -506,12 +509,12 @@ class _FunctionWalk:
         self.refused = module.refused
         self.definition = definition
         self.types: dict[str, Type] = {}
-        if definition.name not in module.found:
-            module.found[definition.name] = ScopeNames.of(definition)
-        names = module.found[definition.name]
+        if definition.name not in module.scope_names:
+            module.scope_names[definition.name] = ScopeNames.of(definition)
+        names = module.scope_names[definition.name]
         self.names, self.read = names.every, names.read
-        self.given = {argument.arg for argument in definition.args.args}
-        self.made: set[str] = set()
+        self.parameters = {argument.arg for argument in definition.args.args}
+        self.fresh_names: set[str] = set()
         self.values = Expressions(
             self.types,
             names.counters,
@@ -534,12 +537,12 @@ class _FunctionWalk:
         parameters = self.definition.args
         names = [argument.arg for argument in (*parameters.posonlyargs, *parameters.args, *parameters.kwonlyargs)]
         self.types.update(zip(names, types, strict=True))
-        # Types only grow, so this ends.
-        # A name that gets a wider type further down, as in a loop, had it from the beginning.
+        # A name that gets a wider type further down, as in a loop, has it from the beginning: the body is translated
+        # again until no type changes, which ends because types only widen.
         self.has_widened = True
         while self.has_widened:
             self.has_widened, self.flags = False, 0
-            self.made.clear()
+            self.fresh_names.clear()
             body = self.block(self.definition.body)
         for parameter, kind in zip(names, types, strict=True):
             if self.types[parameter] != kind:
@@ -547,14 +550,14 @@ class _FunctionWalk:
                 raise self.refused(self.definition, problem)
         if self.writes is not None and self.returns is not None:
             raise self.refused(self.writes, f"'{self.definition.name}' returns a value and writes into an array")
-        kept = tuple(Parameter(name, self.types[name]) for name in names if not is_empty(self.types[name]))
+        passed = tuple(Parameter(name, self.types[name]) for name in names if not is_empty(self.types[name]))
         bound = tuple(
             f"{name} is {kind.name}"
             for name, kind in zip(names, types, strict=True)
             if isinstance(kind, FunctionArgument)
         )
         is_entry = self.returns is None and self.module.entries.get(self.definition.name) == types
-        return Function(name, self.definition.name, kept, self.returns, needed(body, frozenset())[0], bound, is_entry)
+        return Function(name, self.definition.name, passed, self.returns, needed(body, frozenset())[0], bound, is_entry)
 
     def block(self, body: Sequence[ast.stmt]) -> tuple[Statement, ...]:
         """Return the typed statements of a block."""
@@ -614,7 +617,7 @@ class _FunctionWalk:
         call, name = node.iter, node.target.id
         if not (isinstance(call, ast.Call) and ast.unparse(call.func) == "range"):
             return self.loop_over_items(name, node)
-        bounds = [self.values.whole(bound) for bound in call.args]
+        bounds = [self.values.integer(bound) for bound in call.args]
         if not 1 <= len(bounds) <= 3 or call.keywords:
             raise self.refused(node, f"'{ast.unparse(call)}'")
         start, stop = (Term("number", INT, (), 0), bounds[0]) if len(bounds) == 1 else bounds[:2]
@@ -631,21 +634,20 @@ class _FunctionWalk:
 
     def loop_over_items(self, name: str, node: ast.For) -> list[Statement]:
         """Translate a loop over a tuple or a slice of a tuple into a counted loop."""
-        whole = node.iter.value if isinstance(node.iter, ast.Subscript) else node.iter
-        owner = self.values.term(whole)
+        owner = self.values.term(node.iter.value if isinstance(node.iter, ast.Subscript) else node.iter)
         if not isinstance(owner.type, Items) or not owner.type.is_uniform:
             raise self.refused(node, f"'{ast.unparse(node.iter)}' is no tuple of one type")
         if owner.reads & {name, *changed(node.body)}:
             raise self.refused(node, f"a loop over '{ast.unparse(node.iter)}' that changes it")
-        places = range(len(owner.type.types))
+        indices = range(len(owner.type.types))
         if isinstance(node.iter, ast.Subscript):
-            places = places[self.values.part(node.iter.slice)]
+            indices = indices[self.values.literal_slice(node.iter.slice)]
         counter = self.fresh(f"{name}_place", INT)
         self.note_type(counter, INT, node)
         element = Term("item", owner.type.types[0], (owner, Term("name", INT, (), counter)))
-        taken = self.assign(name, element, node)
-        start, stop = (Term("number", INT, (), bound) for bound in (places.start, places.stop))
-        return self.loop(node, lambda: typed.CountedLoop(counter, start, stop, 1, (taken, *self.block(node.body))))
+        assignment = self.assign(name, element, node)
+        start, stop = (Term("number", INT, (), bound) for bound in (indices.start, indices.stop))
+        return self.loop(node, lambda: typed.CountedLoop(counter, start, stop, 1, (assignment, *self.block(node.body))))
 
     def loop(self, node: ast.For | ast.While, make: Callable[[], Statement]) -> list[Statement]:
         """Translate a loop; an ``else`` block becomes conditional on a flag that each ``break`` sets."""
@@ -707,7 +709,7 @@ class _FunctionWalk:
         while owner.kind in ("field", "item"):
             owner = owner.parts[0]
         is_shared = isinstance(owner.type, RowReference)
-        if owner.kind != "name" or element is owner or (owner.detail in self.given and not is_shared):
+        if owner.kind != "name" or element is owner or (owner.detail in self.parameters and not is_shared):
             raise self.refused(target, f"'{ast.unparse(target)}' on the left")
         if joined(element.type, value.type) != element.type:
             raise self.refused(target, f"'{ast.unparse(target)}' gets a value of another type")
@@ -722,9 +724,9 @@ class _FunctionWalk:
 
     def fresh(self, wanted: str, kind: Type) -> str:
         """Return an unused local name for values of a given type."""
-        while wanted in self.names or wanted in self.made or joined(self.types.get(wanted, kind), kind) is None:
+        while wanted in self.names or wanted in self.fresh_names or joined(self.types.get(wanted, kind), kind) is None:
             wanted += "_"
-        self.made.add(wanted)
+        self.fresh_names.add(wanted)
         return wanted
 
     def note_type(self, name: str, kind: Type, node: ast.AST) -> None:
@@ -748,12 +750,12 @@ class _FunctionWalk:
             raise self.module.mistaken(node, f"'{{written}}' needs as many values as there are names{other}")
         before: list[Statement] = []
         if value.kind != "build" or value.reads & set(names) or (is_stored and value.reads):
-            whole = self.fresh("_and_".join(name for name in names if name != "_") or "items", kind)
-            before = [self.assign(whole, value, node)]
-            value = Term("name", self.types[whole], (), whole)
+            name = self.fresh("_and_".join(name for name in names if name != "_") or "items", kind)
+            before = [self.assign(name, value, node)]
+            value = Term("name", self.types[name], (), name)
         return before + [
             statement
-            for at, target_of in enumerate(target.elts)
-            if not isinstance(target_of, ast.Name) or target_of.id in self.read
-            for statement in self.put(target_of, typed.item_of(value, at), node)
+            for index, element in enumerate(target.elts)
+            if not isinstance(element, ast.Name) or element.id in self.read
+            for statement in self.put(element, typed.item_of(value, index), node)
         ]
