@@ -27,9 +27,8 @@ from ppafo.engine.composer import COMPILED_BUILTINS
 from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
-from ppafo.engine.replacements import Replacements
 from ppafo.engine.rows import leaves, rebuilt
-from ppafo.engine.source_text import MadeFrom, NameRead
+from ppafo.engine.source_text import MadeFrom, NameRead, Replacements
 from ppafo.errors import ProgramError
 from ppafo.model.binding import is_made_of
 from ppafo.model.declaration import PlainFunction

@@ -7,9 +7,8 @@ from typing import Any, get_type_hints
 from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text
 from ppafo.engine.in_python import WITHOUT_EXCEPTIONS, PythonFunctions
 from ppafo.engine.loading import compiled
-from ppafo.engine.replacements import Replacements
 from ppafo.engine.rows import is_row, leaf_paths, leaves, rebuilt, row_expression
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.source_text import Replacements, SourceCollector
 from ppafo.model.declaration import PlainFunction
 
 
