@@ -8,7 +8,7 @@ from ppafo.analyses.sweep.answer import load_study_results
 from ppafo.errors import DataError
 from ppafo.report.recording_figure import recording_figure
 from ppafo.report.stored_figure import draw_stored_walk, read_result, stated_units
-from ppafo.rig.experiments import RIG_FILE
+from ppafo.rig.folder import RIG_FILE
 from ppafo.storage.owned_folder import MARK, marking_command, read_json
 from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import NETCDF_FILE, RUN_FILE
@@ -78,8 +78,8 @@ def what_is_there(folder: Path, names: list[str]) -> tuple[str, dict[str, Any]]:
     command = marking_command(folder)
     pictures = [name for name in names if name.endswith(_PICTURES)]
     page = next((name for name in names if name.endswith(".html")), None)
-    shown = ", ".join(pictures[:_NAMED]) + (", ..." if len(pictures) > _NAMED else "")
-    has = f"has its figures ({shown})" if pictures else "has no figures"
+    named = ", ".join(pictures[:_NAMED]) + (", ..." if len(pictures) > _NAMED else "")
+    has = f"has its figures ({named})" if pictures else "has no figures"
     opened = page or next((name for name in names if name.endswith(".txt")), MARK)
-    said = f"{folder}: the result of 'ppafo {command}' {has}; open {folder / opened}"
-    return said, {"files": [], "command": command, "figures": pictures, "open": str(folder / opened)}
+    sentence = f"{folder}: the result of 'ppafo {command}' {has}; open {folder / opened}"
+    return sentence, {"files": [], "command": command, "figures": pictures, "open": str(folder / opened)}

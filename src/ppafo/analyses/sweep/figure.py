@@ -59,12 +59,12 @@ def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]
         metric for metric in all_metrics if any(described[metric]["count"] for described in results.metrics.values())
     ]
     metrics = (with_values or all_metrics)[:MOST_METRICS]
-    # As many as colours that can be told apart.
+    # No more configurations than distinguishable colours.
     names = results.configurations[:MOST_CONFIGURATIONS]
-    # The size of a seed says nothing.
+    # The value of a seed has no meaning.
     varied = [path for path in results.varied if path != NOISE]
     grid = [number["path"] for number in study.get("vary", ()) if number["kind"] in _GRIDDED]
-    # Over two paths each metric of a configuration is a panel, a map of a grid or points; else one a metric.
+    # Over two paths each configuration has a panel of each metric, a map or points; else all share one panel.
     is_mapped = 2 in (len(grid), len(varied))
     title = f"{results.name}, {results.summary['completed']:,} runs"
     if not is_mapped and len(varied) > 1:
@@ -243,12 +243,12 @@ def _band(results: StudyResults, channel: str, names: Sequence[str]) -> Panel:
     pairs = [(low, high) for low, high in zip(fractions, reversed(fractions), strict=True) if low < high]
     marks = []
     for name, colour in zip(names, COLOURS, strict=False):
-        own = (table["configuration"] == name) & (table["channel"] == channel)
+        rows = (table["configuration"] == name) & (table["channel"] == channel)
         for pair, opacity in zip(pairs, _OPACITIES, strict=False):
-            ends = np.stack([table[f"q{fraction:g}"][own] for fraction in pair])
-            marks.append(Mark("band", table["time"][own], ends, colour=colour, style={"alpha": opacity}))
+            ends = np.stack([table[f"q{fraction:g}"][rows] for fraction in pair])
+            marks.append(Mark("band", table["time"][rows], ends, colour=colour, style={"alpha": opacity}))
         if _MEDIAN in fractions:
-            marks.append(Mark("line", table["time"][own], table["q0.5"][own], label=name, colour=colour))
+            marks.append(Mark("line", table["time"][rows], table["q0.5"][rows], label=name, colour=colour))
     kind = of_channel(channel, CHANNELS[channel].unit)
     percentages = ", ".join(f"{100.0 * fraction:g}" for fraction in fractions)
     title = f"{percentages} % of runs below"

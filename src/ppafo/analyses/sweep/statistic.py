@@ -95,16 +95,17 @@ def estimate(
     check_metrics((metric,), base.scenario)
     with at_fault("also"):
         check_metrics(also, base.scenario)
-    wanted = tuple(dict.fromkeys((metric, *also)))
-    what = parse_statistic(statistic, metric, atmosphere_of(base.scenario, {*uncertainty.paths, *uncertainty.same}))
+    metrics = tuple(dict.fromkeys((metric, *also)))
+    parsed = parse_statistic(statistic, metric, atmosphere_of(base.scenario, {*uncertainty.paths, *uncertainty.same}))
     # A probability may be 0, of which a fraction says nothing: its width is a difference.
-    asked = width or (PROBABILITY_WIDTH if what.threshold is not None else DEFAULT_WIDTH)
-    rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
+    width_text = width or (PROBABILITY_WIDTH if parsed.threshold is not None else DEFAULT_WIDTH)
+    limits = StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed)
+    rule = stopping_rule(parsed, metric, width_text, limits)
     warn_of_coarse_pairs([base.scenario])
-    runs = scenario_runs(base.scenario, wanted, RunCounter(rule.first, progress), uncertainty.gauge, threads)
+    runs = scenario_runs(base.scenario, metrics, RunCounter(rule.first, progress), uncertainty.gauge, threads)
     with shown_in(chosen.shown_for(base.scenario)):
-        first = chosen.sample.seed if seed is None else seed
-        return draw_until(runs, uncertainty, metric, what, rule, first, wanted[1:])
+        seed = chosen.sample.seed if seed is None else seed
+        return draw_until(runs, uncertainty, metric, parsed, rule, seed, metrics[1:])
 
 
 def draw_until(

@@ -102,9 +102,9 @@ def _largest_runs(problem: Problem) -> int:
     """Return the number of runs of a tuning in which no start converges early."""
     effort, gains, spread = problem.effort, len(problem.searched), problem.spread
     # The first candidates are a generation of their own.
-    of_start = gains * (effort.candidates_per_gain * (effort.generations + 1) + _REFINEMENTS)
+    runs_of_start = gains * (effort.candidates_per_gain * (effort.generations + 1) + _REFINEMENTS)
     # Beside the candidates, the gains before run for the scales and for their result, and the gains found once.
-    in_search = effort.starts * of_start + 3
+    in_search = effort.starts * runs_of_start + 3
     if spread is None:
         return in_search
     # Both results run over fresh draws too, and the first of these again with other noise.
@@ -173,9 +173,9 @@ def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float])
         objective += goal.weight * bad_ends(known[goal.metric], spread, goal.weight > 0.0) / scales[goal.metric]
     for constraint in problem.constraints:
         reached = bad_ends(known[constraint.metric], spread, constraint.is_most)
-        beyond = reached - constraint.limit if constraint.is_most else constraint.limit - reached
+        excess = reached - constraint.limit if constraint.is_most else constraint.limit - reached
         # As a fraction of the limit, so that constraints in different units add up; a limit of 0 has no fractions.
-        violation += np.maximum(0.0, beyond) / (abs(constraint.limit) or 1.0)
+        violation += np.maximum(0.0, excess) / (abs(constraint.limit) or 1.0)
     # A loop that does not follow its reference violates a constraint that holds in every tuning.
     off = np.maximum(0.0, bad_ends(runs.off, spread, True))
     return _CandidateScores(objective=objective, violation=violation, off=off, without_value=failing)
@@ -258,8 +258,8 @@ def _is_settled(costs: Floats) -> bool:
     if most >= UNUSABLE or least < INFEASIBLE <= most:
         return False
     # Where all break a constraint, what counts is by how much they break it.
-    beyond = costs - INFEASIBLE if least >= INFEASIBLE else costs
-    return float(np.std(beyond)) <= _TOLERANCE * abs(float(np.mean(beyond)))
+    excess = costs - INFEASIBLE if least >= INFEASIBLE else costs
+    return float(np.std(excess)) <= _TOLERANCE * abs(float(np.mean(excess)))
 
 
 def _metrics_of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> CandidateMetrics:
@@ -366,11 +366,17 @@ def _unreachable_draws(
             continue
         # An error is never below what the supply lacks: where that alone is too much, no gains can keep the limit.
         is_mean = spread is None or spread.fraction is None
-        least = np.mean(lacking, axis=1) if is_mean else bad_ends(lacking, spread, True)
-        is_out_of_reach = constraint.metric in MINIMUM_ERRORS and is_most and not constraint.is_kept(float(least[0]))
+        smallest_error = np.mean(lacking, axis=1) if is_mean else bad_ends(lacking, spread, True)
+        is_out_of_reach = (
+            constraint.metric in MINIMUM_ERRORS and is_most and not constraint.is_kept(float(smallest_error[0]))
+        )
         # Else the draws that lack nothing must keep it alone; a standard deviation needs two of them.
-        rest = values[:, lacking[0] == 0.0]
-        if is_out_of_reach or rest.shape[1] < 2 or constraint.is_kept(float(bad_ends(rest, spread, is_most)[0])):
+        within_reach = values[:, lacking[0] == 0.0]
+        if (
+            is_out_of_reach
+            or within_reach.shape[1] < 2
+            or constraint.is_kept(float(bad_ends(within_reach, spread, is_most)[0]))
+        ):
             explained.append(constraint.metric)
     return UnreachableDraws(float(np.mean(lacking > 0.0)), tuple(explained) if lacking.any() else ())
 
