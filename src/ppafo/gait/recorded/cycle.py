@@ -1,4 +1,4 @@
-"""One cycle of a walk: a record slightly longer than a stride, whose end is the same motion as its start."""
+"""Cycle of a walk: a record slightly longer than a stride, whose end is the same motion as its start."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ strides of one healthy walk differ by 0.03."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WrappedCycle:
+class _WrappedCycle:
     """Cycle repeated three times, its ``period`` [s], and the misfit of its ends relative to the ranges [-]."""
 
     walk: Mapping[str, Signal]
@@ -29,7 +29,7 @@ class WrappedCycle:
     misfit: float
 
 
-def wrap_cycle(walk: Mapping[str, Signal]) -> WrappedCycle | None:
+def wrap_cycle(walk: Mapping[str, Signal]) -> _WrappedCycle | None:
     """Return the record of one cycle repeated three times, or None if its start and end are not the same motion."""
     start = max(walk[name].time[0] for name in REQUIRED)
     end = min(walk[name].time[-1] for name in REQUIRED)
@@ -59,7 +59,7 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> WrappedCycle | None:
         slack = 1.0 / signal.rate
         if signal.time[0] <= start + slack and signal.time[-1] >= start + period - slack:
             wrapped[name] = _repeat(signal, start, float(end), period, name in LOADS)
-    return WrappedCycle(wrapped, period, float(misfits[best]))
+    return _WrappedCycle(wrapped, period, float(misfits[best]))
 
 
 def _repeat(signal: Signal, start: float, end: float, period: float, is_load: bool) -> Signal:
