@@ -12,7 +12,7 @@ import numpy as np
 
 from ppafo.analyses.sweep.statistic_answer import finding_of, kind_of, remarks_on
 from ppafo.analyses.sweep.statistic_kind import FEWEST_SEEN, Statistic, parse_statistic
-from ppafo.analyses.sweep.stopping import InterimEstimate, OfMean, StatisticEstimate, StoppingRule, stopping_rule
+from ppafo.analyses.sweep.stopping import InterimEstimate, MetricMean, StatisticEstimate, StoppingRule, stopping_rule
 from ppafo.arguments import Confidence, Count, MaximumFailed, Name, Overrides, Seed, Threads, checked
 from ppafo.documents.json_text import plain
 from ppafo.errors import at_fault
@@ -159,7 +159,7 @@ def draw_until(
     further = {}
     for name in also:
         mean = floored_interval(rows[name], REPLICATES, rule.confidence_of_look)
-        further[name] = OfMean(int(np.count_nonzero(np.isfinite(rows[name]))), mean.value, mean.low, mean.high)
+        further[name] = MetricMean(int(np.count_nonzero(np.isfinite(rows[name]))), mean.value, mean.low, mean.high)
     estimated = StatisticEstimate(
         metric=metric,
         statistic=statistic.label,

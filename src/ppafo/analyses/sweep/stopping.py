@@ -108,7 +108,7 @@ class InterimEstimate:
 
 
 @dataclass(frozen=True, slots=True)
-class OfMean:
+class MetricMean:
     """Mean of an additional metric [SI] over the same draws, with interval and number of draws with a value."""
 
     draws: int
@@ -137,7 +137,7 @@ class StatisticEstimate:
     failed: int
     interval: ConfidenceInterval
     remarks: list[str]
-    also: dict[str, OfMean]
+    also: dict[str, MetricMean]
     share_of_noise: ConfidenceInterval | None
     seed: int
     rule: dict[str, float | str]
