@@ -121,24 +121,24 @@ def time_of_joint(joining: float, holding: float) -> float:
     return joining + holding
 
 
-class NominalParts(NamedTuple):
+class _NominalParts(NamedTuple):
     """Function for the chambers of the actuator at the usual angle."""
 
     mean_chambers: Callable[[Any, Range, Surroundings], MeanChambers]
 
 
-def torque_per_pressure(settings: Any, stops: Range, around: Surroundings, *, parts: NominalParts) -> float:
+def torque_per_pressure(settings: Any, stops: Range, around: Surroundings, *, parts: _NominalParts) -> float:
     """Torque per pressure of chamber 1 [m^3] at the usual angle."""
     return parts.mean_chambers(settings, stops, around).torque_per_pressure_1
 
 
-def dead_volume_1(settings: Any, stops: Range, around: Surroundings, *, parts: NominalParts) -> float:
+def dead_volume_1(settings: Any, stops: Range, around: Surroundings, *, parts: _NominalParts) -> float:
     """Dead volume [m^3] of a vane whose chamber 1 has the same volume at mid-range."""
     mean = parts.mean_chambers(settings, stops, around)
     return rest_of(mean.volume_1, mean.torque_per_pressure_1, stops)
 
 
-def dead_volume_2(settings: Any, stops: Range, around: Surroundings, *, parts: NominalParts) -> float:
+def dead_volume_2(settings: Any, stops: Range, around: Surroundings, *, parts: _NominalParts) -> float:
     """Dead volume [m^3] of a vane whose chamber 2 has the same volume at mid-range."""
     mean = parts.mean_chambers(settings, stops, around)
     return rest_of(mean.volume_2, mean.torque_per_pressure_1, stops)
@@ -230,7 +230,7 @@ def _chamber_terms(device: Device) -> dict[str, LinkFunction]:
     chambers = chambers_of(device)
 
     def term(frame: Callable[..., float]) -> LinkFunction:
-        made = made_of(frame, f"{frame.__name__}_of_device", NominalParts(chambers.function))
+        made = made_of(frame, f"{frame.__name__}_of_device", _NominalParts(chambers.function))
         return LinkFunction(chambers.sources, made, chambers.rows)
 
     return own | {
