@@ -89,7 +89,10 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
         columns.append(HeaderColumn(name, unit, between))
     names = [column.name for column in columns]
     if names[0] != TIME:
-        raise DataError(f"the first column must be '{TIME} [{TIME_UNIT}]', it is '{names[0]}'")
+        raise DataError(
+            f"the first column must be '{TIME} [{TIME_UNIT}]', it is '{names[0]}'; columns of other names and units "
+            "need a column map ([columns] in docs/how-to/recordings.md)"
+        )
     twice = first_twice(names)
     if twice is not None:
         raise DataError(f"there are two columns '{twice}'")
