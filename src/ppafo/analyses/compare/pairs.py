@@ -34,7 +34,7 @@ COMPARED: dict[str, int] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Paired:
+class PairedMetric:
     """Paired statistics of a metric of a configuration against the baseline, over the pairs in which both have a value.
 
     ``pairs``: number of pairs
@@ -77,7 +77,7 @@ def compare_pairs(
     better: int,
     confidence: float,
     other_noise: tuple[Floats, Floats] | None = None,
-) -> Paired | None:
+) -> PairedMetric | None:
     """Return the paired statistics of values (draws,) [SI], nan for a missing value; None without any pair.
 
     Draws are assigned to the replicates in turn. ``other_noise`` has the values of both configurations for the first
@@ -99,7 +99,7 @@ def compare_pairs(
         noise = noise_interval(difference, other_noise[1] - other_noise[0], confidence)
     # A tie is no win on either side: of equal configurations neither is better in any draw.
     wins = np.where(both, better * (other - baseline) > 0.0, np.nan)
-    return Paired(
+    return PairedMetric(
         metric=metric,
         pairs=baseline_values.size,
         difference=replicates_interval(difference, REPLICATES, confidence),

@@ -53,7 +53,8 @@ def compare(
             written
         overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
         baseline: configuration that all others are compared with; default: the first
-        draws: draws of the uncertain values of the study, or of the noise; default 4096
+        draws: draws of the uncertain values of the study, or of the noise, at least 32; default 4096, whatever the
+            runs of the study
         seed: random seed; default: the file's
         confidence: confidence of all intervals; default 95%
         maximum_failed: fraction of the runs that may fail before the study is refused; default 1%
@@ -79,13 +80,13 @@ def compare(
     from dataclasses import replace
 
     from ppafo.analyses.compare.answer import finding_of
-    from ppafo.analyses.compare.solve import Draws, compared
+    from ppafo.analyses.compare.solve import DrawSettings, compared
     from ppafo.arguments.conversion import taken_tasks
     from ppafo.studies.draws import study_of
     from ppafo.studies.study import choose_configurations
     from ppafo.units.shown import shown_in
 
-    requested = Draws(draws, seed, confidence, maximum_failed, threads, progress)
+    requested = DrawSettings(draws, seed, confidence, maximum_failed, threads, progress)
     requested.check()
     loaded = study_of(study) if study is not None else None
     chosen = choose_configurations(configurations or None, loaded, overrides)

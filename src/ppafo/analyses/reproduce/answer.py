@@ -88,10 +88,11 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
 
 def _agrees(low: float | None, high: float | None, unit: str) -> str | None:
     """Return in words the range of values that agrees with a claim."""
-    if low is None and high is None:
-        return None
-    ends = f"{low:g} to {high:g}" if low is not None and high is not None else ""
-    return f"{ends or (f'at most {high:g}' if low is None else f'at least {low:g}')} {unit}".rstrip()
+    if low is not None and high is not None:
+        return f"{low:g} to {high:g} {unit}".rstrip()
+    if low is not None:
+        return f"at least {low:g} {unit}".rstrip()
+    return None if high is None else f"at most {high:g} {unit}".rstrip()
 
 
 def _paper_rows(reproduction: Reproduction) -> list[tuple[str, str, str, str]]:

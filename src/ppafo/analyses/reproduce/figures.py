@@ -72,17 +72,14 @@ def step_response_figure(
     ends = -_SHOWN_BEFORE_STEP * end, end
     upper: list[Panel] = []
     lower: list[Panel] = []
-    for letter, (name, quantity, unit, colour, frame), values, measured in zip(
-        "ABCD",
-        _CURVES,
-        _curves(recording, levels),
-        [None] * len(_CURVES) if synthetic is None else _curves(synthetic, levels),
-        strict=True,
-    ):
+    curves = _curves(recording, levels)
+    measured_curves = None if synthetic is None else _curves(synthetic, levels)
+    for index, (name, quantity, unit, colour, frame) in enumerate(_CURVES):
+        values = curves[index]
         model = Mark("line", _MILLISECONDS * recording.time, values, label="model", colour=colour, style={"zorder": 3})
         marks, then = [model, *marked, *named], partial(_enlarge, frame, ends)
-        if synthetic is not None and measured is not None:
-            times = _MILLISECONDS * synthetic.time
+        if synthetic is not None and measured_curves is not None:
+            times, measured = _MILLISECONDS * synthetic.time, measured_curves[index]
             marks[1:1] = _measurement(times, measured)
             apart = measured - np.interp(synthetic.time, recording.time, values)
             differences = [
@@ -93,7 +90,7 @@ def step_response_figure(
             kind, title = Kind("Error", unit.replace("psig", "psi")), "Measurement less model"
             limit = methodcaller("set_xlim", *ends)
             lower.append(Panel(_AFTER_STEP, kind, differences, title, then=limit, tall=0.85, shares_x=True))
-        legend, title = "" if upper else "figure", f"$\\bf{{{letter}}}$   {name}"
+        legend, title = "" if upper else "figure", f"$\\bf{{{'ABCD'[index]}}}$   {name}"
         upper.append(Panel(_AFTER_STEP, Kind(quantity, unit), marks, title, None, legend, then, 2.3, shares_x=True))
         named = []
     panels = [*upper[:2], *lower[:2], *upper[2:], *lower[2:]]

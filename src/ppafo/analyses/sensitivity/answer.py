@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.analyses.sensitivity.methods import METHODS
-from ppafo.analyses.sensitivity.solve import Influences, OfMetric
+from ppafo.analyses.sensitivity.solve import Influences, MetricSensitivity
 from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import Kind, of_metric
 from ppafo.report.panels import Mark, Panel
@@ -70,7 +70,7 @@ def _panels(influences: Influences) -> list[Panel]:
     return [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)]
 
 
-def _part(influences: Influences, metric: OfMetric) -> Section:
+def _part(influences: Influences, metric: MetricSensitivity) -> Section:
     """Return a table with a row for each uncertain value, the most influential first, with remarks."""
     kind, indices = of_metric(metric.metric, "+.3g"), metric.indices
     order = np.argsort(-indices.values[METHODS[influences.method].shown[0]])
@@ -89,7 +89,7 @@ def _part(influences: Influences, metric: OfMetric) -> Section:
     return Section(heading, columns, remarks=remarks(influences, metric))
 
 
-def overlapping_pairs(influences: Influences, metric: OfMetric) -> list[tuple[str, str]]:
+def overlapping_pairs(influences: Influences, metric: MetricSensitivity) -> list[tuple[str, str]]:
     """Return pairs of neighbours in the ranking whose confidence bands overlap, so that their order is open.
 
     Values surely below a hundredth of the largest index are left out as negligible.
@@ -106,7 +106,7 @@ def overlapping_pairs(influences: Influences, metric: OfMetric) -> list[tuple[st
     ]
 
 
-def remarks(influences: Influences, metric: OfMetric) -> list[str]:
+def remarks(influences: Influences, metric: MetricSensitivity) -> list[str]:
     """Return remarks on overlapping bands and on the sum of first-order indices.
 
     A difference of the sum from 1 within its error is not attributed to interactions.
@@ -131,7 +131,7 @@ def _colour_of(rank: int) -> str:
     return COLOURS[rank] if rank < _MAXIMUM_LINES else GREY
 
 
-def _bars(influences: Influences, metric: OfMetric) -> Panel:
+def _bars(influences: Influences, metric: MetricSensitivity) -> Panel:
     """Return a panel of the indices with their bands, a row and a colour for each value.
 
     The second index has open markers.
@@ -158,7 +158,7 @@ def _bars(influences: Influences, metric: OfMetric) -> Panel:
     return Panel(fraction, Kind(), marks, of_metric(metric.metric).words, legend="", then=name_values)
 
 
-def _course(influences: Influences, metric: OfMetric) -> Panel:
+def _course(influences: Influences, metric: MetricSensitivity) -> Panel:
     """Return a panel of the largest indices for growing parts of the sample."""
     method = METHODS[influences.method]
     name, sizes = method.shown[0], [step.blocks for step in metric.settling]

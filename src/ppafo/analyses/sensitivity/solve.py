@@ -57,7 +57,7 @@ class IndexConvergence:
 
 
 @dataclass(frozen=True, slots=True)
-class OfMetric:
+class MetricSensitivity:
     """Sensitivity of a metric at growing sample sizes.
 
     ``mean``, ``standard_deviation``: over all runs [SI]
@@ -107,7 +107,7 @@ class Influences:
     failed: int
     not_following: int
     policy: str
-    metrics: list[OfMetric]
+    metrics: list[MetricSensitivity]
 
 
 _POLICY = "above the maximum fraction refused; below, every block with a failed run is left out"
@@ -168,13 +168,13 @@ def analyse(
         failed=runs.failures,
         not_following=int(off),
         policy=_POLICY,
-        metrics=[_of_metric(name, rows[name], evaluated, method, settings) for name in requested],
+        metrics=[_metric_sensitivity(name, rows[name], evaluated, method, settings) for name in requested],
     )
 
 
-def _of_metric(
+def _metric_sensitivity(
     name: str, values: Floats, design: EvaluatedBlocks, method: Method, settings: SensitivitySettings
-) -> OfMetric:
+) -> MetricSensitivity:
     """Return the sensitivity of a metric with ``values`` (rows,), for growing parts of the sample.
 
     Raises StudyError if the metric is equal in every run, or if too few blocks are complete.
@@ -207,7 +207,7 @@ def _of_metric(
         )
         settling.append(IndexConvergence(blocks=size, used=complete_blocks.size, indices=indices, bands=bands))
     change, band = changes(_part_of(design, values, np.flatnonzero(is_whole)), settings.confidence)
-    return OfMetric(
+    return MetricSensitivity(
         metric=name,
         mean=float(np.mean(values[known])),
         standard_deviation=float(np.std(values[known], ddof=1)),

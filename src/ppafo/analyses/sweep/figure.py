@@ -48,7 +48,7 @@ _CAPTION = (
 )
 
 
-def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Section:
+def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence[str]) -> Section:
     """Return the figure of a study: panels of the metrics, and bands over time.
 
     A grid of two axes is drawn as maps, two drawn values as coloured points, all else as one panel for each metric.
@@ -73,7 +73,7 @@ def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]
     is_compared = is_mapped and len(names) > 1
     count = len(metrics) + len(study["outputs"].get("bands", ()))
     return Section(
-        said=said,
+        said=sentences,
         remarks=remarks,
         panels=partial(_panels, results, metrics, names, varied, grid),
         name=FIGURE,
@@ -121,20 +121,20 @@ def _kind(results: StudyResults, path: str) -> Kind:
 
 def _histogram(results: StudyResults, metric: str) -> Panel:
     """Return a panel with the histogram of a metric for every configuration."""
-    parts = {name: values[np.isfinite(values)] for name, values in results.thin(metric, MAXIMUM_DRAWN).items()}
-    filled = [values for values in parts.values() if values.size]
-    edges = np.zeros(2)
+    values_by_name = {name: values[np.isfinite(values)] for name, values in results.thin(metric, MAXIMUM_DRAWN).items()}
+    filled = [values for values in values_by_name.values() if values.size]
+    marks = []
     if filled:
-        low, high = min(float(part.min()) for part in filled), max(float(part.max()) for part in filled)
-        is_counted = high - low < _HISTOGRAM_BINS and all(bool(np.all(part == np.round(part))) for part in filled)
-        bins = min(_HISTOGRAM_BINS, max(8, round(sum(part.size for part in filled) ** 0.5)))
-        # A bin for each whole number where values are counts of few kinds: others would be empty now and then.
-        edges = np.arange(low - 0.5, high + 1.0) if is_counted else np.linspace(low, high or low + 1.0, 1 + bins)
-    marks = [
-        Mark("bars", edges, np.histogram(own, edges)[0], label=name, colour=colour)
-        for (name, own), colour in zip(parts.items(), COLOURS, strict=False)
-        if filled
-    ]
+        low, high = min(float(values.min()) for values in filled), max(float(values.max()) for values in filled)
+        are_whole = all(bool(np.all(values == np.round(values))) for values in filled)
+        if are_whole and high - low < _HISTOGRAM_BINS:
+            # A bin for each whole number where values are counts of few kinds: others would be empty now and then.
+            edges = np.arange(low - 0.5, high + 1.0)
+        else:
+            bins = min(_HISTOGRAM_BINS, max(8, round(sum(values.size for values in filled) ** 0.5)))
+            edges = np.linspace(low, high or low + 1.0, 1 + bins)
+        for (name, values), colour in zip(values_by_name.items(), COLOURS, strict=False):
+            marks.append(Mark("bars", edges, np.histogram(values, edges)[0], label=name, colour=colour))
     return Panel(metric_kind(results, metric), Kind(), marks, then=lambda axes: axes.set_yticks([]))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ppafo.analyses.sweep.statistic_answer import finding_of, kind_of, remarks_on
 from ppafo.analyses.sweep.statistic_kind import FEWEST_SEEN, Statistic, parse_statistic
-from ppafo.analyses.sweep.stopping import InterimEstimate, OfMean, StatisticEstimate, StoppingRule, stopping_rule
+from ppafo.analyses.sweep.stopping import InterimEstimate, MetricMean, StatisticEstimate, StoppingRule, target_width
 from ppafo.arguments import Confidence, Count, MaximumFailed, Name, Overrides, Seed, Threads, checked
 from ppafo.documents.json_text import plain
 from ppafo.errors import at_fault
@@ -99,8 +99,8 @@ def estimate(
     parsed = parse_statistic(statistic, metric, atmosphere_of(base.scenario, {*uncertainty.paths, *uncertainty.same}))
     # A probability may be 0, of which a fraction says nothing: its width is a difference.
     width_text = width or (PROBABILITY_WIDTH if parsed.threshold is not None else DEFAULT_WIDTH)
-    limits = StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed)
-    rule = stopping_rule(parsed, metric, width_text, limits)
+    target = target_width(parsed, metric, width_text)
+    rule = StoppingRule(*target, first_draws, draws, confidence, maximum_failed)
     warn_of_coarse_pairs([base.scenario])
     runs = scenario_runs(base.scenario, metrics, RunCounter(rule.first, progress), uncertainty.gauge, threads)
     with shown_in(chosen.shown_for(base.scenario)):
@@ -159,7 +159,7 @@ def draw_until(
     further = {}
     for name in also:
         mean = floored_interval(rows[name], REPLICATES, rule.confidence_of_look)
-        further[name] = OfMean(int(np.count_nonzero(np.isfinite(rows[name]))), mean.value, mean.low, mean.high)
+        further[name] = MetricMean(int(np.count_nonzero(np.isfinite(rows[name]))), mean.value, mean.low, mean.high)
     estimated = StatisticEstimate(
         metric=metric,
         statistic=statistic.label,
