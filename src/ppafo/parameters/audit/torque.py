@@ -186,6 +186,7 @@ def _ceiling_by_angle(evidence: Evidence) -> Iterator[AuditFinding]:
         device = build_device(evidence.parameter_set)
     except ParameterError:
         return
+    chambers = "its chamber at supply or" if device.actuator.has_one_chamber else "one chamber at supply and the other"
     stops = float(device.actuator.angle_min), float(device.actuator.angle_max)
     angles = [stops[0] + (stops[1] - stops[0]) * number / _PLACES for number in range(_PLACES + 1)]
     reaches = [torque_reach(device, angle) for angle in angles]
@@ -208,8 +209,8 @@ def _ceiling_by_angle(evidence: Evidence) -> Iterator[AuditFinding]:
         values=evidence.values_of(*_SUPPLIES, _STATIC),
         sides=tuple(sides),
         paragraph=(
-            f"With one chamber at supply and the other at atmosphere the actuator gives {' and '.join(texts)}, before "
-            f"friction. {'Static friction is more: the joint cannot move.' if holds else _ABOVE}"
+            f"With {chambers} at atmosphere the actuator gives {' and '.join(texts)}, before friction. "
+            f"{'Static friction is more: the joint cannot move.' if holds else _ABOVE}"
         ),
     )
 
