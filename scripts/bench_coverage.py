@@ -25,7 +25,8 @@ if not __package__:
 
 from ppafo.errors import PpafoError
 from ppafo.identification.estimate import Estimate
-from ppafo.identification.problem import PROCEDURES, ProcedureContext, parse_problem, run_procedure
+from ppafo.identification.problem import parse_problem
+from ppafo.identification.procedures import PROCEDURES, ProcedureContext, run_procedure
 from ppafo.identification.source import RecordingSource
 from ppafo.parameters import load_parameter_set
 from ppafo.rig import record

@@ -25,7 +25,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from ppafo.errors import PpafoError
-from ppafo.identification.problem import ProcedureContext, load_problem, run_procedure
+from ppafo.identification.problem import load_problem
+from ppafo.identification.procedures import ProcedureContext, run_procedure
 from ppafo.identification.source import source_of
 from ppafo.identification.tolerances import tolerances_of
 from ppafo.model.orifice import isentropic_flow_function

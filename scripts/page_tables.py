@@ -13,6 +13,7 @@ import numpy as np
 
 from ppafo.analyses.endurance.gas_demand import demand_of_numbers
 from ppafo.analyses.endurance.solve import follow_bottle
+from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.page.workbench import openings_of
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.simulation.loading import list_scenarios
@@ -32,6 +33,7 @@ def minutes_of_bottle() -> dict[str, Any]:
     lasting = [follow_bottle(bottle, draw, schedule).discharge.walking_time for draw in draws]
     return {
         "name": NAME,
+        "molarMass": float(f"{UNIVERSAL_GAS_CONSTANT / bottle.fluid.table.gas_constant:.4g}"),
         "flows": [float(f"{flow:.4g}") for flow in FLOWS],
         "minutes": [float(f"{seconds / 60.0:.4g}") for seconds in lasting],
     }

@@ -103,6 +103,8 @@ export interface Tab {
 /** How many minutes a full bottle lasts, by the mean flow [kg/s] that is taken from it. */
 export interface Bottle {
   readonly name: string;
+  /** Molar mass of its gas [kg/mol]. */
+  readonly molarMass: number;
   readonly flows: readonly number[];
   readonly minutes: readonly number[];
 }

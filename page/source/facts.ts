@@ -21,8 +21,12 @@ export function sustainedTorque(content: Content, { program, values }: Pick<Simu
   return [-above(sustained.lowered), above(sustained.raised)];
 }
 
-/** For how many minutes a full bottle lasts at the mean flow of a run, by the table of the package; NaN where it takes none. */
-export function minutesOfBottle({ flows, minutes }: Bottle, { time, channels }: Run): number {
+/** Relative difference of two molar masses up to which they are of the same gas. */
+const SAME_GAS = 0.01;
+
+/** For how many minutes a full bottle lasts at the mean flow of a run, by the table of the package; NaN where it takes none, or another gas. */
+export function minutesOfBottle({ flows, minutes, molarMass }: Bottle, { time, channels }: Run, values: Values): number {
+  if (Math.abs((values.get("gas.molar_mass") ?? molarMass) / molarMass - 1) > SAME_GAS) return NaN;
   const flow = (channels.get("supplied_mass")?.at(-1) ?? 0) / (time.at(-1) ?? 0);
   const place = Math.min(flows.length - 1, Math.max(1, flows.findIndex((one) => one >= flow)));
   if (!(flow >= (flows[0] ?? 0)) || flow > (flows.at(-1) ?? 0)) return NaN;
@@ -54,8 +58,8 @@ function torqueFacts(content: Content, done: readonly Simulated[]): string {
 }
 
 function gasFacts({ bottle }: Content, done: readonly Simulated[]): string {
-  const lasting = done.flatMap(({ name, run }) => {
-    const minutes = minutesOfBottle(bottle, run);
+  const lasting = done.flatMap(({ name, run, values }) => {
+    const minutes = minutesOfBottle(bottle, run, values);
     return Number.isFinite(minutes) ? [`${plain(minutes, 2)} minutes${done.length > 1 ? ` (${name})` : ""}`] : [];
   });
   return lasting.length === 0 ? "" : `Without rest, ${bottle.name} lasts ${lasting.join(", ")}.`;

@@ -4,6 +4,7 @@ import { type Content, type Metric, programNamed } from "./content";
 import { element, say, whenQuiet } from "./dom";
 import type { Run } from "./engine";
 import { minutesOfBottle } from "./facts";
+import type { Values } from "./settings";
 import { plain, shownText, shownValue } from "./shown";
 import { readableUnit } from "./units";
 
@@ -12,6 +13,7 @@ export interface Column {
   readonly look: number;
   readonly program: string;
   readonly run: Run;
+  readonly values: Values;
 }
 
 interface Row {
@@ -51,7 +53,7 @@ export class OutcomeTable {
       this.build();
     }
     for (const { metric, row, cells, changes } of this.rows) {
-      const values = columns.map(({ run }) => this.valueOf(metric, run));
+      const values = columns.map((column) => this.valueOf(metric, column));
       const zero = this.content.zeros[metric.unit] ?? 0;
       if (values.some((value) => !isNothing(value, zero))) this.seen.add(metric.name);
       row.hidden = !this.seen.has(metric.name);
@@ -64,8 +66,8 @@ export class OutcomeTable {
   }
 
   /** A metric of a run; the minutes of the bottle are made of its gas. */
-  private valueOf(metric: Metric, run: Run): number | undefined {
-    return metric === MINUTES ? 60 * minutesOfBottle(this.content.bottle, run) : run.metrics.get(metric.name);
+  private valueOf(metric: Metric, { run, values }: Column): number | undefined {
+    return metric === MINUTES ? 60 * minutesOfBottle(this.content.bottle, run, values) : run.metrics.get(metric.name);
   }
 
   private build(): void {

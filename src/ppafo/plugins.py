@@ -8,6 +8,7 @@ import importlib
 import importlib.machinery
 import os
 import re
+import site
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -184,8 +185,23 @@ def without_working_folder() -> Iterator[None]:
 
 
 def is_working_folder(folder: str | Path) -> bool:
-    """Tell whether an entry of the search path is the working folder, which may contain files of other people."""
+    """Tell whether an entry of the search path is the working folder, which may contain files of other people.
+
+    The folder of a package that somebody installed as editable is no such folder, wherever the command runs.
+    """
     try:
-        return os.path.samefile(folder or ".", ".")  # noqa: PTH121
+        is_here = os.path.samefile(folder or ".", ".")  # noqa: PTH121
     except OSError:  # the search path has folders that are not there
         return False
+    return is_here and Path.cwd().resolve() not in _editable_folders()
+
+
+def _editable_folders() -> set[Path]:
+    """Return the folders that path files (``.pth``) of the installed packages put on the search path."""
+    folders = set()
+    for packages in map(Path, (*site.getsitepackages(), site.getusersitepackages())):
+        for file in packages.glob("*.pth"):
+            lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
+            folders |= {(packages / line.strip()).resolve() for line in lines if not line.startswith(("import", "#"))}
+        folders.discard(packages.resolve())
+    return folders

@@ -93,7 +93,7 @@ def test_where_the_solver_of_the_rig_gives_up_the_report_has_no_figure_3_and_say
     def gives_up(_run: object) -> RigSolution:
         raise SimulationError("the solver of the rig stopped")
 
-    monkeypatch.setattr("ppafo.rig.experiments.solve_rig", gives_up)
+    monkeypatch.setattr("ppafo.rig.transient.solve_rig", gives_up)
     again = tmp_path / "again"
     shutil.copytree(out, again)
     assert main(["reproduce", "--out", str(again)]) == 0

@@ -22,7 +22,7 @@ from ppafo.identification.problem import load_problem
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parts import load_catalogue
-from ppafo.rig.experiments import check_rig_folder
+from ppafo.rig.folder import check_rig_folder
 from ppafo.rig.preset import load_preset
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.storage.column_map import load_column_map

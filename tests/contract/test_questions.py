@@ -23,7 +23,7 @@ from ppafo.cli.commands import COMMANDS, OTHERS
 from ppafo.cli.main import build_parser, main
 from ppafo.exports.hil.ports import DEFAULT_BAUD
 from ppafo.exports.hil.wire import RATE
-from ppafo.validation.agreement import DEFAULT_LIMIT
+from ppafo.validation.settings import DEFAULT_LIMIT
 from tests.page_code import block_with, write_package
 
 VERBS: dict[str, Command] = {

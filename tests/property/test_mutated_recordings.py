@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 from ppafo.errors import PpafoError
 from ppafo.parameters import load_device
 from ppafo.storage.column_map import ColumnMap
-from ppafo.validation.agreement import ReplaySettings, compare_recording
+from ppafo.validation.agreement import compare_recording
 from ppafo.validation.measured import read_measured
 from ppafo.validation.replay import MOTIONS
+from ppafo.validation.settings import ReplaySettings
 from tests.repeatable import TOO_SLOW
 
 DEVICE = load_device("ppafo2011")

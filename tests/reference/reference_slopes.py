@@ -255,7 +255,7 @@ def right_hand_side_source(program: Program) -> str:
     balance, the states of effects, and the state of the valve.
     """
     collector = SourceCollector(INLINE)
-    link_program(program, collector)
+    link_program(program, collector.replacements)
     add = collector.add
     cells: dict[str, str] = {}
     for name, row in parameter_groups(program).items():

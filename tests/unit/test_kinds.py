@@ -136,6 +136,19 @@ def test_a_law_is_named_by_module_and_object_from_the_working_folder(
             load_scenario("torque-task-proportional", [f"controller.kind={name}"])
 
 
+def test_the_folder_of_an_editable_package_is_searched_from_within_as_from_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, packages = tmp_path / "own", tmp_path / "packages"
+    own.mkdir()
+    packages.mkdir()
+    monkeypatch.chdir(own)
+    monkeypatch.setattr(plugins.site, "getsitepackages", lambda: [str(packages)])
+    assert plugins.is_working_folder(own)
+    (packages / "mine.pth").write_text(f"import something\n{own}\n")
+    assert not plugins.is_working_folder(own)
+
+
 def test_profiles_and_metrics_are_found_too(install: Install) -> None:
     profile = "from dataclasses import replace\nfrom ppafo.control.profiles import SINE\n"
     install("other_profiles", profile + 'KIND = replace(SINE, name="wave")\n', profiles="wave")

@@ -12,7 +12,7 @@ import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import FunctionType
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -26,9 +26,9 @@ COMPILED_BUILTINS = frozenset(
     {"abs", "bool", "divmod", "enumerate", "float", "int", "len", "max", "min", "pow", "range", "round", "sum", "zip"}
 )
 Row = TypeVar("Row", bound=tuple[Any, ...])
-_INSIDE = object()
+_AT_RUN_TIME = object()
 """Placeholder for a value that is known only while the function runs."""
-_INSTEAD = {"print": "; take it out: under PPAFO_BACKEND=python a debugger stops in the function"}
+_REMEDIES = {"print": "; take it out: under PPAFO_BACKEND=python a debugger stops in the function"}
 """Remedies for built-in functions that cannot be compiled."""
 
 
@@ -48,43 +48,55 @@ def is_step_function(function: object) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class RewrittenNames:
-    """Names of a rewritten function: all local names, known values by name, and row classes by name."""
+class FunctionNames:
+    """Names of a function: local names and parameters, known values by name, and row classes by name."""
 
     local: frozenset[str]
-    kept: Mapping[str, Any]
+    parameters: frozenset[str]
+    known: Mapping[str, Any]
     rows: Mapping[str, Any]
+
+
+def names_of(function: FunctionType) -> FunctionNames:
+    """Return the names of a function of the model as it is defined; its bound ``parts`` are known."""
+    parts = parts_of(function)
+    known = {} if parts is None else {"parts": parts}
+    local, parameters = frozenset(function.__code__.co_varnames), frozenset(_parameters(function.__code__))
+    return FunctionNames(local, parameters, known, {})
+
+
+class ModuleText(Protocol):
+    """Text of the module for which a function is composed."""
+
+    def add_inside(self, function: FunctionType, called: Any) -> str:
+        """Add a function or NamedTuple class that a function uses; return its name in the module."""
+
+    def handed_to(self, name: str) -> tuple[str, ...]:
+        """Return the names passed to a function of the module before its own arguments."""
+
+    def constructed(self, row: Any) -> Any:
+        """Return the class that replaces a declared row in this module."""
+
+    def note_read(self, scope: Mapping[str, Any], name: str, value: Any) -> None:
+        """Record a name that was looked up, and its value."""
 
 
 class Composer(ast.NodeTransformer):
     """Rewriter of the body of one function.
 
-    ``add`` adds another function to the module, and ``note`` records each name that was looked up. ``rows_of`` returns
-    the rows of effects that an added function needs; each call passes these rows before its own arguments. ``needed``
-    has the rows that this function must receive in turn, because it has no such parameters. ``stands_for`` returns the
-    class that replaces a declared row in this module. ``names`` are the names of a function that was rewritten before.
+    ``rows_to_receive`` are rows that called functions need and for which this function has no parameter, so that its
+    callers have to pass them.
     """
 
-    def __init__(
-        self,
-        function: types.FunctionType,
-        add: Callable[[Any], str],
-        note: Callable[[Mapping[str, Any], str, Any], None],
-        rows_of: Callable[[str], tuple[str, ...]] = lambda _name: (),
-        stands_for: Callable[[Any], Any] = lambda row: row,
-        names: RewrittenNames | None = None,
-    ) -> None:
-        self.function = function
-        self.add = add
-        self.note = note
-        self.rows_of = rows_of
-        self.stands_for = stands_for
-        self.local = frozenset(function.__code__.co_varnames) if names is None else names.local
-        self.kept: Mapping[str, Any] = {} if names is None else names.kept
-        self.rows: Mapping[str, Any] = {} if names is None else names.rows
+    def __init__(self, function: FunctionType, module: ModuleText, names: FunctionNames) -> None:
+        self.function, self.module = function, module
+        self.local, self.parameters, self.known, self.rows = names.local, names.parameters, names.known, names.rows
         self.kinds: dict[str, Any] = {**function.__annotations__, **self.rows}
-        self.given = frozenset(_parameters(function.__code__)) if names is None else names.local
-        self.needed: set[str] = set()
+        self.rows_to_receive: set[str] = set()
+
+    def add(self, item: Any) -> str:
+        """Add a function or NamedTuple class that this function uses; return its name in the module."""
+        return self.module.add_inside(self.function, item)
 
     def refuse(self, where: ast.AST, problem: str) -> ProgramError:
         """Return the error for a node of the function."""
@@ -127,17 +139,17 @@ class Composer(ast.NodeTransformer):
     def visit_Name(self, node: ast.Name) -> ast.expr:
         """Replace a name defined outside the function."""
         value = self.value_of(node)
-        return node if value is _INSIDE else self.handed_over(value, node)
+        return node if value is _AT_RUN_TIME else self.passed_value(value, node)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         """Replace ``module.name``. ProgramError if the value cannot be compiled."""
         value = self.value_of(node)
-        if value is not _INSIDE:
-            return self.handed_over(value, node)
+        if value is not _AT_RUN_TIME:
+            return self.passed_value(value, node)
         owner = self.value_of(node.value)
-        if owner is not _INSIDE and not isinstance(owner, tuple):
+        if owner is not _AT_RUN_TIME and not isinstance(owner, tuple):
             raise self.refuse(node, f"'{ast.unparse(node)}' is of a {type(owner).__name__}, which cannot be compiled")
-        row = self.stands_for(self.row_of(node.value))
+        row = self.module.constructed(self.row_of(node.value))
         if row is not None and node.attr not in row._fields:
             hint = nearest_name(node.attr, row._fields)
             raise self.refuse(node, f"{ast.unparse(node.value)} has no '{node.attr}'{hint}")
@@ -151,7 +163,7 @@ class Composer(ast.NodeTransformer):
         called = self.value_of(node.func)
         if called is each and len(node.args) > 1:
             return self.each_number(node.args[0], node.args[1])
-        if called is _INSIDE:
+        if called is _AT_RUN_TIME:
             if isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
                 return self.replaced(node, node.func.value)
             if isinstance(node.func, ast.Attribute):
@@ -159,15 +171,15 @@ class Composer(ast.NodeTransformer):
             self.generic_visit(node)
             return node
         called, node = self.with_parts(called, node)
-        own: list[ast.expr] = []
-        if isinstance(called, types.FunctionType) or is_row(called):
-            own = self.own_arguments(called, node)
-        function = self.stand_in(called, node.func)
+        defaults: list[ast.expr] = []
+        if isinstance(called, FunctionType) or is_row(called):
+            defaults = self.default_arguments(called, node)
+        function = self.composed_value(called, node.func)
         arguments = [*self.rows_for(function, node), *(self.visit(argument) for argument in node.args)]
-        if not own:
+        if not defaults:
             named = [ast.keyword(keyword.arg, self.visit(keyword.value)) for keyword in node.keywords]
             return ast.Call(function, arguments, named)
-        return ast.Call(function, [*arguments, *own], [])
+        return ast.Call(function, [*arguments, *defaults], [])
 
     def with_parts(self, called: Any, node: ast.Call) -> tuple[Any, ast.Call]:
         """Return a function called with ``parts=`` as a function bound to these parts, and the call without ``parts``.
@@ -190,28 +202,28 @@ class Composer(ast.NodeTransformer):
 
     def rows_for(self, function: ast.expr, node: ast.AST) -> list[ast.expr]:
         """Rows of effects that are passed first to a function of the module. ProgramError if a local name hides one."""
-        rows = self.rows_of(function.id) if isinstance(function, ast.Name) else ()
+        rows = self.module.handed_to(function.id) if isinstance(function, ast.Name) else ()
         for row in rows:
-            if row in self.local - self.given:
+            if row in self.local - self.parameters:
                 raise self.refuse(node, f"the local name '{row}' hides the parameters of the effect '{row}'; rename it")
-        self.needed.update(row for row in rows if row not in self.given)
+        self.rows_to_receive.update(row for row in rows if row not in self.parameters)
         return [ast.Name(row, ast.Load()) for row in rows]
 
-    def handed_over(self, value: Any, node: ast.expr) -> ast.expr:
+    def passed_value(self, value: Any, node: ast.expr) -> ast.expr:
         """Text of a value that is passed but not called. ProgramError for a function that needs rows of effects."""
-        stand_in = self.stand_in(value, node)
-        if isinstance(stand_in, ast.Name) and self.rows_of(stand_in.id):
+        composed = self.composed_value(value, node)
+        if isinstance(composed, ast.Name) and self.module.handed_to(composed.id):
             raise self.refuse(node, f"an effect acts inside '{ast.unparse(node)}', so that it can only be called")
-        return stand_in
+        return composed
 
-    def own_arguments(self, called: Any, node: ast.Call) -> list[ast.expr]:
+    def default_arguments(self, called: Any, node: ast.Call) -> list[ast.expr]:
         """Fields of a NamedTuple after the positional arguments, if some have default values; else none.
 
         Raises ProgramError if the arguments do not match.
         """
         if is_step_function(called) or any(isinstance(argument, ast.Starred) for argument in node.args):
             return []  # its groups are handed over by name; how many there are is known only to the compiler
-        is_function = isinstance(called, types.FunctionType)
+        is_function = isinstance(called, FunctionType)
         takes: tuple[str, ...] = _parameters(called.__code__) if is_function else called._fields
         if len(node.args) == len(takes) and not node.keywords and not (is_function and called.__kwdefaults__):
             return []
@@ -250,7 +262,7 @@ class Composer(ast.NodeTransformer):
 
     def fields_of(self, node: ast.expr) -> tuple[Any, list[ast.Attribute]]:
         """Class of a row, and an expression for each field. ProgramError if the class is not declared."""
-        row, owner = self.stands_for(self.row_of(node)), node
+        row, owner = self.module.constructed(self.row_of(node)), node
         while isinstance(owner, ast.Attribute):
             owner = owner.value
         if row is None or not isinstance(owner, ast.Name):
@@ -285,34 +297,34 @@ class Composer(ast.NodeTransformer):
 
     def value_of(self, node: ast.expr) -> Any:
         """Present value of a name or ``module.name`` outside the function. ProgramError if there is none."""
-        if isinstance(node, ast.Name) and node.id in self.kept:
-            return self.kept[node.id]
+        if isinstance(node, ast.Name) and node.id in self.known:
+            return self.known[node.id]
         if isinstance(node, ast.Name) and node.id not in self.local:
             scope = self.function.__globals__
             if node.id in scope:
-                self.note(scope, node.id, scope[node.id])
+                self.module.note_read(scope, node.id, scope[node.id])
                 return scope[node.id]
             if node.id in COMPILED_BUILTINS:
                 return getattr(builtins, node.id)
             if hasattr(builtins, node.id):
-                raise self.refuse(node, f"'{node.id}' cannot be compiled{_INSTEAD.get(node.id, '')}")
+                raise self.refuse(node, f"'{node.id}' cannot be compiled{_REMEDIES.get(node.id, '')}")
             hint = nearest_name(node.id, [*self.local, *scope, *COMPILED_BUILTINS])
             remedy = "; import math" if node.id == "math" else ""
             raise self.refuse(node, f"there is no '{node.id}'{hint}{remedy}")
         if not isinstance(node, ast.Attribute):
-            return _INSIDE
+            return _AT_RUN_TIME
         owner = self.value_of(node.value)
         if not isinstance(owner, types.ModuleType):
             is_known = is_made_of(owner) or owner is parts_of(self.function)
-            return getattr(owner, node.attr, _INSIDE) if is_known else _INSIDE
+            return getattr(owner, node.attr, _AT_RUN_TIME) if is_known else _AT_RUN_TIME
         if not hasattr(owner, node.attr):
             hint = nearest_name(node.attr, dir(owner))
             raise self.refuse(node, f"module '{owner.__name__}' has no '{node.attr}'{hint}")
         value = getattr(owner, node.attr)
-        self.note(vars(owner), node.attr, value)
+        self.module.note_read(vars(owner), node.attr, value)
         return value
 
-    def stand_in(self, value: Any, node: ast.expr) -> ast.expr:
+    def composed_value(self, value: Any, node: ast.expr) -> ast.expr:
         """Text of a value from outside the function. ProgramError if the value cannot be compiled.
 
         A function with a cache (``functools.lru_cache``) is replaced by the function without the cache.
@@ -326,7 +338,7 @@ class Composer(ast.NodeTransformer):
             return self.global_name("math", own, node)
         if own in COMPILED_BUILTINS and getattr(builtins, own) is value:
             return self.global_name("", own, node)
-        if isinstance(value, types.FunctionType) or is_row(value):
+        if isinstance(value, FunctionType) or is_row(value):
             return self.global_name("", self.add(value), node)
         name = ast.unparse(node)
         if getattr(value, "__module__", "") == "numpy" or own.startswith("numpy"):
@@ -359,7 +371,7 @@ class Composer(ast.NodeTransformer):
         if is_row(type(value)):
             fields = [self.literal(inner, where, name) for inner in value]
             return ast.Call(ast.Name(self.add(type(value)), ast.Load()), fields, [])
-        if isinstance(value, types.FunctionType):
+        if isinstance(value, FunctionType):
             return ast.Name(self.add(value), ast.Load())
         raise self.refuse(
             where,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from types import FunctionType
 from typing import Any
 
-from ppafo.engine.composer import Composer, RewrittenNames, is_step_function
+from ppafo.engine.composer import Composer, FunctionNames, is_step_function
 from ppafo.engine.definitions import emitted_name
 from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import check_flow, check_grammar, place, refusal
@@ -60,7 +60,7 @@ class StepText:
     parameters: dict[str, Any] = field(init=False)
     of_step: dict[str, Any] = field(init=False)
     composed: dict[FunctionType, ComposedFunction] = field(default_factory=dict)
-    kept: dict[str, Any] = field(default_factory=dict)
+    placeholders: dict[str, Any] = field(default_factory=dict)
     given: set[str] = field(default_factory=set)
     """Groups of a step set by any phase so far, in the order of the loop."""
 
@@ -68,7 +68,7 @@ class StepText:
         """Look up the groups of the program, and link the functions of its components."""
         self.states, self.parameters = self.parts.state_rows(), self.parts.parameter_rows()
         self.of_step = self.parts.step_rows()
-        link_program(self.parts, self.collector)
+        link_program(self.parts, self.collector.replacements)
 
     @property
     def rows(self) -> Mapping[str, Any]:
@@ -102,13 +102,21 @@ class StepText:
         """Return the groups that an added function of the step reads and sets."""
         return self.composed[called].effects
 
+    def add_inside(self, function: FunctionType, called: Any) -> str:
+        """Add a function called inside another, unless it is a composed step; return its name in the module."""
+        return self.composed[called].name if called in self.composed else self.collector.add_inside(function, called)
+
     def handed_to(self, name: str) -> tuple[str, ...]:
         """Return the names passed to a function of the module before its own arguments."""
-        return self.collector.needs.get(name, ())
+        return self.collector.handed_to(name)
 
-    def note_read(self, scope: Mapping[str, Any], name: str) -> None:
-        """Record that a name was looked up."""
-        self.collector.note_read(scope, name, scope[name])
+    def constructed(self, row: Any) -> Any:
+        """Return the class that replaces a declared row in this module."""
+        return self.collector.constructed(row)
+
+    def note_read(self, scope: Mapping[str, Any], name: str, value: Any) -> None:
+        """Record a name that was looked up, and its value."""
+        self.collector.note_read(scope, name, value)
 
     def refuse_unkept(self, name: str, asking: ComposedFunction) -> ProgramError:
         """Return the error for a phase that reads a group which no phase stores: the line, and the remedy."""
@@ -157,22 +165,10 @@ class StepText:
         found: list[ast.stmt] = []
         for function, tree in reduced:
             check_grammar(tree, function.__code__.co_filename)
-            composer = self.composer(function, RewrittenNames(frozenset([*local, *takes]), self.kept, {}))
+            names = frozenset([*local, *takes])
+            composer = Composer(function, self, FunctionNames(names, names, self.placeholders, {}))
             found += [composer.visit(statement) for statement in tree.body]
         return found
-
-    def composer(self, function: FunctionType, names: RewrittenNames) -> Composer:
-        """Return the composer of a reduced function of the step, which replaces names defined outside the function."""
-        return Composer(
-            function,
-            lambda called: (
-                self.composed[called].name if called in self.composed else self.collector.add_inside(function, called)
-            ),
-            self.collector.note_read,
-            self.handed_to,
-            self.collector.stands_for,
-            names,
-        )
 
     def _composed(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> ComposedFunction:
         """Compose a function of the step once; the reduced function returns the groups that it sets.
@@ -194,7 +190,7 @@ class StepText:
             results: list[ast.expr] = [ast.Name(name, ast.Load()) for name in effects.results]
             value: ast.expr = results[0] if len(results) == 1 else ast.Tuple(results, ast.Load())
             if len(results) > 1:
-                value = ast.Call(reduction.kept(self._result_row(function, tuple(effects.results))), results, [])
+                value = ast.Call(reduction.placeholder(self._result_row(function, tuple(effects.results))), results, [])
             tree.body = [*tree.body, ast.copy_location(ast.Return(value), tree)]
         elif effects.results:
             raise reduction.refuse(tree, f"'{function.__name__}' gives a value and sets groups of its lane")
@@ -222,7 +218,8 @@ class StepText:
         check_flow(tree, file, local)
         # A local name may be that of a group which this function does not ask for.
         rows = {name: kind for name, kind in self.rows.items() if name in groups}
-        composer = self.composer(function, RewrittenNames(frozenset(local), self.kept, rows))
+        names = frozenset(local)
+        composer = Composer(function, self, FunctionNames(names, names, self.placeholders, rows))
         tree.returns, tree.decorator_list = None, []
         tree.body = [composer.visit(statement) for statement in tree.body]
         ast.fix_missing_locations(tree)

@@ -27,8 +27,9 @@ from ppafo.engine.composer import COMPILED_BUILTINS
 from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
+from ppafo.engine.replacements import Replacements
 from ppafo.engine.rows import leaves, rebuilt
-from ppafo.engine.source_text import MadeFrom, Read, SourceCollector
+from ppafo.engine.source_text import MadeFrom, NameRead
 from ppafo.errors import ProgramError
 from ppafo.model.binding import is_made_of
 from ppafo.model.declaration import PlainFunction
@@ -52,12 +53,12 @@ class PythonFunctions:
 
     def __init__(
         self,
-        links: Mapping[Any, Any],
-        effects: Mapping[Any, tuple[str, ...]],
+        replacements: Replacements,
         rows: EffectRows,
         operations: "Operations | None" = None,
     ) -> None:
-        self._links, self._effects, self._rows, self._operations = links, effects, rows, operations
+        self._replacements, self._rows, self._operations = replacements, rows, operations
+        self._is_plain = operations is None and replacements == Replacements()
         self._made: dict[Any, Any] = {}
         self.made_from = MadeFrom()
 
@@ -82,11 +83,11 @@ class PythonFunctions:
 
     def of(self, value: Any, inside: Any = None) -> Any:
         """Replacement of a value inside a function."""
-        if not self._links and self._operations is None:
+        if self._is_plain:
             return value
         value = getattr(value, "__wrapped__", value)
         if isinstance(value, FunctionType):
-            return self._function(self._links.get((inside, value), self._links.get(value, value)))
+            return self._function(self._replacements.called(value, inside))
         if isinstance(value, ModuleType) and value.__name__.startswith(OWN):
             return self._module(value)
         return MATH if value is math and self._operations is GOING_ON else value
@@ -98,7 +99,7 @@ class PythonFunctions:
             vars(space).update({name: self.of(value) for name, value in own.items()})
         return self._made[module]
 
-    def _function(self, function: FunctionType) -> Any:
+    def _function(self, function: Any) -> Any:
         """Copy of a function with replaced global names; the function itself if no name differs."""
         # A valve or law of somebody's own module calls the model too; the standard library does not.
         if function.__module__.partition(".")[0] in sys.stdlib_module_names:
@@ -108,10 +109,10 @@ class PythonFunctions:
             given = function.__globals__
             # A module has many more names than a function asks for.
             read = {name: given[name] for name in _names_of(function.__code__) if name in given}
-            self.made_from.reads += [Read(given, name, value) for name, value in read.items()]
+            self.made_from.reads += [NameRead(given, name, value) for name, value in read.items()]
             scope: dict[str, Any] = {"__builtins__": given["__builtins__"], "__name__": function.__module__}
             copied = FunctionType(code, scope, function.__name__, function.__defaults__, function.__closure__)
-            rows = self._effects.get(function, ())
+            rows = self._replacements.rows.get(function, ())
             self._made[function] = self._law(copied, rows) if rows else copied
             scope |= {name: self.of(value, function) for name, value in read.items()}
             copied.__kwdefaults__ = self.part(function.__kwdefaults__ or {})
@@ -142,16 +143,15 @@ def _names_of(code: CodeType) -> frozenset[str]:
 
 def functions_of(program: Program, rows: EffectRows, operations: "Operations | None" = None) -> PythonFunctions:
     """Return the model functions as replaced in a program, with rows of its effects; ProgramError as for linking."""
-    links, effects = _links_of(program)
-    return PythonFunctions(links, effects, rows, operations)
+    return PythonFunctions(_replacements_in(program), rows, operations)
 
 
 @lru_cache(maxsize=64)
-def _links_of(program: Program) -> tuple[dict[Any, Any], dict[Any, tuple[str, ...]]]:
+def _replacements_in(program: Program) -> Replacements:
     """Replacements of model functions in a program, and the rows that the laws of its effects take."""
-    collector = SourceCollector("")
-    link_program(program, collector)
-    return collector.links, collector.effects
+    replacements = Replacements()
+    link_program(program, replacements)
+    return replacements
 
 
 def in_program(
@@ -206,7 +206,7 @@ def over_samples(function: PlainFunction, *arguments: Any) -> Any:
 def _with_operations(function: PlainFunction, operations: "Operations | None") -> PlainFunction:
     """Return a model function with other operations, rebuilt if a global name of the function has changed since."""
     if operations is not COLUMNS:
-        own: PlainFunction = PythonFunctions({}, {}, {}, operations).of(function)
+        own: PlainFunction = PythonFunctions(Replacements(), {}, operations).of(function)
         return own
     functions, own = _for_columns(function)
     if functions.made_from.is_current():
@@ -217,7 +217,7 @@ def _with_operations(function: PlainFunction, operations: "Operations | None") -
 
 @lru_cache(maxsize=256)
 def _for_columns(function: PlainFunction) -> tuple[PythonFunctions, PlainFunction]:
-    functions = PythonFunctions({}, {}, {}, COLUMNS)
+    functions = PythonFunctions(Replacements(), {}, COLUMNS)
     return functions, functions.of(function)
 
 

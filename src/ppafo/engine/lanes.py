@@ -27,7 +27,6 @@ from ppafo.engine.lane_rows import VECTOR, lanes_of
 from ppafo.engine.loading import HOW_TO_INSTALL, compiled, compilers_to_try, runs_by_python
 from ppafo.engine.package_key import package_key
 from ppafo.engine.program import Program
-from ppafo.engine.rows import row_numbers
 from ppafo.engine.source_text import MadeFrom, SourceCollector
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.progress import time_text
@@ -255,22 +254,14 @@ def join_results(results: Sequence[BatchResult]) -> BatchResult:
     return BatchResult(states, np.concatenate([result.record for result in results], axis=2))
 
 
-@lru_cache(maxsize=64)
-def _row_counts(program: Program) -> tuple[int, int]:
-    """Return the numbers of parameter rows and state rows of a program."""
-    return len(row_numbers(program.parameter_rows())), len(row_numbers(program.state_rows()))
-
-
 class LaneBlock:
     """Block of runs in progress; ``states`` (rows, runs) may be read and modified between calls of ``advance``."""
 
     def __init__(
         self, module: RunnableProgram, program: Program, clock: Clock, parameters: Floats, states: Floats
     ) -> None:
-        given, kept = _row_counts(program)
-        if (len(parameters), len(states)) != (given, kept):
-            check_rows(len(parameters), program.parameter_rows(), Role.PARAMETER)
-            check_rows(len(states), program.state_rows(), Role.STATE)
+        check_rows(len(parameters), program.parameter_rows(), Role.PARAMETER)
+        check_rows(len(states), program.state_rows(), Role.STATE)
         self._module = module
         self._clock = clock
         self._width = states.shape[1]

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import FunctionType
 from typing import Any, get_type_hints
 
-from ppafo.engine.composer import RewrittenNames
+from ppafo.engine.composer import Composer, FunctionNames
 from ppafo.engine.entries import ARRAY_2D, ARRAY_3D, FLOAT, HEADER, INT, entry_text, indent, parse_expression
 from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, VECTOR
@@ -43,7 +43,7 @@ class LoopText:
         assert isinstance(function, FunctionType), "it is no other callable"
         self.reduction = Reduction(self.step, function, known or {})
         local = frozenset({*function.__code__.co_varnames, *HISTORIES, "record", *self.rows.arrays})
-        self.composer = self.step.composer(function, RewrittenNames(local, self.step.kept, {"now": Now}))
+        self.composer = Composer(function, self.step, FunctionNames(local, local, self.step.placeholders, {"now": Now}))
         self.other = LoopText(dict(others), function) if others else None
 
     def lines(self) -> list[ast.stmt]:
@@ -119,7 +119,7 @@ class LoopText:
 
     def decided(self, node: ast.If) -> list[ast.stmt] | None:
         """Branch selected by a condition on the parts alone; None for any other condition."""
-        test = self.reduction.asked(node.test)
+        test = self.reduction.condition(node.test)
         if not isinstance(test, ast.Constant):
             return None
         return node.body if test.value else node.orelse
@@ -143,7 +143,7 @@ class LoopText:
                 case ast.For(target=ast.Name()):
                     made.append(ast.For(node.target, self.expression(node.iter), self.of_lane(node.body), []))
                 case ast.If():
-                    test = self.reduction.asked(node.test)
+                    test = self.reduction.condition(node.test)
                     if isinstance(test, ast.Constant):
                         made += self.of_lane(node.body if test.value else node.orelse)
                     else:
@@ -164,7 +164,7 @@ class LoopText:
         """Call of a phase in a loop over runs."""
         if not isinstance(node, ast.Expr) or not isinstance(node.value, ast.Call):
             raise self.reduction.refuse(node, "in a loop over lanes phases are called")
-        called: FunctionType = self.reduction.outside(node.value.func)
+        called: FunctionType = self.reduction.outside_value(node.value.func)
         names = called.__code__.co_varnames[: called.__code__.co_argcount]
         arguments = list(zip(names, node.value.args, strict=True))[2:]
         values = {name: self.reduction.value_of(argument) for name, argument in arguments}
@@ -177,7 +177,7 @@ class LoopText:
         if isinstance(node.func, ast.Attribute) and _is_lanes(node.func.value):
             arguments = [ast.unparse(self.expression(argument)) for argument in node.args]
             return _parsed(self.rows.action(node.func.attr, arguments))
-        function: FunctionType = self.reduction.outside(node.func)
+        function: FunctionType = self.reduction.outside_value(node.func)
         inner = LoopText(self.steps, function)
         names = function.__code__.co_varnames[: function.__code__.co_argcount]
         # Behind ``parts`` and ``lanes``; an argument of the parameter's own name is there already.

@@ -18,7 +18,7 @@ from types import FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 from ppafo.engine.rows import is_row
-from ppafo.engine.source_text import MadeFrom, Read
+from ppafo.engine.source_text import MadeFrom, NameRead
 from ppafo.model.binding import frame_of
 
 COMPOSED = ("control", "engine", "metrics", "model", "processor", "signals")
@@ -92,7 +92,7 @@ def _hash_of_files(folders: tuple[str, ...]) -> str:
     return digest.hexdigest()
 
 
-def _names_in(folders: tuple[str, ...]) -> Iterator[Read]:
+def _names_in(folders: tuple[str, ...]) -> Iterator[NameRead]:
     """Yield the numbers and functions defined in the loaded modules of some folders."""
     own = tuple(f"ppafo.{folder}." for folder in folders)
     for name, module in sorted(sys.modules.items()):
@@ -107,7 +107,7 @@ def _names_in(folders: tuple[str, ...]) -> Iterator[Read]:
                 continue
             if isinstance(value, FunctionType) and not _is_installed(value.__code__.co_filename):
                 raise _ElsewhereError
-            yield Read(scope, read, value)
+            yield NameRead(scope, read, value)
 
 
 def _is_plain(value: Any) -> bool:

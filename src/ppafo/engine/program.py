@@ -243,20 +243,9 @@ class Program:
         return {f"{kind.name}_meter": kind for kind in self.meters}
 
     @property
-    def moving_meters(self) -> dict[str, MeterKind]:
-        """Meters that change after the first sample, by group; meters of motion do not change for a locked vane."""
-        return {group: kind for group, kind in self.meter_groups.items() if not (self.is_locked and kind.of_motion)}
-
-    @property
     def traces(self) -> dict[str, str]:
         """Path in a run of each traceable channel that is not a state variable of the same name."""
         return paths_of_traces(self.state_rows(), self.walks)
-
-    @property
-    def traced_paths(self) -> dict[int, str]:
-        """Path in a run of each traced channel, by channel index."""
-        paths = self.traces
-        return {row: paths.get(name, name) for row, name in enumerate(self.traced)}
 
     @property
     def followed(self) -> str:

@@ -18,7 +18,7 @@ from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any, NamedTuple, Protocol
 
-from ppafo.engine.composer import is_step_function
+from ppafo.engine.composer import ModuleText, is_step_function
 from ppafo.engine.plain_python import parse_module, refusal
 from ppafo.engine.rows import is_number, is_row, members, rebuilt
 from ppafo.errors import ProgramError
@@ -73,8 +73,8 @@ class Effects:
         return [*self.groups, *self.slots]
 
 
-class FunctionCollector(Protocol):
-    """Collector of composed functions, as used by the reduction."""
+class StepModule(ModuleText, Protocol):
+    """Text of the module for which a function of the step is reduced."""
 
     @property
     def parts(self) -> Any:
@@ -88,17 +88,11 @@ class FunctionCollector(Protocol):
         """Add a function called by another function, with its known arguments; return its name in the module."""
 
     @property
-    def kept(self) -> dict[str, Any]:
+    def placeholders(self) -> dict[str, Any]:
         """Known values in reduced functions, by their placeholder names."""
 
     def effects_of(self, called: FunctionType) -> Effects:
         """Return the groups that an added function of the step reads and sets."""
-
-    def handed_to(self, name: str) -> tuple[str, ...]:
-        """Return the names passed to a function of the module before its own arguments."""
-
-    def note_read(self, scope: Mapping[str, Any], name: str) -> None:
-        """Record that a name was looked up."""
 
 
 _COMPREHENSIONS = ast.GeneratorExp | ast.ListComp | ast.SetComp | ast.DictComp
@@ -128,9 +122,9 @@ class Definition:
     def value(self, node: ast.expr, scope: dict[str, Any], known: dict[str, Any]) -> Any:
         """Return the value of an expression."""
         if id(node) not in self.codes:
-            whole = ast.fix_missing_locations(ast.Expression(node))
+            expression = ast.fix_missing_locations(ast.Expression(node))
             is_nested = any(isinstance(inner, _COMPREHENSIONS) for inner in ast.walk(node))
-            self.codes[id(node)] = compile(whole, "<parts>", "eval"), is_nested
+            self.codes[id(node)] = compile(expression, "<parts>", "eval"), is_nested
         code, is_nested = self.codes[id(node)]
         # Evaluated is the text of a function that Python has loaded, with its own globals, as a call of it would: calls
         # and generators too, so that no smaller evaluator would do. No file, setting or argument comes in as text.
@@ -178,19 +172,19 @@ def _definitions(file: str) -> dict[int, ast.FunctionDef]:
 class Reduction:
     """Reduction of one function; ``known`` are names with known values, in addition to ``parts``."""
 
-    def __init__(self, collector: FunctionCollector, function: FunctionType, known: Mapping[str, Any]) -> None:
-        self.collector, self.function = collector, function
+    def __init__(self, module: StepModule, function: FunctionType, known: Mapping[str, Any]) -> None:
+        self.module, self.function = module, function
         self.definition = definition_of(function)
         self.scope: dict[str, Any] = function.__globals__
-        self.known: dict[str, Any] = {"parts": collector.parts, **known}
-        # A name that a generator asks is no plain local one.
-        self.running = {*function.__code__.co_varnames, *function.__code__.co_cellvars} - self.known.keys()
+        self.known: dict[str, Any] = {"parts": module.parts, **known}
+        # Local names whose values exist only while the function runs; those used in a generator are cell variables.
+        self.run_time_names = {*function.__code__.co_varnames, *function.__code__.co_cellvars} - self.known.keys()
         stored = [name.id for name in names_in(self.definition.tree) if isinstance(name.ctx, ast.Store)]
         self.times_set = {name: stored.count(name) for name in stored}
         self.effects = Effects()
-        self.assigned: set[str] = set()
+        self.groups_set: set[str] = set()
         self.parameters = [argument.arg for argument in self.definition.tree.args.args]
-        self.renamed: dict[str, str] = {}
+        self.spellings: dict[str, str] = {}
 
     def refuse(self, where: ast.AST, problem: str) -> ProgramError:
         """Return the error for a node of the function."""
@@ -200,17 +194,16 @@ class Reduction:
         """Return the function with the groups that it reads as first parameters, without a return of groups."""
         tree = copy(self.definition.tree)
         tree.body = self.block(tree.body)
-        taken = {*self.effects.reads, *self.effects.results}
-        asked = {name.id for line in tree.body for name in names_in(line)}
-        own = [name for name in self.parameters if name != "lane" and name not in self.known and name in asked]
-        self.effects.takes = tuple(own)
-        # A local name that is also a group's has another spelling.
-        names = _Renaming({name for name in _bound(tree.body) | set(own) if name in taken})
+        groups = {*self.effects.reads, *self.effects.results}
+        used = {name.id for line in tree.body for name in names_in(line)}
+        parameters = [name for name in self.parameters if name != "lane" and name not in self.known and name in used]
+        self.effects.takes = tuple(parameters)
+        # A local name that is also the name of a group gets another spelling.
+        names = _Renaming((_bound(tree.body) | set(parameters)) & groups)
         tree.body = [names.visit(line) for line in tree.body]
-        handed = [NUMBER, *self.effects.reads] if HISTORIES & self.effects.reads.keys() else [*self.effects.reads]
-        tree.args = ast.arguments(
-            [], [ast.arg(name) for name in [*dict.fromkeys(handed), *map(names.spelling, own)]], None, [], [], None, []
-        )
+        first = [NUMBER] if HISTORIES & self.effects.reads.keys() else []
+        every = [*dict.fromkeys([*first, *self.effects.reads]), *map(names.spelling, parameters)]
+        tree.args = ast.arguments([], [ast.arg(name) for name in every], None, [], [], None, [])
         return tree
 
     # What is known.
@@ -218,7 +211,7 @@ class Reduction:
     def value_of(self, node: ast.expr) -> Any:
         """Return the value of an expression that depends on known names only, at least one; else ``_UNKNOWN``."""
         read = self.definition.read_in(node)
-        if read & self.running or not read & self.known.keys():
+        if read & self.run_time_names or not read & self.known.keys():
             return _UNKNOWN
         self.note_reads(node)
         try:
@@ -226,16 +219,16 @@ class Reduction:
         except (NameError, AttributeError, TypeError) as error:
             raise self.refuse(node, f"'{ast.unparse(node)}': {error}") from error
 
-    def outside(self, node: ast.expr) -> Any:
+    def outside_value(self, node: ast.expr) -> Any:
         """Return the value of an expression outside the function; ``_UNKNOWN`` if the value exists only inside."""
         value = self.value_of(node)
         if value is not _UNKNOWN:
             return value
         self.note_reads(node)
-        if isinstance(node, ast.Name) and node.id not in self.running:
+        if isinstance(node, ast.Name) and node.id not in self.run_time_names:
             return self.scope.get(node.id, getattr(builtins, node.id, _UNKNOWN))
         if isinstance(node, ast.Attribute):
-            owner = self.outside(node.value)
+            owner = self.outside_value(node.value)
             return getattr(owner, node.attr, _UNKNOWN) if isinstance(owner, types.ModuleType) else _UNKNOWN
         return _UNKNOWN
 
@@ -243,22 +236,22 @@ class Reduction:
         """Record the outside names in an expression, including module attributes; the text depends on their values."""
         for inner in ast.walk(node):
             if isinstance(inner, ast.Name) and inner.id in self.scope and inner.id not in self.known:
-                self.collector.note_read(self.scope, inner.id)
+                self.module.note_read(self.scope, inner.id, self.scope[inner.id])
             if isinstance(inner, ast.Attribute) and isinstance(inner.value, ast.Name):
                 owner = self.scope.get(inner.value.id)
                 if isinstance(owner, types.ModuleType) and hasattr(owner, inner.attr):
-                    self.collector.note_read(vars(owner), inner.attr)
+                    self.module.note_read(vars(owner), inner.attr, getattr(owner, inner.attr))
 
-    def written(self, value: Any) -> ast.expr:
+    def expression_of(self, value: Any) -> ast.expr:
         """Return an expression for a known value."""
         if value is None or type(value) in (bool, int, float):
             return ast.Constant(value)
-        return self.kept(value)
+        return self.placeholder(value)
 
-    def kept(self, value: Any) -> ast.Name:
+    def placeholder(self, value: Any) -> ast.Name:
         """Return a placeholder name for a value."""
         name = f"kept_{id(value)}"
-        self.collector.kept[name] = value
+        self.module.placeholders[name] = value
         return ast.Name(name, ast.Load())
 
     # Expressions.
@@ -267,38 +260,40 @@ class Reduction:
         """Return an expression with its known parts evaluated."""
         value = self.value_of(node)
         if value is not _UNKNOWN:
-            return ast.copy_location(self.written(value), node)
-        handler: Callable[[Any], ast.expr] = getattr(self, f"of_{type(node).__name__.lower()}", self.whole)
+            return ast.copy_location(self.expression_of(value), node)
+        handler: Callable[[Any], ast.expr] = getattr(
+            self, f"of_{type(node).__name__.lower()}", self.with_reduced_operands
+        )
         return ast.copy_location(handler(node), node)
 
-    def whole(self, node: ast.expr) -> ast.expr:
+    def with_reduced_operands(self, node: ast.expr) -> ast.expr:
         """Return an expression with reduced operands."""
         made = copy(node)
         for name, value in ast.iter_fields(node):
             if isinstance(value, ast.expr):
                 setattr(made, name, self.visit(value))
             elif isinstance(value, list):
-                setattr(made, name, [self.part(part) for part in value])
+                setattr(made, name, [self.reduced_operand(operand) for operand in value])
         return made
 
-    def part(self, node: ast.AST) -> ast.AST:
+    def reduced_operand(self, node: ast.AST) -> ast.AST:
         """Return a reduced operand of an expression."""
         if isinstance(node, ast.keyword):
             return ast.keyword(node.arg, self.visit(node.value))
         return self.visit(node) if isinstance(node, ast.expr) else node
 
-    def asked(self, node: ast.expr) -> ast.expr:
+    def condition(self, node: ast.expr) -> ast.expr:
         """Return a reduced condition, which is a constant if known."""
         value = self.value_of(node)
         return self.visit(node) if value is _UNKNOWN else ast.Constant(bool(value))
 
     def of_name(self, node: ast.Name) -> ast.expr:
         """Return a name in its present spelling."""
-        return ast.Name(self.renamed.get(node.id, node.id), node.ctx)
+        return ast.Name(self.spellings.get(node.id, node.id), node.ctx)
 
     def of_ifexp(self, node: ast.IfExp) -> ast.expr:
         """Return the selected side of a known conditional expression, else both sides reduced."""
-        test = self.asked(node.test)
+        test = self.condition(node.test)
         if isinstance(test, ast.Constant):
             return self.visit(node.body if test.value else node.orelse)
         return ast.IfExp(test, self.visit(node.body), self.visit(node.orelse))
@@ -307,7 +302,7 @@ class Reduction:
         """Return ``and`` or ``or`` with known operands evaluated."""
         ends, made = isinstance(node.op, ast.Or), list[ast.expr]()
         for item in node.values:
-            value = self.asked(item)
+            value = self.condition(item)
             if not isinstance(value, ast.Constant):
                 made.append(value)
             elif bool(value.value) is ends:
@@ -326,27 +321,27 @@ class Reduction:
 
     def of_attribute(self, node: ast.Attribute) -> ast.expr:
         """Return a group or a field."""
-        name = self.group(node)
-        return self.read(name) if name else self.whole(node)
+        name = self.group_path(node)
+        return self.group_read(name) if name else self.with_reduced_operands(node)
 
     def of_subscript(self, node: ast.Subscript) -> ast.expr:
         """Return a group by its name, an element of a history, or an item."""
-        name = self.group(node)
+        name = self.group_path(node)
         if name:
             group, *way = name.split(".")
-            read: ast.expr = self.read(group)
+            read: ast.expr = self.group_read(group)
             for step in way:
                 read = ast.Attribute(read, step, ast.Load())
             return read
-        history = self.group(node.value)
+        history = self.group_path(node.value)
         if history in HISTORIES:
-            places = [self.visit(index) for index in _places(node)]
+            places = [self.visit(index) for index in _indices(node)]
             return ast.Subscript(
-                self.read(history), ast.Tuple([*places, ast.Name(NUMBER, ast.Load())], ast.Load()), ast.Load()
+                self.group_read(history), ast.Tuple([*places, ast.Name(NUMBER, ast.Load())], ast.Load()), ast.Load()
             )
-        return self.whole(node)
+        return self.with_reduced_operands(node)
 
-    def group(self, node: ast.expr) -> str:
+    def group_path(self, node: ast.expr) -> str:
         """Return the group, or the path in a group, of ``lane.GROUP`` or ``lane["GROUP"]``; empty otherwise."""
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "lane":
             return node.attr
@@ -357,35 +352,37 @@ class Reduction:
             return name
         return ""
 
-    def read(self, name: str) -> ast.expr:
+    def group_read(self, name: str) -> ast.expr:
         """Return the name of a group, which becomes a parameter unless it was set before."""
-        if name not in self.assigned:
+        if name not in self.groups_set:
             self.effects.reads[name] = None
         return ast.Name(_GROUP + name, ast.Load())
 
     def of_call(self, node: ast.Call) -> ast.expr:
         """Return a call with the additional arguments of the called function."""
-        called = self.outside(node.func)
+        called = self.outside_value(node.func)
         called, node = self.with_parts(getattr(called, "__wrapped__", called), node)
         if called is getattr:
             name = self.value_of(node.args[1])
             return ast.Attribute(self.visit(node.args[0]), name, ast.Load())
         if called is rebuilt:
-            return self.row_of(self.outside(node.args[0]), self.arguments(ast.Starred(node.args[1])))
+            return self.row_of(self.outside_value(node.args[0]), self.arguments(ast.Starred(node.args[1])))
         if is_step_function(called):
-            arguments = self.called(called, node)
-            if self.collector.effects_of(called).results:
+            arguments = self.step_arguments(called, node)
+            if self.module.effects_of(called).results:
                 raise self.refuse(node, f"'{called.__name__}' sets groups of its lane, so that it gives no value")
-            return ast.Call(self.kept(called), arguments, [])
+            return ast.Call(self.placeholder(called), arguments, [])
         if isinstance(called, FunctionType):
-            for row in self.collector.handed_to(self.collector.add_called(self.function, called, {})):
-                self.read(row)
+            for row in self.module.handed_to(self.module.add_called(self.function, called, {})):
+                self.group_read(row)
         if called is _UNKNOWN:
-            return self.whole(node)
+            return self.with_reduced_operands(node)
         # Arguments that a generator makes are written out.
         arguments = [part for argument in node.args for part in self.arguments(argument)]
         named = [ast.keyword(keyword.arg, self.visit(keyword.value)) for keyword in node.keywords]
-        function = self.kept(called) if isinstance(called, FunctionType) or is_row(called) else self.visit(node.func)
+        function = (
+            self.placeholder(called) if isinstance(called, FunctionType) or is_row(called) else self.visit(node.func)
+        )
         return ast.Call(function, arguments, named)
 
     def with_parts(self, called: Any, node: ast.Call) -> tuple[Any, ast.Call]:
@@ -397,18 +394,18 @@ class Reduction:
         made = made_of(called, called.__name__, self.value_of(given.value))
         return made, ast.copy_location(ast.Call(node.func, node.args, others), node)
 
-    def called(self, called: FunctionType, node: ast.Call) -> list[ast.expr]:
+    def step_arguments(self, called: FunctionType, node: ast.Call) -> list[ast.expr]:
         """Return the own arguments of a called function of the step, and add the function to the module."""
-        own = self.own_arguments(called, node)[2:]
+        own = self.arguments_by_name(called, node)[2:]
         known = {name: self.value_of(value) for name, value in own}
         known = {name: value for name, value in known.items() if is_known_part(value)}
-        self.collector.add_called(self.function, called, known)
-        effects = self.collector.effects_of(called)
+        self.module.add_called(self.function, called, known)
+        effects = self.module.effects_of(called)
         for row in effects.reads:
-            self.read(row)
+            self.group_read(row)
         return [self.visit(value) for name, value in own if name in effects.takes]
 
-    def own_arguments(self, called: FunctionType, node: ast.Call) -> list[tuple[str, ast.expr]]:
+    def arguments_by_name(self, called: FunctionType, node: ast.Call) -> list[tuple[str, ast.expr]]:
         """Return the arguments of a call of a step function by name, in order. ProgramError if they do not match."""
         names = called.__code__.co_varnames[: called.__code__.co_argcount]
         given = dict(zip(names, node.args, strict=False))
@@ -425,16 +422,16 @@ class Reduction:
             return
         (loop,) = node.value.generators
         assert isinstance(loop.target, ast.Name)
-        before, running = self.known, self.running
+        before, running = self.known, self.run_time_names
         for element in self.items_of(loop.iter):
-            self.known, self.running = {**before, loop.target.id: element}, running - {loop.target.id}
+            self.known, self.run_time_names = {**before, loop.target.id: element}, running - {loop.target.id}
             made = self.visit(node.value.elt)
-            self.known, self.running = before, running
+            self.known, self.run_time_names = before, running
             yield made
 
     def items_of(self, node: ast.expr) -> list[Any]:
         """Return the items of an iterable, which must be known."""
-        if self.definition.read_in(node) & self.running:
+        if self.definition.read_in(node) & self.run_time_names:
             raise self.refuse(node, f"'{ast.unparse(node)}' is not known while this is composed")
         return list(self.definition.value(node, self.scope, self.known))
 
@@ -474,37 +471,37 @@ class Reduction:
 
     def branch(self, node: ast.If) -> list[ast.stmt]:
         """Reduce an ``if`` to one branch if the condition is known; else groups set in one branch are also read."""
-        test = self.asked(node.test)
+        test = self.condition(node.test)
         if isinstance(test, ast.Constant):
             return self.block(node.body if test.value else node.orelse)
-        before = set(self.assigned)
-        body, first = self.block(node.body), self.assigned
-        self.assigned = set(before)
+        before = set(self.groups_set)
+        body, first = self.block(node.body), self.groups_set
+        self.groups_set = set(before)
         otherwise = self.block(node.orelse)
-        for name in sorted((first ^ self.assigned) - before):
+        for name in sorted((first ^ self.groups_set) - before):
             self.effects.reads[name] = None
-        self.assigned |= first
+        self.groups_set |= first
         return [ast.If(test, body or [ast.Pass()], otherwise)]
 
     def unrolled(self, node: ast.For) -> list[ast.stmt]:
         """Expand a loop over known items."""
-        made: list[ast.stmt] = []
-        # Names that live in one turn have another spelling in each: what they stand for may have another class.
-        begun = {name.id for name in names_in(self.definition.tree) if name.lineno < node.lineno}
-        own = [name for name in _bound(node.body) if name not in begun]
+        lines: list[ast.stmt] = []
+        # A name first set inside the loop is spelt anew in each turn, since its values may differ in class.
+        earlier = {name.id for name in names_in(self.definition.tree) if name.lineno < node.lineno}
+        own = [name for name in _bound(node.body) if name not in earlier]
         for number, element in enumerate(self.items_of(node.iter)):
             targets = node.target.elts if isinstance(node.target, ast.Tuple) else [node.target]
             values = element if isinstance(node.target, ast.Tuple) else (element,)
             for target, value in zip(targets, values, strict=True):
                 assert isinstance(target, ast.Name)
                 self.known[target.id] = value
-                self.running.discard(target.id)
+                self.run_time_names.discard(target.id)
             if number:
-                self.renamed |= {name: f"{name}_{number + 1}" for name in own}
-            made += self.block(node.body)
+                self.spellings |= {name: f"{name}_{number + 1}" for name in own}
+            lines += self.block(node.body)
         for name in own:
-            self.renamed.pop(name, None)
-        return made
+            self.spellings.pop(name, None)
+        return lines
 
     def assignment(self, target: ast.expr, value: ast.expr) -> list[ast.stmt]:
         """Reduce an assignment to names, groups or history elements."""
@@ -512,24 +509,26 @@ class Reduction:
             known = self.value_of(value)
             if known is not _UNKNOWN:
                 self.known[target.id] = known
-                self.running.discard(target.id)
+                self.run_time_names.discard(target.id)
                 return []
         if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and not self.crosses(target, value):
             pairs = zip(target.elts, value.elts, strict=True)
-            return [line for target_part, other in pairs for line in self.assignment(target_part, other)]
+            return [line for element, element_value in pairs for line in self.assignment(element, element_value)]
         fields = self.fields_changed(target, value)
-        written = self.visit(value)
-        targets = target.elts if isinstance(target, ast.Tuple) else [target]
-        left = [self.set_target(target, fields) for target in targets]
-        row = self.collector.rows.get(left[0].id.removeprefix(_GROUP)) if left[0].id.startswith(_GROUP) else None
-        if len(left) == 1 and isinstance(written, ast.IfExp) and row is not None and not is_number(row):
-            # The row of the choices between their numbers: no branch, by any compiler.
-            pairs = zip(self.numbers_of(row, written.body), self.numbers_of(row, written.orelse), strict=True)
-            test = written.test
-            written = self.row_of(row, (ast.IfExp(test, yes, other) for yes, other in pairs))
-        if len(left) == 1 and isinstance(written, ast.Name) and written.id == left[0].id:
+        reduced = self.visit(value)
+        if isinstance(target, ast.Tuple):
+            names = [self.set_target(element, fields) for element in target.elts]
+            return [ast.Assign([ast.Tuple([*names], ast.Store())], reduced)]
+        name = self.set_target(target, fields)
+        row = self.module.rows.get(group_of_name(name))
+        if isinstance(reduced, ast.IfExp) and row is not None and not is_number(row):
+            # A choice between rows becomes a row of choices between numbers, for which no compiler makes a branch.
+            pairs = zip(self.numbers_of(row, reduced.body), self.numbers_of(row, reduced.orelse), strict=True)
+            test = reduced.test
+            reduced = self.row_of(row, (ast.IfExp(test, yes, other) for yes, other in pairs))
+        if isinstance(reduced, ast.Name) and reduced.id == name.id:
             return []
-        return [ast.Assign([ast.Tuple([*left], ast.Store()) if isinstance(target, ast.Tuple) else left[0]], written)]
+        return [ast.Assign([name], reduced)]
 
     def crosses(self, target: ast.Tuple, value: ast.Tuple) -> bool:
         """Return whether any of several values reads a target of the same assignment."""
@@ -538,40 +537,40 @@ class Reduction:
 
     def set_target(self, target: ast.expr, fields: Fields) -> ast.Name:
         """Return the name for an assignment target."""
-        name = self.group(target)
+        name = self.group_path(target)
         if name:
             self.note_set(name, fields)
             return ast.Name(_GROUP + name, ast.Store())
-        if isinstance(target, ast.Subscript) and self.group(target.value) in HISTORIES:
-            history, places = self.group(target.value), tuple(map(self.visit, _places(target)))
+        if isinstance(target, ast.Subscript) and self.group_path(target.value) in HISTORIES:
+            history, places = self.group_path(target.value), tuple(map(self.visit, _indices(target)))
             known = [index.value for index in places if isinstance(index, ast.Constant)]
             # A trace has the names of its channels.
-            words = [self.collector.parts.traced[index] if history == TRACE else str(index) for index in known]
+            words = [self.module.parts.traced[index] if history == TRACE else str(index) for index in known]
             name = "_".join(["new", history.removesuffix("_history"), *words]).replace(".", "_")
             self.note_slot(name, Slot(history, places), target)
             return ast.Name(_GROUP + name, ast.Store())
         if not isinstance(target, ast.Name):
             raise self.refuse(target, f"'{ast.unparse(target)}' cannot be set in a phase")
-        return ast.Name(self.renamed.get(target.id, target.id), ast.Store())
+        return ast.Name(self.spellings.get(target.id, target.id), ast.Store())
 
     def note_set(self, name: str, fields: Fields) -> None:
         """Record a group that is set, and the fields that change."""
         known = self.effects.groups.get(name, frozenset())
         self.effects.groups[name] = None if known is None or fields is None else known | fields
-        self.assigned.add(name)
+        self.groups_set.add(name)
 
     def note_slot(self, name: str, slot: Slot, where: ast.AST) -> None:
         """Record a history element that is set. ProgramError for indices unknown to the loop over steps."""
         if any(name.id not in self.parameters for index in slot.places for name in names_in(index)):
             raise self.refuse(where, "where a history is set must be a parameter, or a field of one")
         self.effects.slots[name] = slot
-        self.assigned.add(name)
+        self.groups_set.add(name)
 
     def fields_changed(self, target: ast.expr, value: ast.expr) -> Fields:
         """Return the fields of a group changed by an assignment: the arguments of its ``_replace``, else all."""
         if not isinstance(value, ast.Call) or not isinstance(value.func, ast.Attribute):
             return None
-        is_part = value.func.attr == "_replace" and self.group(target) == self.group(value.func.value) != ""
+        is_part = value.func.attr == "_replace" and self.group_path(target) == self.group_path(value.func.value) != ""
         return frozenset(keyword.arg for keyword in value.keywords if keyword.arg is not None) if is_part else None
 
     def row_of(self, kind: Any, numbers: Iterator[ast.expr]) -> ast.expr:
@@ -581,54 +580,54 @@ class Reduction:
         inner = [self.row_of(inside, numbers) for _, inside in members(kind)]
         if not is_row(kind) or not inner:
             return ast.Tuple([*inner], ast.Load())
-        return ast.Call(self.kept(kind), inner, [])
+        return ast.Call(self.placeholder(kind), inner, [])
 
     def numbers_of(self, kind: Any, row: ast.expr) -> Iterator[ast.expr]:
         """Yield the expressions of the numbers of a row, nested or not, in order."""
         if is_number(kind):
             yield row
         for way, inside in members(kind):
-            yield from self.numbers_of(inside, self.part_of(row, way))
+            yield from self.numbers_of(inside, self.member_of(row, way))
 
-    def part_of(self, owner: ast.expr, way: str) -> ast.expr:
+    def member_of(self, owner: ast.expr, way: str) -> ast.expr:
         """Return a field or an item of a row; evaluated if the row is known."""
         key = int(way[1:-1]) if way[0] == "[" else way[1:]
-        if isinstance(owner, ast.Name) and owner.id in self.collector.kept:
-            value = self.collector.kept[owner.id]
-            return self.written(value[key] if isinstance(key, int) else getattr(value, key))
+        if isinstance(owner, ast.Name) and owner.id in self.module.placeholders:
+            value = self.module.placeholders[owner.id]
+            return self.expression_of(value[key] if isinstance(key, int) else getattr(value, key))
         if isinstance(key, int):
             return ast.Subscript(owner, ast.Constant(key), ast.Load())
         return ast.Attribute(owner, key, ast.Load())
 
     def call_that_sets(self, node: ast.Call) -> list[ast.stmt]:
         """Reduce a call of a function that sets groups: its return values are assigned to these groups."""
-        called = self.outside(node.func)
+        called = self.outside_value(node.func)
         if not is_step_function(called):
             raise self.refuse(node, f"'{ast.unparse(node)}' discards its return value")
-        arguments = self.called(called, node)
-        effects = self.collector.effects_of(called)
+        arguments = self.step_arguments(called, node)
+        effects = self.module.effects_of(called)
         if not effects.results:
             return []
         for group, fields in effects.groups.items():
             self.note_set(group, fields)
-        own = self.own_arguments(called, node)[2:]
+        own = self.arguments_by_name(called, node)[2:]
         given_by_name = {key: self.visit(value) for key, value in own} if effects.slots else {}
         for result, slot in effects.slots.items():
             places = tuple(with_arguments(index, given_by_name) for index in slot.places)
             self.note_slot(result, Slot(slot.history, places), node)
-        call = ast.Call(self.kept(called), arguments, [])
+        call = ast.Call(self.placeholder(called), arguments, [])
         groups = [ast.Name(_GROUP + result, ast.Store()) for result in effects.results]
         if len(groups) == 1:
             return [ast.Assign([groups[0]], call)]
-        whole = f"{called.__name__}_result"
-        parts = [
-            ast.Assign([group], ast.Attribute(ast.Name(whole, ast.Load()), result, ast.Load()))
+        returned = f"{called.__name__}_result"
+        fields_read = [
+            ast.Assign([group], ast.Attribute(ast.Name(returned, ast.Load()), result, ast.Load()))
             for group, result in zip(groups, effects.results, strict=True)
         ]
-        return [ast.Assign([ast.Name(whole, ast.Store())], call), *parts]
+        return [ast.Assign([ast.Name(returned, ast.Store())], call), *fields_read]
 
 
-def _places(node: ast.Subscript) -> Sequence[ast.expr]:
+def _indices(node: ast.Subscript) -> Sequence[ast.expr]:
     """Return the indices of an element."""
     return node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
 
@@ -641,11 +640,11 @@ def _bound(body: Iterable[ast.stmt]) -> set[str]:
 def with_arguments(expression: ast.expr, arguments: Mapping[str, ast.expr]) -> ast.expr:
     """Return an expression of a function with its parameters replaced by the caller's argument expressions."""
 
-    class Replacing(ast.NodeTransformer):
+    class _Replacing(ast.NodeTransformer):
         def visit_Name(self, node: ast.Name) -> ast.expr:
             return arguments.get(node.id, node)
 
-    replaced: ast.expr = Replacing().visit(deepcopy(expression))
+    replaced: ast.expr = _Replacing().visit(deepcopy(expression))
     return replaced
 
 

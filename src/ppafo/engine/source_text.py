@@ -12,18 +12,18 @@ from dataclasses import dataclass, field
 from types import CodeType, FunctionType
 from typing import Any, Generic, NamedTuple
 
-from ppafo.engine.composer import Composer
+from ppafo.engine.composer import Composer, names_of
 from ppafo.engine.definitions import Adaptation, check_is_plain, emitted_name, parse_definition, place_of, source_lines
 from ppafo.engine.entries import ORIGIN, without_origins
 from ppafo.engine.plain_python import refusal
+from ppafo.engine.replacements import Replacements
 from ppafo.engine.rows import is_row
 from ppafo.errors import ProgramError
-from ppafo.model.binding import parts_of
 from ppafo.model.declaration import PlainFunction
 from ppafo.wording import one_line
 
 
-class Read(NamedTuple):
+class NameRead(NamedTuple):
     """Name that was looked up during composition, and its value."""
 
     scope: Mapping[str, Any]
@@ -31,7 +31,7 @@ class Read(NamedTuple):
     value: Any
 
 
-class Made(NamedTuple):
+class ComposedFrom(NamedTuple):
     """Function as it was at composition."""
 
     function: Any
@@ -52,8 +52,8 @@ def composed_lines(lines: Iterable[str], needs: Mapping[str, tuple[str, ...]]) -
 class MadeFrom:
     """Names read and functions composed for a text, which determine whether the text is up to date."""
 
-    reads: list[Read] = field(default_factory=list)
-    functions: list[Made] = field(default_factory=list)
+    reads: list[NameRead] = field(default_factory=list)
+    functions: list[ComposedFrom] = field(default_factory=list)
 
     def is_current(self) -> bool:
         """Return whether all names and functions still have the values used at composition."""
@@ -69,10 +69,8 @@ class MadeFrom:
 class SourceCollector:
     """Collector of definitions in dependency order; ``adapt`` may rewrite a definition.
 
-    If a function is a key of ``links``, the linked function is added and called instead. A link with a pair as key
-    applies only inside the first function of the pair; a link with the key (row, ``"_replace"``) is the class
-    constructed by ``row._replace``. ``effects`` maps laws to the rows that they need. Callers of a law receive these
-    rows in turn, up to the text around the module (``needs``, ``composed_lines``).
+    A function that ``replacements`` replaces is never added, but its replacement. Rows that a replacement takes are
+    parameters of all its callers too, up to the text around the module (``needs``, ``composed_lines``).
     """
 
     decorator: str
@@ -80,16 +78,15 @@ class SourceCollector:
     definitions: dict[str, str] = field(default_factory=dict)
     owners: dict[str, Any] = field(default_factory=dict)
     made_from: MadeFrom = field(default_factory=MadeFrom)
-    links: dict[Any, Any] = field(default_factory=dict)
-    effects: dict[Any, tuple[str, ...]] = field(default_factory=dict)
+    replacements: Replacements = field(default_factory=Replacements)
     needs: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def add(self, function: PlainFunction | type) -> str:
         """Add a function or NamedTuple class and all its dependencies; return its name in the module."""
-        return self._add(self.links.get(function, function))
+        return self._add(self.replacements.called(function))
 
     def _add(self, item: Any) -> str:
-        """Add a function or NamedTuple class itself, not the linked one. ProgramError if it cannot be compiled."""
+        """Add a function or NamedTuple class itself, not its replacement. ProgramError if it cannot be compiled."""
         if not is_row(item):
             check_is_plain(item)
         name = emitted_name(item)
@@ -114,11 +111,15 @@ class SourceCollector:
 
     def note_read(self, scope: Mapping[str, Any], name: str, value: Any) -> None:
         """Record a name that was looked up during composition, and its value."""
-        self.made_from.reads.append(Read(scope, name, value))
+        self.made_from.reads.append(NameRead(scope, name, value))
 
-    def stands_for(self, row: Any) -> Any:
+    def handed_to(self, name: str) -> tuple[str, ...]:
+        """Return the names passed to a function of the module before its own arguments."""
+        return self.needs.get(name, ())
+
+    def constructed(self, row: Any) -> Any:
         """Return the class that replaces a declared row in this module."""
-        return self.links.get((row, "_replace"), row)
+        return self.replacements.constructed.get(row, row)
 
     def decorated(self, tree: ast.FunctionDef, file: str) -> str:
         """Return the text of a composed function, with the line numbers of its source file."""
@@ -131,46 +132,38 @@ class SourceCollector:
         Raises ProgramError if the function contains code that cannot be compiled, or calls itself.
         """
         tree = parse_definition(function, self.adapt)
-        # Before its body is read, so that one met again inside it calls itself.
+        # Recorded before the body is composed, so that a function met again inside its own body is found.
         if any(known.function is function for known in self.made_from.functions):
             problem = f"'{function.__name__}' calls itself, which cannot be compiled"
             raise refusal(function.__code__.co_filename, tree, problem)
         self.made_from.functions.append(
-            Made(
+            ComposedFrom(
                 function=function,
                 code=function.__code__,
                 defaults=function.__defaults__,
                 named_defaults=dict(function.__kwdefaults__ or {}),
             )
         )
-        composer = Composer(
-            function,
-            lambda called: self.add_inside(function, called),
-            self.note_read,
-            lambda callee: self.needs.get(callee, ()),
-            self.stands_for,
-        )
-        parts = parts_of(function)
-        composer.kept = {} if parts is None else {"parts": parts}
-        tree.args.kwonlyargs = [argument for argument in tree.args.kwonlyargs if argument.arg not in composer.kept]
-        rows = self.effects.get(function, ())
-        _compose_parameters(composer, tree, rows)
+        composer = Composer(function, self, names_of(function))
+        tree.args.kwonlyargs = [argument for argument in tree.args.kwonlyargs if argument.arg not in composer.known]
+        own_rows = self.replacements.rows.get(function, ())
+        _compose_parameters(composer, tree, own_rows)
         body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
         tree.name, tree.returns = name, None
         tree.body = [composer.visit(statement) for statement in body]
-        # Rows that what it calls needs, and that it has no parameter for, are handed to it in its turn.
-        handed = sorted(composer.needed)
-        parameters = [*map(ast.arg, handed), *tree.args.args]
-        if rows or handed:
-            self.needs[name] = (*handed, *(argument.arg for argument in parameters if argument.arg in rows))
+        # Rows of called functions for which this function has no parameter are passed on by its callers.
+        passed_on = sorted(composer.rows_to_receive)
+        parameters = [*map(ast.arg, passed_on), *tree.args.args]
+        if own_rows or passed_on:
+            self.needs[name] = (*passed_on, *(argument.arg for argument in parameters if argument.arg in own_rows))
         tree.args.args = parameters
         return self.decorated(tree, function.__code__.co_filename)
 
     def add_inside(self, function: Any, called: Any) -> str:
         """Add a function called inside another; a law that calls its own port gets the port's previous function."""
-        if (function, called) in self.links:
-            return self._add(self.links[function, called])
-        if called in self.effects and isinstance(called, FunctionType):
+        if (function, called) in self.replacements.inside:
+            return self._add(self.replacements.inside[function, called])
+        if called in self.replacements.rows:
             raise ProgramError(
                 f"{place_of(function)}: '{called.__name__}' is the law of an effect: call its port instead"
             )
@@ -203,7 +196,7 @@ def _row_text(row: Any, name: str) -> str:
             f"{row.__module__}.{row.__qualname__} must be a NamedTuple itself, not a class made from one"
         )
     meanings = {name for name, value in own.items() if name.startswith("__") and isinstance(value, FunctionType)}
-    meanings -= set(vars(Read)) | {"__str__", "__format__"}
+    meanings -= set(vars(NameRead)) | {"__str__", "__format__"}
     if meanings:
         names = ", ".join(sorted(meanings))
         raise ProgramError(

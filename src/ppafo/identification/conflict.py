@@ -48,16 +48,16 @@ class Conflict:
     p: float
 
 
-def _groups(work: FitRuns) -> Iterator[tuple[str, list[slice]]]:
+def _groups(runs: FitRuns) -> Iterator[tuple[str, list[slice]]]:
     """Yield sensors, recordings, channels of recordings and further groups with their rows, without duplicates."""
     labels = [
         (block.channel, block.recording, f"{block.channel} of {block.recording}", *block.groups)
-        for block in work.blocks
+        for block in runs.blocks
     ]
-    seen = {tuple((block.rows.start, block.rows.stop) for block in work.blocks)}
+    seen = {tuple((block.rows.start, block.rows.stop) for block in runs.blocks)}
     for column in zip(*labels, strict=True):
         for name in dict.fromkeys(column):
-            rows = [block.rows for block, label in zip(work.blocks, column, strict=True) if label == name]
+            rows = [block.rows for block, label in zip(runs.blocks, column, strict=True) if label == name]
             key = tuple((part.start, part.stop) for part in rows)
             if key not in seen:
                 seen.add(key)
@@ -70,7 +70,7 @@ def too_smooth(sensors: Mapping[str, Noise]) -> Conflict | None:
     return Conflict(channel, SMOOTH, 1.0 / noise.innovation, 0.0) if noise.innovation < _SMOOTHEST else None
 
 
-def conflict_of(work: FitRuns, rows: Floats, point: Floats, free: Flags, freedom: float) -> Conflict | None:
+def conflict_of(runs: FitRuns, rows: Floats, point: Floats, free: Flags, freedom: float) -> Conflict | None:
     """Return the group of rows whose own estimates differ most from the common ones; None if none is significant.
 
     Hausman's test: the estimate of a group alone differs by d = -H_g^-1 (J_g' r_g + P (z - m)), with covariance H_g^-1
@@ -78,12 +78,12 @@ def conflict_of(work: FitRuns, rows: Floats, point: Floats, free: Flags, freedom
     (1 - a)).
     """
     errors, slopes = rows[:, 0], rows[:, 1:][:, free]
-    prior, shift = np.square(work.prior[free]), (point - work.mean)[free]
+    prior, shift = np.square(runs.prior[free]), (point - runs.start)[free]
     root, seen = root_of_inverse(slopes.T @ slopes + np.diag(prior))
     root = root[:, seen]
     variance = np.square(root).sum(axis=1)
-    groups, worst = list(_groups(work)), None
-    names = np.array([number.name for number in work.numbers])[free]
+    groups, worst = list(_groups(runs)), None
+    names = np.array([number.name for number in runs.numbers])[free]
     count_of_tests = len(groups) + int((prior > 0.0).sum())
     for name, parts in groups:
         group = np.concatenate([slopes[part] for part in parts])
@@ -112,7 +112,7 @@ def conflict_of(work: FitRuns, rows: Floats, point: Floats, free: Flags, freedom
         p = min(2.0 * float(student.sf(ratio, freedom)) * count_of_tests, 1.0)
         if p < _SIGNIFICANCE and (worst is None or p < worst.p):
             worst = Conflict(group=STATED, number=str(names[index]), standard_errors=ratio, p=p)
-    families = np.array([number.family for number in work.numbers])[free]
+    families = np.array([number.family for number in runs.numbers])[free]
     for family in dict.fromkeys(families[prior > 0.0].tolist()):
         members = np.flatnonzero((families == family) & (prior > 0.0))
         if family and len(members) > 1 and worst is None:

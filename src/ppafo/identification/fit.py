@@ -9,6 +9,7 @@ import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -65,16 +66,13 @@ class Fit:
     @property
     def by_name(self) -> dict[str, float]:
         """Estimated values by name [SI]."""
-        return dict(zip((one.name for one in self.numbers), self.values.tolist(), strict=True))
+        return dict(zip((number.name for number in self.numbers), self.values.tolist(), strict=True))
 
 
 _LEFT_OUT = 0.01
 """Largest fraction of samples left out [-], for outliers and for samples affected by an event such as an impact."""
-
 _LEVERAGE = 0.1
 """Leverage of a single sample [-] above which the sample is left out."""
-
-
 _PASSES = 4
 """Largest number of passes of the search; each pass uses the noise estimated by the previous one."""
 _SETTLED = 0.03
@@ -84,12 +82,15 @@ _EVALUATIONS, _FEW_EVALUATIONS = 40, 10
 _ROUGH, _FINE = 1.0e-3, 1.0e-4
 """Relative decrease of the squares [-] that ends the robust pass and the later passes; later steps are finer."""
 _LAST_STEPS = 12
+"""Largest number of Gauss-Newton steps on whitened samples."""
 _SHARES = (1.0, 0.3, 0.1)
+"""Fractions of a step [-], of which the first that gains is taken."""
 _GAIN = 0.05
 """Decrease of the sum of squares [-] below which a step after whitening counts as converged."""
 _CONVERGED = 0.5
 """Decrease of the squares in the last step [-] below which the search has converged within the standard errors."""
-
+_AT_BOUND = 1.0e-6
+"""Distance from a bound [-], absolute below 1 and relative above, up to which a variable is at it."""
 _SHOWN = 0.01
 """Least contribution to the variance [-] for which a tolerance is listed."""
 _OTHER_STARTS = 32
@@ -120,58 +121,105 @@ def fit(
         raise IdentificationError(
             f"a fit needs at least one number and one block of residuals, it has {len(numbers)} and {len(blocks)}"
         )
-    for one in numbers:
-        if not (one.low <= one.start <= one.high and one.low < one.high):
+    for number in numbers:
+        if not (number.low <= number.start <= number.high and number.low < number.high):
             raise IdentificationError(
-                f"{one.name}: bounds {one.low:g} to {one.high:g} with the start {one.start:g}: the lower must be below "
-                "the upper and the start between them"
+                f"{number.name}: bounds {number.low:g} to {number.high:g} with the start {number.start:g}: the lower "
+                "must be below the upper and the start between them"
             )
-    work = FitRuns(residuals, tuple(numbers), tuple(blocks), report, memory, is_motion)
-    samples = sum(one.rows.stop - one.rows.start for one in blocks)
-    sought = sum(math.isinf(one.deviation) for one in numbers)
+    runs = FitRuns(residuals, tuple(numbers), tuple(blocks), report, memory, is_motion)
+    samples = sum(block.rows.stop - block.rows.start for block in blocks)
+    sought = sum(math.isinf(number.deviation) for number in numbers)
     if samples <= sought:
         raise IdentificationError(f"{samples} samples for {sought} numbers that are sought; more samples are needed")
-    found = _whitened(work, _search(work, work.start), confidence)
+    best = _fit_from(runs, runs.start, confidence)
     # A right law in its right place has neither.
-    if found.conflict is None and found.has_converged:
-        return found
+    if best.conflict is None and best.has_converged:
+        return best
     # Where the law is wrong other starts end where the first does: only one that explains more at once is followed.
-    for start in _other_starts(work, found):
+    for start in _other_starts(runs, best):
         report(Progress("fit: another start, which fits better than the first result"))
-        other = _whitened(work, _search(work, start), confidence)
+        other = _fit_from(runs, start, confidence)
         # By more than what the search itself leaves open, so that equal optima do not change the answer.
-        if _likelihood(work, other) > _likelihood(work, found) + 1.0:
-            found = other
-    return replace(found, evaluations=work.evaluations)
+        if _likelihood(runs, other) > _likelihood(runs, best) + 1.0:
+            best = other
+    return replace(best, evaluations=runs.evaluations)
 
 
-def _search(work: FitRuns, start: Floats) -> Floats:
-    """Return the approximate least-squares point, alternating between estimation of weights and minimisation."""
-    point = np.clip(start, work.low, work.high)
-    left, work.outliers = work.one(point), work.outliers[:0]
-    if not np.isfinite(left).all():
+def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
+    """Return the fit with intervals and consistency tests that the search from a scaled point finds."""
+    point, outliers = _search(runs, start)
+    end = _settle(runs, point, outliers)
+    point, linear = end.point, end.linear
+    sensors, jacobian, errors = linear.sensors, linear.rows[:, 1:], linear.rows[:, 0]
+    covariance = linear.root @ linear.root.T
+    # Samples less what the numbers took: a tolerance that the readings do not move takes none.
+    freedom = max(len(errors) - float(np.sum(jacobian * (jacobian @ covariance))), 1.0)
+    low, high = interval_ends(runs, point, linear, float(student.ppf(0.5 + 0.5 * confidence, freedom)))
+    # At a bound that the squares would leave a number is no longer free, and no group can move it there.
+    gradient = errors @ jacobian + np.square(runs.prior) * (point - runs.start)
+    near = _AT_BOUND * np.maximum(1.0, np.abs(point))
+    is_at_bound = ((point - runs.low < near) & (gradient > 0.0)) | ((runs.high - point < near) & (gradient < 0.0))
+    names = [number.name for number in runs.numbers]
+    # What is assumed of each number widens the interval of every one by its share of the variance [-].
+    fractions = np.square(covariance * runs.prior) / np.diag(covariance)[:, None]
+    shares = {
+        name: tuple((names[other], float(row[other])) for other in np.argsort(-row).tolist() if row[other] >= _SHOWN)
+        for name, row in zip(names, fractions, strict=True)
+    }
+    return Fit(
+        numbers=runs.numbers,
+        values=point * runs.scale,
+        covariance=covariance * np.outer(runs.scale, runs.scale),
+        low=low * runs.scale,
+        high=high * runs.scale,
+        noise={channel: noise.deviation for channel, noise in sensors.items()},
+        correlation={channel: len(noise.reflection) + (noise.gain > 0.0) for channel, noise in sensors.items()},
+        residuals=end.residuals,
+        outliers=tuple(outliers.tolist()),
+        conflict=conflict_of(runs, linear.rows, point, ~is_at_bound, freedom) or too_smooth(sensors),
+        unidentified=tuple(unidentified(covariance, names)),
+        shares=shares,
+        evaluations=runs.evaluations,
+        # Where every step leaves the region in which runs succeed nothing says that this is the least.
+        has_converged=-math.inf < end.gain < _CONVERGED,
+        sensors=sensors,
+        jacobian=jacobian / runs.scale,
+        confidence=confidence,
+        edge={} if math.isfinite(end.gain) else _edge(runs, point, end.step),
+    )
+
+
+def _search(runs: FitRuns, start: Floats) -> tuple[Floats, Indices]:
+    """Return the approximate least-squares point, alternating between estimation of weights and minimisation.
+
+    The isolated outliers of a motion, as rows of the residuals, are returned with it.
+    """
+    point, outliers = np.clip(start, runs.low, runs.high), np.zeros(0, dtype=np.intp)
+    residuals = runs.residuals_at(point)
+    if not np.isfinite(residuals).all():
         raise IdentificationError("no run succeeds at the start values; give others, or check the recordings")
-    noise, _ = work.deviations(left[:, None])
+    noise, _ = runs.deviations(residuals[:, None])
     begun = time.monotonic()
     for number in range(_PASSES):
-        work.report(Progress("fit", number, _PASSES, noun="passes", elapsed=time.monotonic() - begun))
+        runs.report(Progress("fit", number, _PASSES, noun="passes", elapsed=time.monotonic() - begun))
         weight = 1.0 / noise
-        weight[work.outliers] = 0.0
+        weight[outliers] = 0.0
 
         def weighted(x: Floats, weight: Floats = weight) -> Floats:
-            return np.concatenate([work.one(x) * weight, (x - work.mean) * work.prior])
+            return np.concatenate([runs.residuals_at(x) * weight, (x - runs.start) * runs.prior])
 
-        def slopes(x: Floats, weight: Floats = weight) -> Floats:
-            return np.concatenate(
-                [work.jacobian(x, weight, is_central=not work.is_motion) * weight[:, None], np.diag(work.prior)]
-            )
+        def weighted_slopes(x: Floats, weight: Floats = weight) -> Floats:
+            slopes = runs.jacobian(x, is_central=not runs.is_motion)
+            runs.adapt_steps(slopes, weight)
+            return np.concatenate([slopes * weight[:, None], np.diag(runs.prior)])
 
         # The first pass is robust: a number can lose its gradient at a bound while the clock is still wrong.
         result = least_squares(
             weighted,
             point,
-            slopes,
-            (work.low, work.high),
+            weighted_slopes,
+            (runs.low, runs.high),
             method="trf",
             x_scale="jac",
             xtol=1.0e-9,
@@ -181,149 +229,121 @@ def _search(work: FitRuns, start: Floats) -> Floats:
             max_nfev=_FEW_EVALUATIONS if number > 1 else _EVALUATIONS,
         )
         point = np.asarray(result.x)
-        left = work.one(point).copy()
-        if number == 0 and work.is_motion:
-            work.outliers = _outliers(work, left)
-        left[work.outliers] = 0.0
-        before, (noise, _) = noise, work.deviations(left[:, None])
-        if number and result.status > 0 and float(np.abs(np.log(noise / before)).max()) < _SETTLED:
+        residuals = runs.residuals_at(point).copy()
+        if number == 0 and runs.is_motion:
+            outliers = _outliers(runs, residuals)
+        residuals[outliers] = 0.0
+        previous_noise, (noise, _) = noise, runs.deviations(residuals[:, None])
+        if number and result.status > 0 and float(np.abs(np.log(noise / previous_noise)).max()) < _SETTLED:
             break
-    return point
+    return point, outliers
 
 
-def _outliers(work: FitRuns, left: Floats) -> Indices:
+def _outliers(runs: FitRuns, residuals: Floats) -> Indices:
     """Return the isolated outliers among the residuals of the robust pass, at most one sample in 100.
 
     A single outlier near a break-away could otherwise determine a friction. If more samples stand out, the noise has
     heavy tails, and only the largest are left out.
     """
-    found, sizes = list[Indices](), list[Floats]()
-    for one in work.blocks:
-        own = left[one.rows]
-        noise = max(white_noise_of(own), float(np.min(one.floor)))
-        rows = np.flatnonzero(outlying_samples(own, noise))
-        found.append(rows + one.rows.start)
-        sizes.append(off_neighbours(own)[rows] / max(noise, 1.0e-300))
-    order = np.argsort(-np.concatenate(sizes), kind="stable")[: int(_LEFT_OUT * len(left))]
-    return np.sort(np.concatenate(found)[order])
+    outliers, sizes = list[Indices](), list[Floats]()
+    for block in runs.blocks:
+        samples = residuals[block.rows]
+        noise = max(white_noise_of(samples), float(np.min(block.floor)))
+        rows = np.flatnonzero(outlying_samples(samples, noise))
+        outliers.append(rows + block.rows.start)
+        sizes.append(off_neighbours(samples)[rows] / max(noise, 1.0e-300))
+    order = np.argsort(-np.concatenate(sizes), kind="stable")[: int(_LEFT_OUT * len(residuals))]
+    return np.sort(np.concatenate(outliers)[order])
 
 
-def _settled(work: FitRuns, point: Floats) -> tuple[Floats, Floats, Linear, Floats, float]:
+class _SearchEnd(NamedTuple):
+    """End of the Gauss-Newton steps: scaled point, residuals [SI], linearisation there, and the last step tried.
+
+    ``gain`` is the decrease of the cost by this step [-]: at most 0 if the step was not taken, -inf if no run succeeds.
+    """
+
+    point: Floats
+    residuals: Floats
+    linear: Linear
+    step: Floats
+    gain: float
+
+
+def _settle(runs: FitRuns, point: Floats, outliers: Indices) -> _SearchEnd:
     """Return the point at which Gauss-Newton steps on whitened samples end, starting from a scaled ``point``.
 
-    Returns the scaled variables, the residuals, the linearisation there, the last step tried, and its gain: the
-    decrease of the cost; at most 0 if the step was not taken, -inf if no run succeeds there. Outliers are left out and,
-    in a fit of motion, also samples of high leverage.
+    Outliers are left out and, in a fit of motion, also samples of high leverage.
     """
-    left = work.one(point)
-    work.left_out, is_checked = work.outliers, False
-    kept = left.copy()
-    kept[work.left_out] = 0.0
-    noise, _ = work.deviations(kept[:, None])
+    residuals = runs.residuals_at(point)
+    left_out, is_checked = outliers, False
+    without_outliers = residuals.copy()
+    without_outliers[outliers] = 0.0
+    noise, _ = runs.deviations(without_outliers[:, None])
     for number in range(_LAST_STEPS):
-        linear, step = linear_at(work, point, left, work.jacobian(point, 1.0 / noise))
-        noise, cost = linear.noise, cost_of(work, left, point, linear)
+        jacobian = runs.jacobian(point)
+        runs.adapt_steps(jacobian, 1.0 / noise)
+        linear, step = linear_at(runs, point, residuals, jacobian, left_out)
+        noise, cost = linear.noise, cost_of(runs, residuals, point, linear)
         # A step may leave where runs succeed, or overshoot: a shorter one is taken then, one that gains or none.
         for share in _SHARES:
-            reached = np.clip(point + share * step, work.low, work.high)
-            after = work.one(reached)
-            gain = cost - cost_of(work, after, reached, linear) if np.isfinite(after).all() else -math.inf
+            trial = np.clip(point + share * step, runs.low, runs.high)
+            trial_residuals = runs.residuals_at(trial)
+            has_run = np.isfinite(trial_residuals).all()
+            gain = cost - cost_of(runs, trial_residuals, trial, linear) if has_run else -math.inf
             if gain > 0.0:
                 break
         is_settled = gain < _GAIN
-        if (is_settled and (is_checked or not work.is_motion)) or number == _LAST_STEPS - 1:
+        if (is_settled and (is_checked or not runs.is_motion)) or number == _LAST_STEPS - 1:
             break
         if is_settled:
             is_checked = True
             # What a sample near an impact seems to say alone is narrow and false: its slope holds on one side only.
             leverage = np.square(linear.rows[:, 1:] @ linear.root).sum(axis=1)
             highest = np.argsort(-leverage)[: int(_LEFT_OUT * len(leverage))]
-            work.left_out = np.union1d(work.outliers, highest[leverage[highest] > _LEVERAGE])
+            left_out = np.union1d(outliers, highest[leverage[highest] > _LEVERAGE])
         if gain > 0.0:
-            point, left = reached, after
-    return point, left, linear, step, gain
+            point, residuals = trial, trial_residuals
+    return _SearchEnd(point, residuals, linear, step, gain)
 
 
-def _edge(work: FitRuns, point: Floats, step: Floats) -> dict[str, int]:
+def _edge(runs: FitRuns, point: Floats, step: Floats) -> dict[str, int]:
     """Return the unknowns for which no run succeeds after a short step from a point, with the sign of the step.
 
     If every single step succeeds and only their combination fails, all unknowns are returned.
     """
-    sought = np.flatnonzero((work.prior == 0.0) & (step != 0.0))
+    sought = np.flatnonzero((runs.prior == 0.0) & (step != 0.0))
     moved = point[:, None] + _SHARES[-1] * np.diag(step)[:, sought]
-    fails = ~np.isfinite(work.at(np.clip(moved, work.low[:, None], work.high[:, None]))).all(axis=0)
-    rows = sought[fails] if fails.any() else sought
-    return {work.numbers[row].name: int(np.sign(step[row])) for row in rows.tolist()}
+    residuals = runs.residuals_at_points(np.clip(moved, runs.low[:, None], runs.high[:, None]))
+    fails = ~np.isfinite(residuals).all(axis=0)
+    indices = sought[fails] if fails.any() else sought
+    return {runs.numbers[index].name: int(np.sign(step[index])) for index in indices.tolist()}
 
 
-def _whitened(work: FitRuns, start: Floats, confidence: float) -> Fit:
-    """Return the whitened fit with intervals and consistency tests, starting from a scaled least-squares point."""
-    point, left, linear, step, gain = _settled(work, start)
-    rows = linear.rows
-    known, whitened, errors = linear.sensors, rows[:, 1:], rows[:, 0]
-    covariance = linear.root @ linear.root.T
-    # Samples less what the numbers took: a tolerance that the readings do not move takes none.
-    freedom = max(len(left) - float(np.sum(whitened * (whitened @ covariance))), 1.0)
-    low, high = interval_ends(work, point, linear, float(student.ppf(0.5 + 0.5 * confidence, freedom)))
-    # At a bound that the squares would leave a number is no longer free, and no group can move it there.
-    gradient = errors @ whitened + np.square(work.prior) * (point - work.mean)
-    near = 1.0e-6 * np.maximum(1.0, np.abs(point))
-    touching = ((point - work.low < near) & (gradient > 0.0)) | ((work.high - point < near) & (gradient < 0.0))
-    names = [number.name for number in work.numbers]
-    # What is assumed of each number widens the interval of every one by its share of the variance [-].
-    fractions = np.square(covariance * work.prior) / np.diag(covariance)[:, None]
-    shares = {
-        name: tuple((names[other], float(row[other])) for other in np.argsort(-row).tolist() if row[other] >= _SHOWN)
-        for name, row in zip(names, fractions, strict=True)
-    }
-    return Fit(
-        numbers=work.numbers,
-        values=point * work.scale,
-        covariance=covariance * np.outer(work.scale, work.scale),
-        low=low * work.scale,
-        high=high * work.scale,
-        noise={channel: sensor.deviation for channel, sensor in known.items()},
-        correlation={channel: len(sensor.reflection) + (sensor.gain > 0.0) for channel, sensor in known.items()},
-        residuals=left,
-        outliers=tuple(work.outliers.tolist()),
-        conflict=conflict_of(work, rows, point, ~touching, freedom) or too_smooth(known),
-        unidentified=tuple(unidentified(covariance, names)),
-        shares=shares,
-        evaluations=work.evaluations,
-        # Where every step leaves the region in which runs succeed nothing says that this is the least.
-        has_converged=-math.inf < gain < _CONVERGED,
-        sensors=known,
-        jacobian=whitened / work.scale,
-        confidence=confidence,
-        edge={} if math.isfinite(gain) else _edge(work, point, step),
-    )
-
-
-def _likelihood(work: FitRuns, found: Fit) -> float:
+def _likelihood(runs: FitRuns, fitted: Fit) -> float:
     """Return the log-likelihood [-] of whitened residuals and priors, up to a constant."""
     size = 0.0
-    for one in work.blocks:
-        noise, count = found.sensors[one.channel], one.rows.stop - one.rows.start
+    for block in runs.blocks:
+        noise, count = fitted.sensors[block.channel], block.rows.stop - block.rows.start
         size += count * (math.log(noise.deviation) + math.log(noise.innovation))
-    return -size - 0.5 * float(np.square((found.values / work.scale - work.mean) * work.prior).sum())
+    return -size - 0.5 * float(np.square((fitted.values / runs.scale - runs.start) * runs.prior).sum())
 
 
-def _other_starts(work: FitRuns, found: Fit) -> Iterator[Floats]:
+def _other_starts(runs: FitRuns, fitted: Fit) -> Iterator[Floats]:
     """Yield at most two scaled start points that explain the recordings better than the fit does."""
-    sought = ~(work.prior > 0.0)
-    point = found.values / work.scale
-    low, high = np.maximum(work.low, -1.0e3)[sought], np.minimum(work.high, 1.0e3)[sought]
+    sought = ~(runs.prior > 0.0)
+    point = fitted.values / runs.scale
+    low, high = np.maximum(runs.low, -1.0e3)[sought], np.minimum(runs.high, 1.0e3)[sought]
     is_ratio = (low > 0.0) & (high > 10.0 * low)
     with np.errstate(invalid="ignore", divide="ignore"):
         ends = [np.where(is_ratio, np.log(end), end) for end in (low, high)]
     # Seeded, so that the same recordings give the same numbers.
     drawn = qmc.Sobol(int(sought.sum()), seed=1).random(_OTHER_STARTS).T
     drawn = ends[0][:, None] + drawn * (ends[1] - ends[0])[:, None]
+    # The last is where the fit ended.
     points = np.repeat(point[:, None], _OTHER_STARTS + 1, axis=1)
     points[sought, :-1] = np.where(is_ratio[:, None], np.exp(np.where(is_ratio[:, None], drawn, 0.0)), drawn)
-    left = work.at(points)
-    noise = np.concatenate([np.full(one.rows.stop - one.rows.start, found.noise[one.channel]) for one in work.blocks])
-    costs = np.sum(np.log1p(np.square(left / noise[:, None])), axis=0)
+    noise = [np.full(block.rows.stop - block.rows.start, fitted.noise[block.channel]) for block in runs.blocks]
+    residuals = runs.residuals_at_points(points)
+    costs = np.sum(np.log1p(np.square(residuals / np.concatenate(noise)[:, None])), axis=0)
     costs[~np.isfinite(costs)] = np.inf
-    # The last is where the fit ended.
-    yield from (points[:, place] for place in np.argsort(costs)[:2].tolist() if costs[place] < costs[-1])
+    yield from (points[:, index] for index in np.argsort(costs)[:2].tolist() if costs[index] < costs[-1])

@@ -37,30 +37,30 @@ _UNKNOWN = 0.5
 """Standard error of a combination of scaled variables [-] above which it is not identifiable."""
 
 
-def interval_ends(work: FitRuns, point: Floats, linear: Linear, times: float) -> tuple[Floats, Floats]:
+def interval_ends(runs: FitRuns, point: Floats, linear: Linear, times: float) -> tuple[Floats, Floats]:
     """Return scaled lower and upper confidence limits: ``times`` standard errors, or wider for nonlinear laws.
 
     Only intervals of unknowns without a prior are widened. A limit that the samples do not determine is the bound.
     """
     covariance = linear.root @ linear.root.T
     wide = times * np.sqrt(np.diag(covariance))
-    low, high = np.maximum(point - wide, work.low), np.minimum(point + wide, work.high)
-    least = cost_of(work, work.one(point), point, linear)
-    sides = [(number, ends) for number in np.flatnonzero(work.prior == 0.0).tolist() for ends in (low, high)]
+    low, high = np.maximum(point - wide, runs.low), np.minimum(point + wide, runs.high)
+    least = cost_of(runs, runs.residuals_at(point), point, linear)
+    sides = [(number, ends) for number in np.flatnonzero(runs.prior == 0.0).tolist() for ends in (low, high)]
     held = [number for number, _ in sides]
     offsets = np.array([ends[number] - point[number] for number, ends in sides])
     straight = point[:, None] + covariance[:, held] / covariance[held, held] * offsets
-    first = _least_beside(work, straight, held, linear)
+    first = _least_beside(runs, straight, held, linear)
     for place, (number, ends) in enumerate(sides):
-        bound = float((work.low if ends is low else work.high)[number])
+        bound = float((runs.low if ends is low else runs.high)[number])
         if offsets[place] != 0.0:
             tried = float(first[0][place]), first[1][:, place]
-            ends[number] = _end(work, point, least, linear, number, bound, tried, times)
+            ends[number] = _end(runs, point, least, linear, number, bound, tried, times)
     return low, high
 
 
 def _end(
-    work: FitRuns,
+    runs: FitRuns,
     point: Floats,
     least: float,
     linear: Linear,
@@ -78,7 +78,7 @@ def _end(
     outer: Floats | None = None
     far, (squares, reached) = math.inf, straight
     if math.sqrt(max(squares - least, 0.0)) > _BENT * times:
-        squares, reached = _least_along(work, reached, number, linear)
+        squares, reached = _least_along(runs, reached, number, linear)
     for _ in range(_TRIES):
         # By how many standard errors priors and samples tell this point from the estimate.
         parted = math.sqrt(max(squares - least, 0.0))
@@ -94,29 +94,29 @@ def _end(
             break
         further = min(max(times / max(near, 0.1), _FURTHER), 2.0)
         tried = point + further * (inner - point) if outer is None else 0.5 * (inner + outer)
-        squares, reached = _least_along(work, np.clip(tried, work.low, work.high), number, linear)
+        squares, reached = _least_along(runs, np.clip(tried, runs.low, runs.high), number, linear)
     if outer is None:
         return bound
     share = (times - near) / (far - near)
     return float(inner[number] + share * (outer[number] - inner[number]))
 
 
-def _least_beside(work: FitRuns, points: Floats, held: list[int], linear: Linear) -> tuple[Floats, Floats]:
+def _least_beside(runs: FitRuns, points: Floats, held: list[int], linear: Linear) -> tuple[Floats, Floats]:
     """Return the minimum of the squares with one variable fixed, for each scaled point, and the points of the minima.
 
     ``held`` is the index of the fixed variable of each point. The other variables take Gauss-Newton steps with the
     Jacobian of the estimate. The minimum is infinite if no run succeeds.
     """
     covariance, slopes = linear.root @ linear.root.T, linear.rows[:, 1:]
-    low, high, each = work.low[:, None], work.high[:, None], np.arange(len(held))
+    low, high, each = runs.low[:, None], runs.high[:, None], np.arange(len(held))
     tried = best = np.clip(points, low, high)
     least = np.full(len(held), np.inf)
     for _ in range(_CORRECTIONS + 1):
-        errors = whitened_errors(work, work.at(tried), linear)
-        squares = squares_of(work, errors, tried)
+        errors = whitened_errors(runs, runs.residuals_at_points(tried), linear)
+        squares = squares_of(runs, errors, tried)
         is_less = squares < least
         least, best = np.where(is_less, squares, least), np.where(is_less, tried, best)
-        pull = slopes.T @ errors + np.square(work.prior)[:, None] * (tried - work.mean[:, None])
+        pull = slopes.T @ errors + np.square(runs.prior)[:, None] * (tried - runs.start[:, None])
         step = -covariance @ pull
         # Of all steps, the one that leaves the number where it is held.
         step -= covariance[:, held] / covariance[held, held] * step[held, each]
@@ -128,27 +128,29 @@ def _least_beside(work: FitRuns, points: Floats, held: list[int], linear: Linear
     return least, best
 
 
-def _least_along(work: FitRuns, point: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
+def _least_along(runs: FitRuns, point: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
     """Return the minimum of the squares with one variable of a scaled point fixed, and the point of the minimum.
 
     The other variables take Gauss-Newton steps within their bounds, each with a new Jacobian, because far from the
     estimate its Jacobian leads out of a curved valley. The minimum is infinite if no run succeeds.
     """
-    errors = whitened_errors(work, work.at(point[:, None]), linear)
-    squares = float(squares_of(work, errors, point[:, None])[0])
+    errors = whitened_errors(runs, runs.residuals_at_points(point[:, None]), linear)
+    squares = float(squares_of(runs, errors, point[:, None])[0])
     if not math.isfinite(squares):
         return math.inf, point
     others = np.delete(np.arange(len(point)), number)
     for _ in range(_LINEARISATIONS):
-        slopes = whitened_errors(work, work.jacobian(point, 1.0 / linear.noise, is_central=False), linear)
-        axes, triangle = np.linalg.qr(np.concatenate([slopes, np.diag(work.prior)])[:, others])
-        pull = axes.T @ np.concatenate([errors[:, 0], (point - work.mean) * work.prior])
-        low, high = (end - point[others] for end in (work.low[others], work.high[others]))
+        jacobian = runs.jacobian(point, is_central=False)
+        runs.adapt_steps(jacobian, 1.0 / linear.noise)
+        slopes = whitened_errors(runs, jacobian, linear)
+        axes, triangle = np.linalg.qr(np.concatenate([slopes, np.diag(runs.prior)])[:, others])
+        pull = axes.T @ np.concatenate([errors[:, 0], (point - runs.start) * runs.prior])
+        low, high = (end - point[others] for end in (runs.low[others], runs.high[others]))
         step = np.zeros(len(point))
         step[others] = lsq_linear(triangle, -pull, (low - 1.0e-300, high + 1.0e-300), method="bvls").x
-        tried = np.clip(point + _SHARES * step, work.low, work.high).T
-        all_errors = whitened_errors(work, work.at(tried), linear)
-        all_squares = squares_of(work, all_errors, tried)
+        tried = np.clip(point + _SHARES * step, runs.low, runs.high).T
+        all_errors = whitened_errors(runs, runs.residuals_at_points(tried), linear)
+        all_squares = squares_of(runs, all_errors, tried)
         best = int(np.argmin(np.where(np.isfinite(all_squares), all_squares, np.inf)))
         fall = squares - float(all_squares[best])
         if not fall > 0.0:

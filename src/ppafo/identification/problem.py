@@ -1,15 +1,8 @@
-"""Problem file of ``ppafo identify``: recordings, column maps, and procedures to apply.
+"""Problem file of ``ppafo identify``: initial parameter set, recordings, column maps, and procedures to apply."""
 
-Each procedure is a table of the file, completed with values from a parameter set. The recommended order matters where
-one procedure uses results of another: torque and friction come first because they need no others, the flow of the open
-valve comes before the valve map, and the leak comes last, because its chambers must be known to be closed.
-"""
-
-import math
-from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -17,311 +10,24 @@ from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make
 from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.flow import GasAt, Law
-from ppafo.identification.bench.free_decay import free_decay
-from ppafo.identification.bench.open_valve_flow import open_valve_flow
-from ppafo.identification.bench.result import BenchResult
-from ppafo.identification.bench.static_torque import static_torque
-from ppafo.identification.bench.valve_map import valve_map
-from ppafo.identification.bench.vane_leak import vane_leak
-from ppafo.identification.keys import Columns, Confidence, positive_in, quantity_in
-from ppafo.identification.new_set import stated_half_width
-from ppafo.identification.source import RecordingSource
-from ppafo.identification.tolerances import DEFAULTS, BenchSection, Tolerances
+from ppafo.identification.procedures import ProcedureProblem
+from ppafo.identification.tolerances import BenchSection
 from ppafo.identification.trajectory.layout import TrajectorySection, refuse_removed
-from ppafo.model.gas import SPECIES
-from ppafo.parameters.device import VANE
-from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si, with_followers
-from ppafo.simulation.recorded.usual_errors import deviation_of_limit
+from ppafo.parameters.parameter_set import Citation
 from ppafo.storage.column_map import ColumnMap
 from ppafo.wording import nearest_name
-
-_Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
-_Start = Annotated[Text | None, Field(description="first time to use, such as '2 s'")]
-_End = Annotated[Text | None, Field(description="last time to use, such as '8 s'")]
-_Gas = Annotated[Text | None, Field(description="species of the gas on the bench; default: the set's")]
-_Temperature = Annotated[Text | None, Field(description="of the gas on the bench, '17 degC'; default: the set's")]
-_Valve = Annotated[Text | None, Field(description="name of a valve of the set; default: the chosen one")]
-
-UNKNOWN = "unknown"
-_COLDEST, _HOTTEST = 150.0, 600.0
-_THERMOMETER = 1.0
-"""Limit [K] of the error of a temperature stated in the problem."""
 
 _FILE = TomlKind(
     "identification problem", "identification", resources.files("ppafo.identification"), IdentificationError
 )
 
 
-@dataclass(frozen=True, slots=True)
-class ProcedureContext:
-    """Context of a procedure: parameter set, chosen valve, label of the section in messages, bench tolerances."""
-
-    parameter_set: ParameterSet
-    valve: str
-    place: str
-    tolerances: Tolerances = DEFAULTS
-
-    def number(self, path: str) -> float:
-        """Return the value at a path [SI]. Raises IdentificationError if the set has none."""
-        value = number_in_si(with_followers(self.parameter_set), path)
-        if value is None:
-            raise IdentificationError(f"{self.place}: needs {path}, which {self.parameter_set.file} does not have")
-        return value
-
-    def gas(self, problem: "OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem") -> GasAt:
-        """Return the gas of the bench; species and temperature default to the values of the set.
-
-        Raises IdentificationError for an unknown species.
-        """
-        temperature, species = quantity_in(problem, "temperature", "K", self.place, _COLDEST, _HOTTEST), problem.gas
-        if temperature is None:
-            temperature = self.number("gas.temperature")
-            deviation = self.deviation("gas.temperature", temperature, "K")
-        else:
-            limit = self.tolerances.gas_temperature
-            deviation = deviation_of_limit(_THERMOMETER if limit is None else limit)
-        if species is None:
-            own = self.number("gas.molar_mass"), self.number("gas.heat_capacity_ratio")
-            return GasAt(*own, temperature, deviation)
-        if species not in SPECIES:
-            hint = nearest_name(species, SPECIES)
-            known = ", ".join(SPECIES)
-            raise IdentificationError(f"{self.place}: gas = {species!r} is unknown{hint}; available: {known}")
-        known_gas = SPECIES[species]
-        return GasAt(known_gas.molar_mass, known_gas.heat_capacity_ratio, temperature, deviation)
-
-    def deviation(self, path: str, value: float, unit: str) -> float:
-        """Return the standard deviation of a number, given its value [unit], from the bench, the set, or defaults."""
-        entry = with_followers(self.parameter_set).numbers.get(path)
-        return self.tolerances.deviation_of(path, value, 0.0 if entry is None else stated_half_width(entry, unit))
-
-    def valve_path(self, name: str | None) -> str:
-        """Return the path of a valve in the set, such as ``valves.main``; None is the chosen valve."""
-        return f"valves.{chosen_valve(self.parameter_set, name or self.valve)}"
-
-
-class StaticTorqueProblem(StrictTable):
-    """Static torque over rising and falling pressure: torque constant and static friction."""
-
-    kind: Literal["static-torque"]
-    recordings: _Recordings
-    columns: Columns = None
-    confidence: Confidence = 0.95
-
-    def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
-        """Return the result of the procedure for recordings."""
-        return static_torque(sources, self.confidence, setting.tolerances)
-
-
-_MOST_OF_STOPS = 10.0
-"""Largest ratio of angle travelled in a decay to angle between the stops [-]; more means a wrong unit."""
-
-
-class FreeDecayProblem(StrictTable):
-    """Free decay after an impulse: viscous damping and Coulomb friction."""
-
-    kind: Literal["free-decay"]
-    recordings: _Recordings
-    columns: Columns = None
-    confidence: Confidence = 0.95
-    start: _Start = None
-    end: _End = None
-    inertia: Text | None = Field(None, description="such as '8.4 g m^2', or 'unknown'; default: the set's")
-
-    def inertia_of(self, setting: ProcedureContext) -> tuple[float | None, float]:
-        """Return the inertia and its standard deviation [kg m^2], by default from the set; None if unknown."""
-        path = "foot_plate.inertia"
-        if self.inertia == UNKNOWN:
-            return None, 0.0
-        inertia = positive_in(self, "inertia", "kg m^2", setting.place)
-        if inertia is not None:
-            return inertia, setting.tolerances.deviation_of(path, inertia, 0.0)
-        inertia = number_in_si(setting.parameter_set, path)
-        return inertia, 0.0 if inertia is None else setting.deviation(path, inertia, "kg m^2")
-
-    def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
-        """Return the result of the procedure for recordings. Raises IdentificationError for an implausible angle."""
-        low, high = (number_in_si(setting.parameter_set, f"actuator.angle_{end}") for end in ("min", "max"))
-        for source in sources:
-            angles = source.recording["angle"] if "angle" in source.recording else source.recording.time[:1]
-            turned = float(angles.max() - angles.min())
-            if low is not None and high is not None and turned > _MOST_OF_STOPS * (high - low) > 0.0:
-                raise IdentificationError(
-                    f"{source.name}: free-decay: 'angle' goes over {turned:.4g} rad, {turned / math.tau:.3g} turns, "
-                    f"and the stops of the set are {math.degrees(high - low):.4g} deg apart: is its unit deg?"
-                )
-        paths = ("friction.static_torque", "friction.dynamic_torque")
-        static, dynamic = (number_in_si(setting.parameter_set, path) for path in paths)
-        # Near standstill a seal grips as hard as at rest at most.
-        rise = max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0
-        return free_decay(
-            sources,
-            *times_of(self, setting.place),
-            *self.inertia_of(setting),
-            rise,
-            confidence=self.confidence,
-            tolerances=setting.tolerances,
-        )
-
-
-class OpenValveFlowProblem(StrictTable):
-    """Flow through the fully open valve: Cd, or C and b of ISO 6358."""
-
-    kind: Literal["open-valve-flow"]
-    recordings: _Recordings
-    columns: Columns = None
-    confidence: Confidence = 0.95
-    gas: _Gas = None
-    temperature: _Temperature = None
-    valve: _Valve = None
-    law: Annotated[Law, Field(description="law of the flow; it is written into the set in this form")] = "orifice"
-
-    def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
-        """Return the result of the procedure for recordings."""
-        path = setting.valve_path(self.valve)
-        area = number_in_si(setting.parameter_set, f"{path}.area")
-        ratio = number_in_si(setting.parameter_set, f"{path}.critical_ratio")
-        gas, known = setting.gas(self), (self.confidence, setting.tolerances)
-        return open_valve_flow(sources, gas, self.law, area, path, ratio, *known)
-
-
-class VaneLeakProblem(StrictTable):
-    """Leak of closed chambers losing pressure, or in steady flow: area, conductance or laminar coefficient."""
-
-    kind: Literal["vane-leak"]
-    recordings: _Recordings
-    columns: Columns = None
-    confidence: Confidence = 0.95
-    gas: _Gas = None
-    temperature: _Temperature = None
-    start: _Start = None
-    end: _End = None
-    angle: Text | None = Field(None, description="vane angle, from which the set's volumes follow")
-    law: Literal["orifice", "laminar", "both"] = Field(
-        "orifice", description="an orifice is written as the set has it; both: a laminar gap beside it"
-    )
-    volume_1: Text | None = Field(None, description="volume of chamber 1 with its line, such as '40 cm^3'")
-    volume_2: Text | None = Field(None, description="volume of chamber 2 with its line")
-
-    def volumes_of(self, setting: ProcedureContext) -> tuple[float | None, float | None, float]:
-        """Return both volumes [m^3], given or computed from the angle, and relative standard deviation of a volume [-].
-
-        Equations (4), (5): V1 = V_dead1 + v (theta - theta_min) and V2 = V_dead2 + v (theta_max - theta), with v the
-        displacement per radian [m^3/rad].
-        """
-        first, second = (positive_in(self, name, "m^3", setting.place) for name in ("volume_1", "volume_2"))
-        angle = quantity_in(self, "angle", "rad", setting.place)
-        deviation = setting.tolerances.deviation_of("actuator.dead_volume_1", 1.0, 0.0)
-        if angle is not None:
-            if setting.parameter_set.actuator_kind != VANE:
-                raise IdentificationError(
-                    f"{setting.place}: angle = {self.angle!r}: volumes follow from the angle of a vane only; give "
-                    "volume_1 and volume_2"
-                )
-            names = ("angle_min", "angle_max", "displacement_per_radian", "dead_volume_1", "dead_volume_2")
-            lower, upper, per_angle, dead_1, dead_2 = (setting.number(f"actuator.{name}") for name in names)
-            if not lower <= angle <= upper:
-                raise IdentificationError(f"{setting.place}: angle = {self.angle!r} lies beyond the stops of the set")
-            # A volume that is given counts before one from the angle: its line may be another one.
-            first = first or dead_1 + per_angle * (angle - lower)
-            second = second or dead_2 + per_angle * (upper - angle)
-            of_volume = setting.deviation("actuator.dead_volume_1", dead_1, "m^3")
-            of_angle = (angle - lower) * setting.deviation("actuator.displacement_per_radian", per_angle, "m^3/rad")
-            deviation = math.hypot(of_volume, of_angle) / (dead_1 + per_angle * (angle - lower))
-        return first, second, deviation
-
-    def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
-        """Return the result of the procedure for recordings."""
-        first, second, deviation = self.volumes_of(setting)
-        start, end = times_of(self, setting.place)
-        forms = ("discharge_coefficient", "critical_ratio")
-        coefficient, ratio = (number_in_si(setting.parameter_set, f"actuator.leak.{name}") for name in forms)
-        return vane_leak(
-            sources,
-            setting.gas(self),
-            first,
-            second,
-            coefficient,
-            start,
-            end,
-            self.confidence,
-            ratio,
-            self.law,
-            setting.tolerances,
-            deviation,
-        )
-
-
-class ValveMapProblem(StrictTable):
-    """Flow over command: dead band, gain, saturation, hysteresis."""
-
-    kind: Literal["valve-map"]
-    recordings: _Recordings
-    columns: Columns = None
-    confidence: Confidence = 0.95
-    gas: _Gas = None
-    temperature: _Temperature = None
-    valve: _Valve = None
-
-    def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
-        """Return the result of the procedure for recordings."""
-        gas = setting.gas(self)
-        return valve_map(sources, gas, setting.valve_path(self.valve), self.confidence, setting.tolerances)
-
-
-def times_of(problem: FreeDecayProblem | VaneLeakProblem, place: str) -> tuple[float | None, float | None]:
-    """Return first and last time [s] to use, None for the start or end of the recording; ``place`` starts messages."""
-    return quantity_in(problem, "start", "s", place), quantity_in(problem, "end", "s", place)
-
-
 class DeviceProblem(StrictTable):
     """Initial parameter set, its valve, and changes to it."""
 
     set: Text = Field(description="name of a parameter set, or a path relative to this file")
-    valve: _Valve = None
+    valve: Text | None = Field(None, description="name of a valve of the set; default: the chosen one")
     overrides: Texts = Field((), description="changes to the set, kept in the new one")
-
-
-ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem
-
-
-PROCEDURES = "static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak"
-"""Kinds of procedures in the recommended order."""
-
-
-def run_procedure(
-    sources: tuple[RecordingSource, ...], problem: ProcedureProblem, setting: ProcedureContext
-) -> BenchResult:
-    """Return the result of a procedure for its recordings.
-
-    Raises IdentificationError, with the name of the recording or the label of the procedure first.
-    """
-    try:
-        found = problem.run(sources, setting)
-    except IdentificationError as error:
-        # What is wrong with a file is told by its name, what is wrong with a procedure by its place in the problem.
-        if str(error).startswith((setting.place, *(source.name for source in sources))):
-            raise
-        raise IdentificationError(f"{setting.place}: {error}") from error
-    acting = ("zero",) if problem.kind == "static-torque" else ()
-    idle = [f"'{name}'" for name in setting.tolerances.each_recording if name not in acting]
-    if not idle or len(sources) == 1:
-        return found
-    said = (
-        f"bench.each_recording: {' and '.join(idle)} acts in a [trajectory], and 'zero' in static-torque; here it is "
-        f"common to all {len(sources)} recordings: give each mounting of the sensors its own [[procedure]]"
-    )
-    return replace(found, remarks=(*found.remarks, said))
-
-
-def window_of(problem: ProcedureProblem, setting: ProcedureContext) -> tuple[float, float]:
-    """Return the first and last time [s] of the recordings that a procedure uses; infinite if not limited."""
-    # Steady readings have no window: each counts by itself.
-    if not isinstance(problem, FreeDecayProblem | VaneLeakProblem):
-        return -math.inf, math.inf
-    first, last = times_of(problem, setting.place)
-    return -math.inf if first is None else first, math.inf if last is None else last
 
 
 class ProblemFile(StrictTable):
@@ -361,11 +67,12 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
         raise IdentificationError(f"{file}: has nothing to do: neither a [[procedure]] nor a [trajectory]")
     fitted = () if problem.trajectory is None else problem.trajectory.experiments
     named = [(f"procedure {number}", item.columns) for number, item in enumerate(problem.procedure, start=1)]
-    for place, name in [*named, *((f"experiment '{item.label}'", item.columns) for item in fitted)]:
+    named += [(f"experiment '{item.label}'", item.columns) for item in fitted]
+    for user, name in named:
         if name is not None and name not in problem.columns:
             hint = nearest_name(name, problem.columns)
             known = ", ".join(problem.columns) or "none"
-            raise IdentificationError(f"{file}: {place}: there is no column map '{name}'{hint}; available: {known}")
+            raise IdentificationError(f"{file}: {user}: there is no column map '{name}'{hint}; available: {known}")
     return problem
 
 

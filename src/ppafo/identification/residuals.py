@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,16 @@ Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 Residuals = Callable[[Floats], Floats]
 """Function from points [SI] (numbers, points) to residuals measured - model [SI] (rows, points); NaN if a run fails."""
+
+_UNITS_OF_NOISE = 3.0
+"""Change of all residuals together in one finite difference, in units of noise [-].
+
+With differences of a thousandth of the variable 7 of 16 intervals held, with thirty units of noise 11, with three 28.
+"""
+_SHORTEST_STEP, _LONGEST_STEP = 1.0e-7, 1.0e-3
+"""Shortest and longest finite difference, as fractions of the scale of a variable [-]."""
+_LEAST_NOISE = 1.0e-12
+"""Least noise of a channel, relative to its largest residual at the start [-]: a law may fit exactly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,15 +62,12 @@ class ResidualBlock:
     groups: tuple[str, ...] = ()
 
 
-_UNITS_OF_NOISE = 3.0
-"""Change of all residuals together in one finite difference, in units of noise [-]."""
-
-_STEPS = (1.0e-7, 1.0e-3)
-"""Shortest and longest finite difference, as fractions of the scale of a variable [-]."""
-
-
 class FitRuns:
-    """Model runs of a fit at scaled points; the residuals of the last single point are cached."""
+    """Model runs of a fit at scaled points; the residuals of the last single point are cached.
+
+    ``start`` is also the mean of the priors, ``prior`` the reciprocal of their standard deviations, 0 for an unknown;
+    both are scaled. ``steps`` are the lengths of finite differences [-], which ``adapt_steps`` changes.
+    """
 
     def __init__(
         self,
@@ -70,7 +78,7 @@ class FitRuns:
         memory: int,
         is_motion: bool,
     ) -> None:
-        self.residuals, self.numbers, self.blocks, self.report = residuals, numbers, blocks, report
+        self._residuals, self.numbers, self.blocks, self.report = residuals, numbers, blocks, report
         self.memory, self.is_motion = memory, is_motion
         self.scale = np.array([number.scale for number in numbers])
         self.start, self.low, self.high, deviation = (
@@ -78,75 +86,76 @@ class FitRuns:
             for name in ("start", "low", "high", "deviation")
         )
         self.prior = 1.0 / deviation
-        self.mean = self.start
+        self.channels = tuple(dict.fromkeys(block.channel for block in blocks))
+        self.steps = np.full(len(numbers), _LONGEST_STEP)
         self.evaluations = 0
-        self.least: dict[str, float] = {}
-        self.step = np.full(len(numbers), _STEPS[1])
-        self.outliers = self.left_out = np.zeros(0, dtype=np.intp)
         self._last: tuple[bytes, Floats] | None = None
 
-    def at(self, points: Floats) -> Floats:
+    def residuals_at_points(self, points: Floats) -> Floats:
         """Return residuals [SI] (rows, points) at scaled points (numbers, points)."""
         self.evaluations += points.shape[1]
-        return self.residuals(points * self.scale[:, None])
+        return self._residuals(points * self.scale[:, None])
 
-    def one(self, point: Floats) -> Floats:
+    def residuals_at(self, point: Floats) -> Floats:
         """Return residuals [SI] (rows,) at one scaled point; a repeated call does not run the model again."""
         key = point.tobytes()
         if self._last is None or self._last[0] != key:
-            self._last = key, self.at(point[:, None])[:, 0]
+            self._last = key, self.residuals_at_points(point[:, None])[:, 0]
         return self._last[1]
 
-    def jacobian(self, point: Floats, weight: Floats, *, is_central: bool = True) -> Floats:
+    def jacobian(self, point: Floats, *, is_central: bool = True) -> Floats:
         """Return the Jacobian of the residuals [SI] by the scaled variables, from finite differences in one batch.
 
-        ``weight`` [1/SI] by row sets the step lengths for the next call. One-sided differences need half the runs and
-        are accurate enough for the search.
+        One-sided differences need half the runs and are accurate enough for the search; where one of their runs fails,
+        central differences are returned. Raises IdentificationError if no run succeeds on either side of a variable.
         """
-        above, below = np.minimum(point + self.step, self.high), np.maximum(point - self.step, self.low)
-        sides = [above, below] if is_central else [np.where(above - point >= point - below, above, below)]
-        values = self.at(np.concatenate([point[:, None] + np.diag(side - point) for side in sides], axis=1))
-        centre, count = self.one(point), len(point)
-        slopes = np.empty((len(centre), count))
-        for index in range(count):
-            tried = [
-                (float(side[index]), values[:, index + side_number * count]) for side_number, side in enumerate(sides)
-            ]
-            ran = [(end, column) for end, column in tried if np.isfinite(column).all()]
-            if not is_central and not ran:
-                return self.jacobian(point, weight)
-            (up, last), (down, first) = [*ran, (float(point[index]), centre)][:2]
-            # Neither side runs: at a bound, or where a device is none.
-            if up == down:
-                free = self.numbers[index]
-                raise IdentificationError(
-                    f"{free.name}: no run succeeds near {point[index] * free.scale:.6g}; give other bounds or "
-                    "another start"
-                )
-            slopes[:, index] = (last - first) / (up - down)
-        # With a thousandth of the number 7 of 16 intervals held, with thirty units of noise 11, with three 28.
+        above, below = np.minimum(point + self.steps, self.high), np.maximum(point - self.steps, self.low)
+        if not is_central:
+            side = np.where(above - point >= point - below, above, below)
+            values = self.residuals_at_points(point[:, None] + np.diag(side - point))
+            if np.isfinite(values).all():
+                return np.ascontiguousarray((values - self.residuals_at(point)[:, None]) / (side - point))
+        ends = np.concatenate([np.diag(above - point), np.diag(below - point)], axis=1)
+        values_above, values_below = np.split(self.residuals_at_points(point[:, None] + ends), 2, axis=1)
+        runs_above, runs_below = (np.isfinite(values).all(axis=0) for values in (values_above, values_below))
+        # Where a side has no run, the point itself is the other end of the difference.
+        runs_both = runs_above & runs_below
+        first, second = np.where(runs_above, above, below), np.where(runs_both, below, point)
+        failing = np.flatnonzero(~(runs_above | runs_below) | (first == second))
+        if failing.size:
+            number = self.numbers[failing[0]]
+            raise IdentificationError(
+                f"{number.name}: no run succeeds near {point[failing[0]] * number.scale:.6g}; give other bounds or "
+                "another start"
+            )
+        at_first = np.where(runs_above, values_above, values_below)
+        at_second = np.where(runs_both, values_below, self.residuals_at(point)[:, None])
+        return np.ascontiguousarray((at_first - at_second) / (first - second))
+
+    def adapt_steps(self, slopes: Floats, weight: Floats) -> None:
+        """Set the lengths of finite differences from a Jacobian [SI] and the weights [1/SI] of its rows."""
         sizes = np.linalg.norm(slopes * weight[:, None], axis=0)
-        self.step = np.clip(_UNITS_OF_NOISE / np.maximum(sizes, 1.0e-300), *_STEPS)
-        return slopes
+        self.steps = np.clip(_UNITS_OF_NOISE / np.maximum(sizes, 1.0e-300), _SHORTEST_STEP, _LONGEST_STEP)
 
     def rows_of(self, channel: str) -> list[slice]:
         """Return the rows of a channel in each recording."""
         return [block.rows for block in self.blocks if block.channel == channel]
 
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Names of the channels, without duplicates."""
-        return tuple(dict.fromkeys(block.channel for block in self.blocks))
-
     def shared(self) -> Floats:
         """Return the errors [SI] common to the rows of a recording, shape (rows, recordings with such errors)."""
-        names = dict.fromkeys(block.recording for block in self.blocks if block.shared is not None)
+        names = list(dict.fromkeys(block.recording for block in self.blocks if block.shared is not None))
         columns = np.zeros((self.blocks[-1].rows.stop, len(names)))
-        for index, name in enumerate(names):
-            for block in self.blocks:
-                if block.recording == name and block.shared is not None:
-                    columns[block.rows, index] = block.shared
+        for block in self.blocks:
+            if block.shared is not None:
+                columns[block.rows, names.index(block.recording)] = block.shared
         return columns
+
+    @cached_property
+    def _least_noise(self) -> dict[str, float]:
+        """Least noise [SI] by channel, relative to the residuals at the start: channels have units of their own."""
+        start = self.residuals_at(self.start)
+        largest = {name: max(float(np.abs(start[rows]).max()) for rows in self.rows_of(name)) for name in self.channels}
+        return {name: _LEAST_NOISE * (size or 1.0) for name, size in largest.items()}
 
     def deviations(self, series: Floats) -> tuple[Floats, dict[str, float]]:
         """Return the noise [SI] of each row, and by channel, pooled over recordings and no less than the floor.
@@ -154,13 +163,11 @@ class FitRuns:
         ``series`` has the residuals as first column; further columns are the uncertainty of the fitted model.
         """
         noise, by_channel = np.empty(len(series)), {}
-        for channel in self.channels:
+        for channel, least in self._least_noise.items():
             samples = np.concatenate([series[rows] for rows in self.rows_of(channel)])
-            pooled = math.sqrt(float(np.square(samples).sum()) / len(samples))
-            # Of its own size at the start: channels have units of their own, and a law may fit exactly.
-            least = self.least.setdefault(channel, 1.0e-12 * (float(np.abs(samples[:, 0]).max()) or 1.0))
+            pooled = max(math.sqrt(float(np.square(samples).sum()) / len(samples)), least)
             blocks = [block for block in self.blocks if block.channel == channel]
-            by_channel[channel] = max(pooled, least, float(np.min(blocks[0].floor)))
+            by_channel[channel] = max(pooled, float(np.min(blocks[0].floor)))
             for block in blocks:
-                noise[block.rows] = np.maximum(max(pooled, least), block.floor)
+                noise[block.rows] = np.maximum(pooled, block.floor)
         return noise, by_channel

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from ppafo.identification.noise import Noise, noise_of, whiten
-from ppafo.identification.residuals import FitRuns, Flags
+from ppafo.identification.residuals import FitRuns, Flags, Indices
 from ppafo.signals.recording import Floats
 
 _OF_ANY_SIZE = 1.0e8
@@ -35,49 +35,52 @@ class Linear(NamedTuple):
     sensors: dict[str, Noise]
 
 
-def linear_at(work: FitRuns, point: Floats, left: Floats, slopes: Floats) -> tuple[Linear, Floats]:
+def linear_at(
+    runs: FitRuns, point: Floats, residuals: Floats, slopes: Floats, left_out: Indices
+) -> tuple[Linear, Floats]:
     """Return the whitened problem at a point, and the step to its least-squares solution within the bounds.
 
     Fitting absorbs part of the noise, which is then missing in the residuals. The expected part J C J' is added and the
-    noise re-estimated until both agree (expectation maximisation), so that slow noise is not underestimated.
+    noise re-estimated until both agree (expectation maximisation), so that slow noise is not underestimated. Rows
+    ``left_out`` say nothing.
     """
-    step, hidden = np.zeros(len(point)), np.zeros((len(left), 0))
-    limits = work.low - point - 1.0e-300, work.high - point + 1.0e-300
+    step, hidden = np.zeros(len(point)), np.zeros((len(residuals), 0))
+    limits = runs.low - point - 1.0e-300, runs.high - point + 1.0e-300
     # A sample with a number of its own, of no known size, says nothing: so it is left out of any noise.
-    own_numbers = np.zeros((len(left), len(work.left_out)))
-    own_numbers[work.left_out, np.arange(len(work.left_out))] = _OF_ANY_SIZE
-    common = work.shared()
+    own_numbers = np.zeros((len(residuals), len(left_out)))
+    own_numbers[left_out, np.arange(len(left_out))] = _OF_ANY_SIZE
+    common = runs.shared()
     for _ in range(_ROUNDS):
-        series = np.column_stack([left + slopes @ step, hidden])
-        series[work.left_out] = 0.0
-        noise, sizes = work.deviations(series)
-        known, scaled = {}, np.column_stack([left, slopes, common]) / noise[:, None]
+        series = np.column_stack([residuals + slopes @ step, hidden])
+        series[left_out] = 0.0
+        noise, sizes = runs.deviations(series)
+        sensors, scaled = {}, np.column_stack([residuals, slopes, common]) / noise[:, None]
         rows = np.column_stack([scaled, own_numbers])
-        for channel in work.channels:
-            of_channel = work.rows_of(channel)
-            kind = noise_of([series[part] / noise[part, None] for part in of_channel], work.memory, work.is_motion)
-            known[channel] = replace(kind, deviation=sizes[channel])
-            for part in of_channel:
-                rows[part] = whiten(rows[part], kind)
+        for channel in runs.channels:
+            blocks = runs.rows_of(channel)
+            model = noise_of([series[block] / noise[block, None] for block in blocks], runs.memory, runs.is_motion)
+            sensors[channel] = replace(model, deviation=sizes[channel])
+            for block in blocks:
+                rows[block] = whiten(rows[block], model)
         # With D = U S V' the covariance is 1 + D D', and 1 - U (1 - 1 / sqrt(1 + S^2)) U' makes it 1.
         axes, triangle = np.linalg.qr(rows[:, 1 + len(point) :])
         turned, spread, _ = np.linalg.svd(triangle)
         shared = axes @ (turned * np.sqrt(1.0 - 1.0 / np.hypot(1.0, spread)))
         rows = rows[:, : 1 + len(point)]
         rows = rows - shared @ (shared.T @ rows)
-        root, _ = root_of_inverse(rows[:, 1:].T @ rows[:, 1:] + np.diag(np.square(work.prior)))
+        root, _ = root_of_inverse(rows[:, 1:].T @ rows[:, 1:] + np.diag(np.square(runs.prior)))
         hidden = slopes @ root
         before = step
         solved = lsq_linear(
-            np.concatenate([rows[:, 1:], np.diag(work.prior)]),
-            -np.concatenate([rows[:, 0], (point - work.mean) * work.prior]),
+            np.concatenate([rows[:, 1:], np.diag(runs.prior)]),
+            -np.concatenate([rows[:, 0], (point - runs.start) * runs.prior]),
             limits,
             method="bvls",
         )
         step = np.asarray(solved.x)
         if np.abs((step - before) @ np.linalg.pinv(root)).max() < 0.01 and series.shape[1] > 1:
             break
-    return Linear(rows=rows, shared=shared, root=root, noise=noise, sensors=known), step
+    return Linear(rows=rows, shared=shared, root=root, noise=noise, sensors=sensors), step
 
 
 def root_of_inverse(curvature: Floats) -> tuple[Floats, Flags]:
@@ -91,20 +94,20 @@ def root_of_inverse(curvature: Floats) -> tuple[Floats, Flags]:
     return np.asarray(vectors / np.sqrt(np.maximum(values, _RANK)) / size[:, None]), np.asarray(values > _RANK)
 
 
-def whitened_errors(work: FitRuns, left: Floats, linear: Linear) -> Floats:
+def whitened_errors(runs: FitRuns, residuals: Floats, linear: Linear) -> Floats:
     """Return residuals [SI] (rows, points) as independent errors [-], using the noise of a linearised problem."""
-    scaled = left / linear.noise[:, None]
-    kinds = {channel: replace(noise, deviation=1.0) for channel, noise in linear.sensors.items()}
-    errors = np.concatenate([whiten(scaled[block.rows], kinds[block.channel]) for block in work.blocks])
+    scaled = residuals / linear.noise[:, None]
+    models = {channel: replace(noise, deviation=1.0) for channel, noise in linear.sensors.items()}
+    errors = np.concatenate([whiten(scaled[block.rows], models[block.channel]) for block in runs.blocks])
     return np.asarray(errors - linear.shared @ (linear.shared.T @ errors))
 
 
-def squares_of(work: FitRuns, errors: Floats, points: Floats) -> Floats:
+def squares_of(runs: FitRuns, errors: Floats, points: Floats) -> Floats:
     """Return the sum of squares [-] of whitened errors (rows, points) and priors, for each scaled point."""
-    away = (points - work.mean[:, None]) * work.prior[:, None]
+    away = (points - runs.start[:, None]) * runs.prior[:, None]
     return np.asarray(np.square(errors).sum(axis=0) + np.square(away).sum(axis=0))
 
 
-def cost_of(work: FitRuns, left: Floats, point: Floats, linear: Linear) -> float:
+def cost_of(runs: FitRuns, residuals: Floats, point: Floats, linear: Linear) -> float:
     """Return the sum of squares [-] of priors and whitened residuals, given residuals [SI] (rows,) at a point."""
-    return float(squares_of(work, whitened_errors(work, left[:, None], linear), point[:, None])[0])
+    return float(squares_of(runs, whitened_errors(runs, residuals[:, None], linear), point[:, None])[0])

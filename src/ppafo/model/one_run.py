@@ -3,6 +3,7 @@
 import math
 
 from ppafo.model import columns
+from ppafo.model.declaration import PlainFunction
 
 
 def root(number: float) -> float:
@@ -35,7 +36,7 @@ def whole(number: float) -> int:
     return int(number)
 
 
-FOR_ONE_RUN = {
+FOR_ONE_RUN: dict[PlainFunction, PlainFunction] = {
     columns.root: root,
     columns.larger: larger,
     columns.smaller: smaller,

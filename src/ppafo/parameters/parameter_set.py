@@ -239,8 +239,9 @@ def links_of_set(
     """Return the links of a set: gauge pressures follow the atmosphere, the second regulator follows the first.
 
     The second regulator follows the first if the set has the same pressure for both, unless ``set_paths`` contains only
-    the second; without a second chamber its port is at the atmosphere. The pressures are compared at ``atmosphere`` [Pa absolute], by default the set's. The displacement of a
-    vane per radian follows its torque constant, by virtual work, unless the set states it.
+    the second; of an actuator with one chamber it follows the atmosphere. The pressures are compared at ``atmosphere``
+    [Pa absolute], by default the set's. The displacement of a vane per radian follows its torque constant, by virtual
+    work, unless the set states it.
     """
     numbers = parameter_set.numbers
     links = {

@@ -27,13 +27,13 @@ from ppafo.model.plant import Openings, PlantParameters, actuator_torque
 from ppafo.model.sensors import Measurement
 from ppafo.parameters.device import Device
 from ppafo.rig.dynamics import Inputs, Observables, RigNumbers, RigPhysics, RigState, VaneInputs, observables, rig_rates
-from ppafo.rig.preset import SimulatedSensor
+from ppafo.rig.sensors import SimulatedSensor
 from ppafo.rig.stretches import Distances, Slopes, solve_stretch
 
 # The controller of a run on the rig: what it decides sample by sample, and its commands on the way to the valve.
 
 
-class Commands:
+class _Commands:
     """Commands of one run: ``decided`` [-] by the controller, and ``at_valve`` [-] after backlash and dead time.
 
     ``period`` [s]: time between two controller decisions
@@ -137,7 +137,7 @@ def solve_rig(rig_run: RigRun) -> RigSolution:
     return _Solver(rig_run).solve()
 
 
-class CompiledRig:
+class _CompiledRig:
     """Compiled equations with the parameters of one run. Calls are independent of each other.
 
     Valve and prescribed vane angle are computed outside, in Python, and passed in as numbers. So one compiled program
@@ -181,7 +181,7 @@ class _Equations:
         self.rig_run, self.run = rig_run, rig_run.run
         self.plant: PlantParameters = rig_run.run.plant
         self.is_free = self.run.program.angle is None
-        self.compiled = CompiledRig(
+        self.compiled = _CompiledRig(
             RigNumbers(
                 plant=self.plant,
                 rig=rig_run.physics,
@@ -271,7 +271,7 @@ class _Solver:
 
     def __init__(self, rig_run: RigRun) -> None:
         self.rig_run, self.equations = rig_run, _Equations(rig_run)
-        self.commands = Commands(rig_run.run, rig_run.control_period, rig_run.command_delay, rig_run.hysteresis)
+        self.commands = _Commands(rig_run.run, rig_run.control_period, rig_run.command_delay, rig_run.hysteresis)
         self.time, self.unknowns, self.direction = 0.0, self.equations.initial, 0.0
         samples = rig_run.sample_times.size
         self.solution = RigSolution(

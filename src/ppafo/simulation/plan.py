@@ -124,22 +124,18 @@ class TimeGrid:
     tolerance: Any = 1.0
 
 
-StepRule = Callable[[PlantParameters], TimeGrid]
-Start = Callable[[PlantParameters], PlantState]
-
-
 def compose_run(
     components: Components,
     plant: PlantParameters,
-    rule: StepRule,
-    start: Start,
+    time_grid_of: Callable[[PlantParameters], TimeGrid],
+    initial_state_of: Callable[[PlantParameters], PlantState],
     walk: Walk | None = None,
 ) -> Run:
-    """Return the run of components: ``rule`` gives the time grid, ``start`` the initial state, ``walk`` a walking leg.
+    """Return the run of components: every controller, valve, motion, gas and supply can be combined with every other.
 
-    A leg without ground contact is one of the components, and ``plant`` is the plant without the leg.
-
-    Every controller, valve, motion, gas and supply can be combined with every other here.
+    ``time_grid_of`` gives the time grid and ``initial_state_of`` the initial state, both of the plant with lines and
+    leg; ``plant`` is the plant without them. ``walk`` is a walking leg; a leg without ground contact is one of the
+    components.
     """
     settings = valve_settings(components.device.valve)
     delay = components.valve.command_delay(settings)
@@ -153,35 +149,34 @@ def compose_run(
         lines = Lines(components.supply_lines, lines_at_start(plant, components.supply_lines))
     controller: Any = ()
     if components.controller is not None:
-        law, given = components.controller, components.settings
+        law, settings_by_name = components.controller, components.settings
         # The numbers that a plan made have no settings of their names; they come in the order of the law's parameters.
-        numbers = given.values() if law.plan is not None else [given[quantity.name] for quantity in law.quantities]
-        controller = rebuilt(law.parameters, numbers)
-    # After lines and leg: the rule looks at the plant with both.
-    steps = rule(plant)
+        names = settings_by_name if law.plan is not None else [quantity.name for quantity in law.quantities]
+        controller = rebuilt(law.parameters, [settings_by_name[name] for name in names])
+    grid = time_grid_of(plant)
     return Run(
         # Of the first run, for all runs of one program have a delay or none has.
-        program=_program(components, steps, walk, has_delay=first(delay) > 0.0),
+        program=_program(components, grid, walk, has_delay=first(delay) > 0.0),
         plant=plant,
         thermal=NoParameters()
         if components.thermal is None
         else thermal_gas(components.thermal, components.device.gas),
         valve_orifice=exact_orifice(components.device.valve.orifice, components.device),
         leak_orifice=exact_orifice(components.device.actuator.leak, components.device),
-        initial=start(plant),
+        initial=initial_state_of(plant),
         valve=over_runs(lambda *values: components.valve.prepare(type(settings)(*values)), *settings),
         controller=controller,
         reference=profile_parameters(components.reference),
         path=() if components.path is None else profile_parameters(components.path),
         sensors=components.sensors,
-        step=steps.step,
-        step_count=steps.step_count,
-        steps_per_sample=steps.steps_per_sample,
-        record_every=steps.record_every,
+        step=grid.step,
+        step_count=grid.step_count,
+        steps_per_sample=grid.steps_per_sample,
+        record_every=grid.record_every,
         signal_delay=components.signal_delay,
         command_delay=delay,
-        needs_parts=steps.needs_parts,
-        tolerance=steps.tolerance,
+        needs_parts=grid.needs_parts,
+        tolerance=grid.tolerance,
         walk=walk,
         lines=lines,
         effects=effect_rows(components.device, components.sections),
@@ -191,37 +186,31 @@ def compose_run(
 
 def _gas(components: Components, effects: Sequence[Effect]) -> GasPhases:
     """Return the gas phases of a gas model; ScenarioError for a density effect that a component does not support."""
-    real = next((effect for effect in effects if gas_density in effect.laws), None)
-    if real is None and components.thermal is None:
+    density_effect = next((effect for effect in effects if gas_density in effect.laws), None)
+    if density_effect is None and components.thermal is None:
         return isothermal
-    if real is None:
+    if density_effect is None:
         from ppafo.engine.step import energy_balance  # most runs keep their temperature
 
         return energy_balance
-    lacks = {
+    actuator_kind = components.device.actuator.kind
+    unsupported = {
         "gas_model.kind=thermal": components.thermal is not None,
         "[supply_line]": components.supply_lines is not None,
-        f"actuator.kind={components.device.actuator.kind}": ACTUATORS[components.device.actuator.kind].model.shape
-        is not None,
+        f"actuator.kind={actuator_kind}": ACTUATORS[actuator_kind].model.shape is not None,
     }
-    for what, is_there in lacks.items():
-        if is_there:
-            off = " and ".join(f"{real.section}.{name}=0" for name in real.switch)
-            raise ScenarioError(f"effect '{real.name}' does not work together with {what} yet; omit it, or set {off}")
+    for component, is_present in unsupported.items():
+        if is_present:
+            off = " and ".join(f"{density_effect.section}.{name}=0" for name in density_effect.switch)
+            raise ScenarioError(
+                f"effect '{density_effect.name}' does not work together with {component} yet; omit it, or set {off}"
+            )
     from ppafo.engine.step import not_ideal  # most runs have ideal gas
 
     return not_ideal
 
 
-def _of_error(law: ControllerKind | None, components: Components) -> ControllerKind | None:
-    """Return a controller with the error functions of its controlled quantity; a torque controller unchanged."""
-    parts = error_functions(components.controlled, components.device.supply.is_vacuum)
-    if law is None or law.controls == (TORQUE,) or parts == OF_TORQUE:
-        return law
-    return replace(law, update=made_of(law.update, law.update.__name__, parts))
-
-
-def _program(components: Components, steps: TimeGrid, walk: Walk | None, has_delay: bool) -> Program:
+def _program(components: Components, grid: TimeGrid, walk: Walk | None, has_delay: bool) -> Program:
     """Return the program of a run with these components."""
     feed: ModuleType | None = None
     foot: ModuleType | None = None
@@ -236,12 +225,15 @@ def _program(components: Components, steps: TimeGrid, walk: Walk | None, has_del
         from ppafo.engine.step import walk as leg
     if walk is not None and walk.failing is not None:
         from ppafo.engine.step import failing as faults
+    law, errors = components.controller, error_functions(components.controlled, components.device.supply.is_vacuum)
+    if law is not None and law.controls != (TORQUE,) and errors != OF_TORQUE:
+        law = replace(law, update=made_of(law.update, law.update.__name__, errors))
     is_late, effects = first(components.signal_delay) > 0.0, effects_of(components.device, components.sections)
     return Program(
         actuator=ACTUATORS[components.device.actuator.kind].model,
         valve=components.valve,
         reference=PROFILES[components.reference.kind],
-        controller=_of_error(components.controller, components),
+        controller=law,
         angle=None if components.path is None else PROFILES[components.path.kind],
         ideal_sensors=components.has_ideal_sensors,
         late_commands=has_delay,
@@ -252,9 +244,9 @@ def _program(components: Components, steps: TimeGrid, walk: Walk | None, has_del
         takes_task_sequence=walk is not None and walk.task_sequence is not None,
         faults=faults,
         feed=feed,
-        is_adaptive=bool(first(steps.needs_parts)),
+        is_adaptive=bool(first(grid.needs_parts)),
         # A broken number of steps to a sample puts samples inside steps.
-        samples_inside=bool(first(steps.record_every % 1.0)),
+        samples_inside=bool(first(grid.record_every % 1.0)),
         effects=effects,
         shank=None if components.leg is None else components.leg.shank,
         foot=foot,
@@ -273,17 +265,17 @@ def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, t
     plant = plant_parameters(device, motion.outside_torque)
     # The command of a Python object comes from outside the lanes.
     law = None if control.is_outside else CONTROLLERS[control.kind]
-    numbers: Mapping[str, Any] = control.settings
+    settings: Mapping[str, Any] = control.settings
     problems: tuple[Problem, ...] = ()
     # A fixed-point controller has integers, which follow from its gains, its period and the range of its reference.
     if law is not None and law.plan is not None:
         bounds = profile_bounds(scenario.reference)
-        numbers, problems = law.plan(numbers, control.period, plant.torque_constant, bounds)
+        settings, problems = law.plan(settings, control.period, plant.torque_constant, bounds)
     components = Components(
         device=device,
         valve=VALVES[device.valve.kind].choose(first_settings(device.valve)),
         controller=law,
-        settings=numbers,
+        settings=settings,
         reference=scenario.reference,
         path=motion.profile,
         sensors=sensor_parameters(scenario),
@@ -297,19 +289,22 @@ def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, t
         controlled=scenario.controlled,
     )
     run = compose_run(
-        components, plant, lambda fed: scenario_steps(scenario, fed), lambda fed: initial_state(scenario, fed)
+        components,
+        plant,
+        time_grid_of=lambda whole_plant: time_grid(scenario, whole_plant),
+        initial_state_of=lambda whole_plant: initial_state(scenario, whole_plant),
     )
     return run, (too_many_steps(scenario, run.step, run.step_count), *problems)
 
 
-def scenario_steps(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
+def time_grid(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
     """Time grid of a scenario: the largest step that divides the sample period, divided into parts by error control."""
     counts = step_counts(
         scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
     )
     tolerance = relative_tolerance(scenario.run.tolerance)
-    # The error decides about the parts of a step, but for a held joint whose chambers no pressure widens, and which are
-    # slow enough for plain steps.
+    # The error decides about the parts of a step, but for a locked joint whose chambers no pressure widens, and which
+    # are slow enough for plain steps.
     needs_parts: Any = True
     model = ACTUATORS[scenario.device.actuator.kind].model
     is_alone = scenario.supply_lines is None and not model.gives
@@ -317,11 +312,10 @@ def scenario_steps(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
     if angle is not None:
         # A stricter tolerance counts as a longer step; a looser one as the default.
         step = counts.step / smaller(1.0, tolerance)
-        held = smaller(larger(angle, plant.angle_min), plant.angle_max)
-        room = plant.atmospheric_pressure
-        needs_parts = np.logical_not(
-            is_slow(plant, step, *volumes_of(model, plant, held, room, room), scenario.stiffness)
-        )
+        locked_angle = smaller(larger(angle, plant.angle_min), plant.angle_max)
+        atmosphere = plant.atmospheric_pressure
+        volumes = volumes_of(model, plant, locked_angle, atmosphere, atmosphere)
+        needs_parts = np.logical_not(is_slow(plant, step, *volumes, scenario.stiffness))
     return TimeGrid(
         step=counts.step,
         step_count=whole(counts.step_count),
@@ -403,9 +397,9 @@ def step_counts(duration: float, time_step: float, output_interval: float, perio
 
 def nearly_whole(steps: Numeric) -> Numeric:
     """Number of steps [-], rounded to an integer if it differs only by rounding."""
-    counted = truncated(steps + 0.5)
-    found: Numeric = choose(abs(steps - counted) <= WHOLE * steps, counted, steps)
-    return found
+    nearest = truncated(steps + 0.5)
+    counted: Numeric = choose(abs(steps - nearest) <= WHOLE * steps, nearest, steps)
+    return counted
 
 
 def thermal_gas(walls: GasModel, gas: Gas) -> ThermalParameters:

@@ -19,6 +19,7 @@ from ppafo.storage.owned_folder import (
     FolderKind,
     check_owned_folder,
     hashes_of,
+    marking_command,
     read_json,
     write_owned_folder,
 )

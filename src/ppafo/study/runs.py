@@ -15,7 +15,7 @@ from ppafo.progress import Progress, Report
 from ppafo.running import most_reversals
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.declaration import changes_reach
-from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import with_numbers
@@ -28,7 +28,7 @@ from ppafo.study.blocks import runs_at_once
 
 Rows = dict[str, NDArray[Any]]
 """Columns of one length: metrics by name [SI], nan if a run lacks the metric; and ``failed``, True for a failed run."""
-_Made = Callable[[Mapping[str, Floats]], tuple[Rows, str]]
+Evaluation = Callable[[Mapping[str, Floats]], tuple[Rows, str]]
 """Function from columns to rows and the reason why the first run failed."""
 FAILED = "failed"
 _AT_ONCE, _SLOW_AT_ONCE = 16_384, 32
@@ -40,7 +40,7 @@ class RunCounter:
     """Counter of runs for progress reports, starting from ``done``; the total ``runs`` doubles if exceeded."""
 
     def __init__(self, runs: int, progress: Report | None, done: int = 0, failed: int = 0) -> None:
-        self._runs, self._report, self._started = max(1, runs), progress, 0.0
+        self._total, self._report, self._started = max(1, runs), progress, 0.0
         self.done, self.failed, self._earlier = done, failed, 0
 
     def add(self, runs: int, failed: int) -> None:
@@ -50,63 +50,26 @@ class RunCounter:
         if not self._earlier:
             self._earlier, self._started = self.done, time.monotonic()
         # A search does not know how many runs it will take: a total that follows would always say 'nearly done'.
-        while self._runs < self.done:
-            self._runs *= 2
+        while self._total < self.done:
+            self._total *= 2
         if self._report is not None:
             elapsed = time.monotonic() - self._started
-            self._report(Progress("", self.done, self._runs, self.failed, self._earlier, elapsed))
+            self._report(Progress("", self.done, self._total, self.failed, self._earlier, elapsed))
 
 
 @final
 class Runs:
-    """Runs of a scenario: ``run(columns)`` returns their rows and appends columns and rows to ``table``.
+    """Runs of one scenario or model: ``run(columns)`` returns their rows and appends columns and rows to ``table``.
 
-    ``count`` is the number of runs made, ``failures`` the number that diverged or were refused; ``reason`` says why the
-    first of these failed.
+    ``evaluate`` makes the rows of some runs, at most ``at_once`` of them. ``count`` is the number of runs made,
+    ``failures`` the number that diverged or were refused; ``reason`` says why the first of these failed.
     """
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        metrics: Sequence[str],
-        tally: RunCounter,
-        gauge: Collection[str] = (),
-        threads: int | None = None,
-    ) -> None:
-        """Raise StudyError for a metric that does not exist or that the scenario cannot have.
-
-        Paths in ``gauge`` hold gauge pressures relative to the atmosphere of each run.
-        """
-        check_metrics([name for name in metrics if name not in SETTLED_METRICS], scenario)
-
-        def rows(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
-            with refused_as(StudyError, f"scenario '{scenario.name}'", ScenarioError):
-                result = run_ensemble(scenario, columns, metrics, threads=threads, gauge=gauge)
-            none = np.full(result.status.size, np.nan)
-            values: Rows = {name: result.metrics.get(name, none) for name in metrics}
-            reason = result.reasons[min(result.reasons)] if result.reasons else ""
-            return {**values, FAILED: result.status != 0}, reason
-
-        is_slow = scenario.controller.custom is not None
-        self._begin(metrics, rows, tally, _SLOW_AT_ONCE if is_slow else runs_at_once(scenario, _AT_ONCE))
-
-    @classmethod
-    def of_model(cls, model: Callable[[Mapping[str, Floats]], Mapping[str, Any]], metrics: Sequence[str]) -> "Runs":
-        """Return runs of a function of the columns instead of a scenario; a run without a finite metric has failed."""
-        runs = cls.__new__(cls)
-
-        def rows(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
-            rows = {name: np.asarray(values) for name, values in model(columns).items()}
-            failed = rows.get(FAILED, ~np.any([np.isfinite(rows[name]) for name in metrics], axis=0))
-            return {**rows, FAILED: failed}, "diverged" if failed.any() else ""
-
-        runs._begin(metrics, rows, RunCounter(1, None), _AT_ONCE)
-        return runs
-
-    def _begin(self, metrics: Sequence[str], rows: _Made, tally: RunCounter, at_once: int) -> None:
-        self.metrics, self._rows, self._tally, self._at_once = tuple(metrics), rows, tally, at_once
-        self._parts: list[Rows] = []
+    def __init__(self, evaluate: Evaluation, metrics: Sequence[str], counter: RunCounter, at_once: int) -> None:
+        self.metrics = tuple(metrics)
         self.count, self.failures, self.reason = 0, 0, ""
+        self._evaluate, self._counter, self._at_once = evaluate, counter, at_once
+        self._parts: list[Rows] = []
 
     def run(self, columns: Mapping[str, Floats]) -> Rows:
         """Return the rows of runs with these values [SI] by path, each column (runs,)."""
@@ -114,13 +77,14 @@ class Runs:
         parts = []
         for first in range(0, runs, self._at_once):
             part = {path: values[first : first + self._at_once] for path, values in columns.items()}
-            rows, reason = self._rows(part)
+            rows, reason = self._evaluate(part)
             parts.append(rows)
             self._parts.append({**part, **rows})
             self.reason = self.reason or reason
-            self.count += rows[FAILED].size
-            self.failures += failures_of(rows)
-            self._tally.add(rows[FAILED].size, failures_of(rows))
+            count, failures = rows[FAILED].size, failures_of(rows)
+            self.count += count
+            self.failures += failures
+            self._counter.add(count, failures)
         return joined(parts)
 
     @property
@@ -128,21 +92,46 @@ class Runs:
         """All rows so far, together with their columns of values."""
         return joined(self._parts) if self._parts else {}
 
-    def check(self, rows: Rows, maximum_failed: float, what: str, metrics: Sequence[str] = ()) -> None:
+    def check(self, rows: Rows, maximum_failed: float, subject: str, metrics: Sequence[str] = ()) -> None:
         """Raise StudyError if more than a fraction of the rows failed, or lacks one of some metrics.
 
-        Statistics of the remaining runs would be biased. ``what`` names the rows in the message.
+        Statistics of the remaining runs would be biased. ``subject`` names the rows in the message.
         """
         failures, runs = failures_of(rows), rows[FAILED].size
         if failures > maximum_failed * runs:
             raise StudyError(
-                f"{what}: {failures:,} of {runs:,} runs failed ({100.0 * failures / runs:.3g} %), more than the "
+                f"{subject}: {failures:,} of {runs:,} runs failed ({100.0 * failures / runs:.3g} %), more than the "
                 f"{100.0 * maximum_failed:.3g} % allowed; the first: {self.reason}"
             )
         for name in metrics:
             missing = int(np.count_nonzero(~np.isfinite(rows[name])))
             if missing > maximum_failed * runs:
-                raise StudyError(f"{what}: {missing:,} of {runs:,} runs have no '{name}'; choose another metric")
+                raise StudyError(f"{subject}: {missing:,} of {runs:,} runs have no '{name}'; choose another metric")
+
+
+def scenario_runs(
+    scenario: Scenario,
+    metrics: Sequence[str],
+    counter: RunCounter,
+    gauge: Collection[str] = (),
+    threads: int | None = None,
+) -> Runs:
+    """Return the runs of a scenario; StudyError for a metric that does not exist or that the scenario cannot have.
+
+    Paths in ``gauge`` hold gauge pressures relative to the atmosphere of each run.
+    """
+    check_metrics([name for name in metrics if name not in SETTLED_METRICS], scenario)
+
+    def evaluate(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
+        with refused_as(StudyError, f"scenario '{scenario.name}'", ScenarioError):
+            result = run_ensemble(scenario, columns, metrics, threads=threads, gauge=gauge)
+        unknown = np.full(result.status.size, np.nan)
+        values: Rows = {name: result.metrics.get(name, unknown) for name in metrics}
+        reason = result.reasons[min(result.reasons)] if result.reasons else ""
+        return {**values, FAILED: result.status != COMPLETED}, reason
+
+    is_slow = scenario.controller.custom is not None
+    return Runs(evaluate, metrics, counter, _SLOW_AT_ONCE if is_slow else runs_at_once(scenario, _AT_ONCE))
 
 
 def unvaried(scenario: Scenario, runs: int) -> dict[str, Floats]:

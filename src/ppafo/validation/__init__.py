@@ -1,7 +1,8 @@
 """Validation of the model against recordings: replay, then comparison channel by channel, in units and in percent."""
 
-from ppafo.validation.agreement import ChannelAgreement, RecordingAgreement, ReplaySettings, compare_recording
+from ppafo.validation.agreement import ChannelAgreement, RecordingAgreement, compare_recording
 from ppafo.validation.compared import Thresholds, parse_thresholds
+from ppafo.validation.settings import ReplaySettings
 
 __all__ = [
     "ChannelAgreement",

@@ -1,14 +1,9 @@
-"""Comparison of the model with one recording, replayed on the recorded inputs: errors channel by channel.
-
-The delay between measurement and model is the time shift with the least squared error.
-"""
+"""Comparison of the model with one recording, replayed on the recorded inputs: errors channel by channel."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from ppafo.arguments.door import argument_text
 from ppafo.errors import DataError
@@ -20,7 +15,6 @@ from ppafo.simulation.recorded.channels import DORSIFLEXION_SUPPLY, SUPPLY
 from ppafo.simulation.recorded.clock import regular_interval
 from ppafo.simulation.recorded.replay import with_fixed_volume
 from ppafo.simulation.recorded.rest import start_of
-from ppafo.simulation.scenario import Leg
 from ppafo.units.shown import in_units, shown_text
 from ppafo.validation.compared import (
     ACCEPTABLE_FRACTION,
@@ -30,19 +24,11 @@ from ppafo.validation.compared import (
     PRESSURE_1,
     PRESSURE_2,
     PRESSURE_DIFFERENCE,
-    ErrorLimit,
-    Thresholds,
-    parse_thresholds,
 )
-from ppafo.validation.initial import initial_remedies, parse_initial
+from ppafo.validation.delay import ComparedCurve, Delay, estimate_delay
 from ppafo.validation.measured import MeasuredRecording, supply_gauge
-from ppafo.validation.replay import MOTIONS, Motion, Replay, Replayed, replay_recording
-from ppafo.wording import nearest_name, one_line
-
-DEFAULT_LIMIT = 0.02
-"""Default limit of the estimated delay [s]; sensors, filters and valves lag less, so a longer lag is a model error."""
-LARGEST_DELAY = 1.0
-"""Largest limit of the delay that a user may set [s]; with a longer delay the command is not of this recording."""
+from ppafo.validation.replay import Replay, Replayed, replay_recording
+from ppafo.validation.settings import ReplaySettings, initial_remedies
 
 ENGINE_ERROR = 3.0e-5
 """Integration error of the engine as a fraction of the full range [-] (tests/convergence)."""
@@ -52,135 +38,10 @@ _UNMOVED = 1.0e-3
 """Accepted error of a signal that does not move, as a fraction of the full range [-]: the zero error of its sensor."""
 _WITHIN_NOISE = 1.5
 """RMS error as a multiple of the estimated white noise [-] up to which the error may be noise."""
-_SHIFTS = 81
-"""Number of delays on the initial grid, from one limit to the other."""
-_MAXIMUM_SAMPLES = 4000
-"""Largest number of samples of a channel used to estimate the delay."""
-_MINIMUM_GAIN = 25.0
-"""Least reduction of the squared error by a delay, in sample variances: five standard deviations of white noise."""
-_SMALLEST_GAIN = 1.0e-12
-"""Gain below which two curves are the same to the accuracy of the engine."""
-_RESOLUTION = 0.02
-"""Delay as a fraction of the sample interval [-] below which it is taken as 0."""
-_ACCURACY = 1.0e-7
-"""Accuracy of the estimated delay as a fraction of the limit [-]."""
-_AT_LIMIT = 0.99
-"""Fraction of the limit [-] from which a delay counts as being at the limit."""
-
-
-@dataclass(frozen=True, slots=True)
-class ComparedCurve:
-    """Measured and modelled values of one channel, each with their own times [s].
-
-    ``unit`` is the SI unit of an error, ``full_range`` the full range of the channel, ``usual_zero`` the usual zero
-    error of a sensor, both in this unit. ``limit`` is the error limit set by the user, if any.
-    """
-
-    channel: str
-    unit: str
-    times: Floats
-    values: Floats
-    model_times: Floats
-    model_values: Floats
-    full_range: float
-    usual_zero: float
-    limit: ErrorLimit | None = None
-
-    def shift(self, delay: float, times: Floats) -> Floats:
-        """Return the model delayed by ``delay`` [s] at ``times``, constant outside the range of the model."""
-        return np.interp(times - delay, self.model_times, self.model_values)
-
-
-@dataclass(frozen=True, slots=True)
-class Delay:
-    """Delay [s] of the measurement with respect to the model, 0 if undetectable, and whether the limit is reached."""
-
-    value: float
-    is_at_limit: bool
-
-    @property
-    def correction(self) -> float:
-        """Delay [s] to correct for; 0 at the limit, because a best fit there is no longer the delay of a sensor."""
-        return 0.0 if self.is_at_limit else self.value
-
-
-def estimate_delay(curves: list[ComparedCurve], limit: float) -> Delay:
-    """Return the delay within +-``limit`` [s] with the least mean squared error of all channels, in full ranges."""
-    if limit <= 0.0 or not curves:
-        return Delay(0.0, is_at_limit=False)
-    # No more measured samples than the search needs.
-    steps = [-(-curve.times.size // _MAXIMUM_SAMPLES) for curve in curves]
-    thinned = [
-        replace(curve, times=curve.times[::step], values=curve.values[::step])
-        for curve, step in zip(curves, steps, strict=True)
-    ]
-
-    def cost(delay: float) -> float:
-        """Return the mean squared error over all samples and channels, in units of full range squared [-]."""
-        errors = [(curve.shift(delay, curve.times) - curve.values) / curve.full_range for curve in thinned]
-        return sum(float(np.square(error).mean()) for error in errors) / len(errors)
-
-    shifts = np.linspace(-limit, limit, _SHIFTS).tolist()
-    best = int(np.argmin([cost(shift) for shift in shifts]))
-    between = shifts[max(0, best - 1)], shifts[min(_SHIFTS - 1, best + 1)]
-    value = float(minimize_scalar(cost, bounds=between, method="bounded", options={"xatol": _ACCURACY * limit}).x)
-    # A delay counts where it explains more than noise and the accuracy of the engine could.
-    shifted = cost(value)
-    gain, samples = cost(0.0) - shifted, sum(curve.times.size for curve in thinned)
-    is_significant = gain > _SMALLEST_GAIN and gain * samples > _MINIMUM_GAIN * shifted
-    if abs(value) < _RESOLUTION * float(np.median(np.diff(curves[0].times))) or not is_significant:
-        return Delay(0.0, is_at_limit=False)
-    return Delay(value, abs(value) > _AT_LIMIT * limit)
-
-
 _LONGEST_WEIGHT = 3.0
 """Largest weight of one sample, in usual sample intervals [-], so that a gap in time gets no weight."""
 _OTHER_SUPPLY = 0.05
 """Relative difference between recorded and model gauge supply pressure [-] from which a remark is made."""
-
-
-@dataclass(frozen=True, slots=True)
-class ReplaySettings:
-    """Settings of the replay and of the acceptance limits.
-
-    ``motion`` is ``free`` for a vane that moves as the model demands, ``measured`` for the recorded angle as prescribed
-    motion, ``locked`` for a vane fixed at its initial angle, or ``leg`` for a vane with the foot of ``leg`` (default:
-    the fixture of figure 7). With a ``volume`` [m^3] chamber 1 is a fixed volume that the valve fills and vents,
-    without a vane. ``initial`` values [SI] by channel override the first samples. ``longest_delay`` [s] limits the
-    estimated delay.
-    """
-
-    motion: Motion = "free"
-    initial: Mapping[str, float] = field(default_factory=dict)
-    longest_delay: float = DEFAULT_LIMIT
-    thresholds: Thresholds = field(default_factory=parse_thresholds)
-    volume: float | None = None
-    leg: Leg | None = None
-
-
-def replay_settings(
-    device: Device,
-    motion: str,
-    volume: float | None,
-    initial: Sequence[str],
-    thresholds: Sequence[str],
-    longest_delay: float,
-) -> ReplaySettings:
-    """Return the settings of a validation from its arguments. Raises DataError if arguments contradict each other."""
-    if volume is not None and not volume > 0.0:
-        raise DataError(f"volume of {volume:g} m^3: must be above 0")
-    if not 0.0 <= longest_delay <= LARGEST_DELAY:
-        raise DataError(f"longest delay of {longest_delay:g} s: must be from 0 to {LARGEST_DELAY:g} s")
-    chosen = next((known for known in MOTIONS if known == motion), None)
-    if chosen is None:
-        near = nearest_name(motion, MOTIONS)
-        raise DataError(f"motion '{one_line(motion)}' is not one of {', '.join(MOTIONS)}{near}")
-    if volume is not None and chosen != "free":
-        raise DataError(
-            f"motion '{chosen}': a fixed volume has no vane that could move; give motion or volume, not both"
-        )
-    states = parse_initial(initial, device.supply.atmospheric_pressure)
-    return ReplaySettings(chosen, states, longest_delay, parse_thresholds(thresholds), volume)
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,8 +127,8 @@ def channel_agreement(curve: ComparedCurve, delay: float) -> ChannelAgreement:
     worst = int(np.argmax(np.abs(error)))
     noise = max(noise_in(curve.values, curve.full_range), correlated_noise_of(error))
     # White noise is no part of what the signal goes through, and no model explains it.
-    away = curve.values - weights @ curve.values
-    variation = math.sqrt(max(float(weights @ away**2) - noise * noise, 0.0))
+    deviation = curve.values - weights @ curve.values
+    variation = math.sqrt(max(float(weights @ deviation**2) - noise * noise, 0.0))
     explained = min(ACCEPTABLE_FRACTION * curve.full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
     # Of a low supply the usual zero is much of the range: there the limit stays a fraction of it.
     zero = min(max(curve.usual_zero, _UNMOVED * curve.full_range), ACCEPTABLE_FRACTION * curve.full_range)
@@ -314,10 +175,12 @@ def compare_recording(measured: MeasuredRecording, device: Device, settings: Rep
     replayed = replay_recording(request)
     curves = _curves(measured, replayed, request.device, settings)
     # Sums and multiples of two others do not count twice.
-    of_sensors = [curve for curve in curves if curve.channel in (ANGLE, PRESSURE_1, PRESSURE_2)]
-    delay = estimate_delay(of_sensors or curves[:1], settings.longest_delay)
-    longest = f"model and measurement are more than {settings.longest_delay:g} s apart in time; no delay was removed"
-    late = [longest] if delay.is_at_limit else []
+    sensed = [curve for curve in curves if curve.channel in (ANGLE, PRESSURE_1, PRESSURE_2)]
+    delay = estimate_delay(sensed or curves[:1], settings.longest_delay)
+    remarks = [*measured.remarks, *_remarks(measured, device, settings)]
+    if delay.is_at_limit:
+        limit = settings.longest_delay
+        remarks.append(f"model and measurement are more than {limit:g} s apart in time; no delay was removed")
     return RecordingAgreement(
         file=measured.file,
         sha256=measured.sha256,
@@ -328,7 +191,7 @@ def compare_recording(measured: MeasuredRecording, device: Device, settings: Rep
         step=replayed.step,
         delay=delay,
         channels=tuple(channel_agreement(curve, delay.correction) for curve in curves),
-        remarks=(*measured.remarks, *_remarks(measured, device, settings), *late),
+        remarks=tuple(remarks),
     )
 
 
@@ -349,31 +212,30 @@ def _curves(
 ) -> list[ComparedCurve]:
     """Return the recorded channels that are no inputs of the model. Raises DataError if there are none."""
     gauge = supply_gauge(measured.recording, device)
-    # Channels that say nothing where the vane is locked, or where there is none.
-    silent: tuple[str, ...] = (ANGLE,) if settings.motion == "locked" else ()
+    # Where the vane is locked, or where there is none, some channels carry no information.
+    informative = {name for name in COMPARED if settings.motion != "locked" or name != ANGLE}
     if settings.volume is not None:
-        silent = tuple(name for name in COMPARED if name != PRESSURE_1)
+        informative = {PRESSURE_1}
     curves, model = [], replayed.recording
-    for name, kind in COMPARED.items():
+    for name, channel in COMPARED.items():
         values = measured_values(measured.recording, name)
-        if values is not None and name not in replayed.inputs and name not in silent:
-            times, limit = measured.recording.time, settings.thresholds.limit(name)
+        if values is not None and name not in replayed.inputs and name in informative:
             curves.append(
                 ComparedCurve(
                     channel=name,
-                    unit=kind.unit,
-                    times=times,
+                    unit=channel.unit,
+                    times=measured.recording.time,
                     values=values,
                     model_times=model.time,
                     model_values=model[name],
-                    full_range=kind.full_range(device, gauge),
-                    usual_zero=kind.usual_zero(device),
-                    limit=limit,
+                    full_range=channel.full_range(device, gauge),
+                    usual_zero=channel.usual_zero(device),
+                    limit=settings.thresholds.limit(name),
                 )
             )
     if not curves:
-        word = "pressure_1" if settings.volume is not None else "anything beside the prescribed angle"
-        raise DataError(f"{measured.file}: has nothing to compare; it needs {word}")
+        needed = "pressure_1" if settings.volume is not None else "anything beside the prescribed angle"
+        raise DataError(f"{measured.file}: has nothing to compare; it needs {needed}")
     return curves
 
 
@@ -382,14 +244,14 @@ def _remarks(measured: MeasuredRecording, device: Device, settings: ReplaySettin
     """Return remarks on assumptions that differ from set or recording: supply pressure, sample times, vane motion."""
     remarks = []
     gauge_of_set = device.supply.pressure - device.supply.atmospheric_pressure
-    followed = supply_gauge(measured.recording, device)
-    if measured.has(SUPPLY) and abs(followed - gauge_of_set) > _OTHER_SUPPLY * gauge_of_set:
-        times = "pressure, other than"
+    recorded_gauge = supply_gauge(measured.recording, device)
+    if measured.has(SUPPLY) and abs(recorded_gauge - gauge_of_set) > _OTHER_SUPPLY * gauge_of_set:
+        relation = "pressure, other than"
         if gauge_of_set > 0.0:
-            times = f"{followed / gauge_of_set:.3g} times the gauge pressure of"
-        remarks.append(f"the recorded supply has {times} supply.pressure; the recorded supply was used")
+            relation = f"{recorded_gauge / gauge_of_set:.3g} times the gauge pressure of"
+        remarks.append(f"the recorded supply has {relation} supply.pressure; the recorded supply was used")
     if not measured.has(SUPPLY):
-        # Said as values, for they may be the set's or given in its place.
+        # Shown as values, for they may be the set's or given in its place.
         used = {"supply.pressure": device.supply.pressure}
         if settings.volume is None and not (measured.has(DORSIFLEXION_SUPPLY) or device.supply.has_one_pressure):
             used["supply.dorsiflexion_pressure"] = device.supply.dorsiflexion_pressure

@@ -24,11 +24,12 @@ from ppafo.simulation.recorded.usual_errors import (
     usual_errors,
 )
 from ppafo.units.shown import shown_in, shown_unit, shown_value
-from ppafo.validation.agreement import ReplaySettings, replay_of
+from ppafo.validation.agreement import replay_of
 from ppafo.validation.change import SENSORS, CandidateCause, ModelChange, SensorModel
 from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
 from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.replay import replayed_scenario
+from ppafo.validation.settings import ReplaySettings
 
 
 def _sensed(names: Iterable[str], kind: str, about: float, size: float) -> ModelChange:
@@ -246,7 +247,7 @@ class _UnknownEffect(NamedTuple):
     """Effect that a device may have and its model has not, with one magnitude to fit.
 
     ``words`` describes the effect in messages. ``scaled`` are the settings equal to the magnitude, which is tried from
-    ``lowest`` to ``highest`` [unit of these settings]; ``held`` are the constant settings.
+    ``lowest`` to ``highest`` [unit of these settings]; ``constant`` are the constant settings.
     """
 
     name: str
@@ -254,7 +255,7 @@ class _UnknownEffect(NamedTuple):
     scaled: tuple[str, ...]
     lowest: float
     highest: float
-    held: Mapping[str, float] = MappingProxyType({})
+    constant: Mapping[str, float] = MappingProxyType({})
 
 
 _EFFECTS = (
@@ -264,7 +265,7 @@ _EFFECTS = (
         scaled=("pressure",),
         lowest=1e3,
         highest=2e5,
-        held={"rise": 0.3},
+        constant={"rise": 0.3},
     ),
     _UnknownEffect(
         name="stribeck",
@@ -272,7 +273,7 @@ _EFFECTS = (
         scaled=("velocity",),
         lowest=0.02,
         highest=6.0,
-        held={"share": 0.9},
+        constant={"share": 0.9},
     ),
     _UnknownEffect(
         name="seal_friction",
@@ -287,7 +288,7 @@ _EFFECTS = (
         scaled=("share",),
         lowest=0.05,
         highest=8.0,
-        held={"coefficient": SECOND_VIRIAL["CO2"]},
+        constant={"coefficient": SECOND_VIRIAL["CO2"]},
     ),
     _UnknownEffect(
         name="spool_play",
@@ -305,10 +306,9 @@ def effects(device: Device) -> Iterator[CandidateCause]:
     """Yield every effect that is off in the model of the device, with trial magnitudes."""
     for effect in _EFFECTS:
         if effect.name not in device.effects:
-            tried = tuple(np.geomspace(effect.lowest, effect.highest, _SIZES_OF_AN_EFFECT).tolist())
-            yield CandidateCause(effect.name, effect.words, partial(_affected, effect), tried, is_ratio=True)
+            trial_sizes = tuple(np.geomspace(effect.lowest, effect.highest, _SIZES_OF_AN_EFFECT).tolist())
 
+            def change(size: float, effect: _UnknownEffect = effect) -> ModelChange:
+                return ModelChange(effects={effect.name: {**effect.constant, **dict.fromkeys(effect.scaled, size)}})
 
-def _affected(effect: _UnknownEffect, size: float) -> ModelChange:
-    """Return a change in which an effect is on with the given magnitude."""
-    return ModelChange(effects={effect.name: {**effect.held, **dict.fromkeys(effect.scaled, size)}})
+            yield CandidateCause(effect.name, effect.words, change, trial_sizes, is_ratio=True)

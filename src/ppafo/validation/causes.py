@@ -20,13 +20,14 @@ from ppafo.progress import Report, report_nothing
 from ppafo.simulation.recorded.clock import usual_interval
 from ppafo.simulation.recorded.rest import samples_at_rest
 from ppafo.simulation.recorded.usual_errors import usual_errors
-from ppafo.validation.agreement import RecordingAgreement, ReplaySettings, compare_recording
+from ppafo.validation.agreement import RecordingAgreement, compare_recording
 from ppafo.validation.candidates import effects, exchanges, numbers, sizes
 from ppafo.validation.change import SENSORS, CandidateCause, ModelChange
 from ppafo.validation.compared import ANGLE, EXPLAINED_FRACTION
 from ppafo.validation.measured import MeasuredRecording
-from ppafo.validation.record import Left, Record, at_rate, record_of
+from ppafo.validation.record import Record, ScaledResiduals, at_rate, record_of
 from ppafo.validation.search import CauseSearch, SizedCause
+from ppafo.validation.settings import ReplaySettings
 
 _TIMES = {
     "milliseconds read as seconds": (1.0e3, "ms"),
@@ -110,7 +111,7 @@ def causes_of(
     if settings.motion == "measured":
         # A measured angle is an input, and a delay of the sensors would be one of an input: samples alone are searched.
         tried = search.compared(_samples(records), none)
-        explaining = [each for each in tried if each.explains]
+        explaining = [cause for cause in tried if cause.explains]
         # That no change explains the recordings would say too much.
         return _explained(search, none, tried, explaining, []) if explaining else Diagnosis()
     names = set.intersection(*(set(measured.recording.names) for measured in read))
@@ -139,8 +140,8 @@ def causes_of(
         return _explained(search, none, tried, explaining, sized)
     # What is wrong with samples is seen in them, whatever else is wrong; a misread unit is no hint beside other faults.
     nearest = max(
-        (each for each in tried if not each.candidate.is_of_unit),
-        key=lambda each: (each.candidate.is_of_samples, each.gain),
+        (cause for cause in tried if not cause.candidate.is_of_unit),
+        key=lambda cause: (cause.candidate.is_of_samples, cause.gain),
         default=None,
     )
     return Diagnosis() if nearest is None else Diagnosis(None, _cause_of([nearest], search.penalty), len(tried))
@@ -162,7 +163,7 @@ def _units_of_moving(
         if float(np.abs(recording[name] - atmosphere).max()) > usual_errors(name).zero
     }
     recordings = [measured.recording for measured in read]
-    return {name: {one.channels[name].stated for one in recordings if name in one} for name in moving}
+    return {name: {recording.channels[name].stated for recording in recordings if name in recording} for name in moving}
 
 
 def _tried_in_turn(stages: Iterable[Sequence[SizedCause]]) -> tuple[list[SizedCause], list[SizedCause]]:
@@ -170,33 +171,33 @@ def _tried_in_turn(stages: Iterable[Sequence[SizedCause]]) -> tuple[list[SizedCa
     tried: list[SizedCause] = []
     for stage in stages:
         tried += stage
-        explaining = [each for each in tried if each.explains]
+        explaining = [cause for cause in tried if cause.explains]
         if explaining:
             return tried, explaining
     return tried, []
 
 
-def _usual_errors(search: CauseSearch, none: Left, of_bench: Sequence[SizedCause]) -> ResidualCause | None:
+def _usual_errors(search: CauseSearch, none: ScaledResiduals, of_bench: Sequence[SizedCause]) -> ResidualCause | None:
     """Return a usual sensor error that explains the recordings, or several together; None if there is none.
 
     ``of_bench`` are the candidate errors of single sensors and sensor groups.
     """
     # Beside pressures that are nearly equal a flow bends: what is small together may fail on straight lines, and not
     # alone.
-    explaining = [each for each in of_bench if each.explains]
-    usual = [each for each in explaining if each.is_usual]
+    explaining = [cause for cause in of_bench if cause.explains]
+    usual = [cause for cause in explaining if cause.is_usual]
     if not usual:
-        candidates = [each.candidate for each in of_bench]
+        candidates = [cause.candidate for cause in of_bench]
         # One error beyond its limit explains more than several that strain to add up to it.
-        least = max((each.gain for each in explaining), default=0.0) - search.penalty
+        least = max((cause.gain for cause in explaining), default=0.0) - search.penalty
         together = search.compared(search.together(candidates, none), none)
-        usual = [each for each in together if each.explains and each.gain > least]
+        usual = [cause for cause in together if cause.explains and cause.gain > least]
     return _cause_of(usual, search.penalty) if usual else None
 
 
 def _explained(
     search: CauseSearch,
-    none: Left,
+    none: ScaledResiduals,
     tried: Sequence[SizedCause],
     explaining: Sequence[SizedCause],
     sized: Sequence[CandidateCause],
@@ -205,15 +206,15 @@ def _explained(
 
     ``explaining`` are the candidates that explain the recordings, ``sized`` the candidates with a magnitude to combine.
     """
-    first = max(explaining, key=lambda each: each.gain)
+    first = max(explaining, key=lambda cause: cause.gain)
     # What has no size of its own to fit, a swap or a sign, cannot pass for two other changes.
     is_fitted = first.candidate.has_size and not first.candidate.is_of_samples
     # One Jacobian, at the first cause, shows what a second one would add and what could replace it.
-    slopes = search.slopes(first.change, first.left, sized) if is_fitted else []
+    slopes = search.slopes(first.change, first.residuals, sized) if is_fitted else []
     if search.needs_another(first, slopes):
         return Diagnosis(None, _cause_of([first], search.penalty), len(tried))
     # With errors of sensors that any bench has, other small changes may explain as much as one alone.
-    others = search.beside_usual(slopes, none, {each.candidate.name for each in explaining})
+    others = search.beside_usual(slopes, none, {cause.candidate.name for cause in explaining})
     return Diagnosis(_cause_of(explaining, search.penalty, others), None, len(tried))
 
 
@@ -263,7 +264,7 @@ def _samples(records: Sequence[Record]) -> list[CandidateCause]:
     if not faulty:
         return []
     has_several = len(records) > 1
-    said = [
+    texts = [
         f"{words} ({record.measured.file})" if has_several else words for record in faulty for words in record.words
     ]
     channels = dict.fromkeys(words.split()[0] for record in faulty for words in record.words)
@@ -275,7 +276,7 @@ def _samples(records: Sequence[Record]) -> list[CandidateCause]:
         CandidateCause(
             f"samples of {' and '.join(channels)}",
             # No size is shown, and a file's name may have a brace.
-            "; ".join(said).replace("{", "{{").replace("}", "}}"),
+            "; ".join(texts).replace("{", "{{").replace("}", "}}"),
             lambda share: ModelChange(start=share),
             (0.0,) if has_start else _STARTS,
             is_usual=all(record.has_few for record in faulty),
@@ -308,16 +309,16 @@ def _cause_of(named: Sequence[SizedCause], penalty: float, others: Sequence[Size
     )
     first, *rest = (
         ResidualCause(
-            name=each.candidate.name,
-            in_words=each.candidate.in_words(each.size),
-            gain=each.gain,
-            left=math.sqrt(float(each.left.squares.max())),
+            name=cause.candidate.name,
+            in_words=cause.candidate.in_words(cause.size),
+            gain=cause.gain,
+            left=math.sqrt(float(cause.residuals.squares.max())),
             numbers={
-                path: (value, unit) for path, value in each.change.numbers.items() if (unit := each.candidate.unit)
+                path: (value, unit) for path, value in cause.change.numbers.items() if (unit := cause.candidate.unit)
             },
-            is_usual=each.is_usual,
-            is_of_samples=each.candidate.is_of_samples,
+            is_usual=cause.is_usual,
+            is_of_samples=cause.candidate.is_of_samples,
         )
-        for each in alike
+        for cause in alike
     )
     return replace(first, same=tuple(rest))

@@ -20,7 +20,6 @@ from ppafo.validation.agreement import (
     ENGINE_ERROR,
     ChannelAgreement,
     RecordingAgreement,
-    ReplaySettings,
     measured_values,
     noise_in,
     replay_of,
@@ -29,6 +28,7 @@ from ppafo.validation.change import SENSORS, SWAPPED, ModelChange, SensorModel
 from ppafo.validation.compared import ANGLE
 from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.replay import Replay, Replayed, replay_together
+from ppafo.validation.settings import ReplaySettings
 
 Flags = NDArray[np.bool_]
 
@@ -63,7 +63,7 @@ class Record(NamedTuple):
     starts: tuple[Floats, ...] = ()
 
 
-class Left(NamedTuple):
+class ScaledResiduals(NamedTuple):
     """Residuals under a change, divided by noise: mean square of each channel of each recording, and all errors."""
 
     squares: Floats
@@ -79,13 +79,13 @@ def record_of(
     measured: MeasuredRecording, agreement: RecordingAgreement, device: Device, settings: ReplaySettings
 ) -> Record:
     """Return the recording with faulty samples marked and the sensitivity of its readings to each initial value."""
-    of_sensors = [channel for channel in agreement.channels if channel.channel in SENSORS]
-    compared = of_sensors or agreement.channels[:1]
+    compared = [channel for channel in agreement.channels if channel.channel in SENSORS] or agreement.channels[:1]
     values, noises, faults = zip(*(_samples_of(channel, agreement) for channel in compared), strict=True)
     noise, full_ranges = np.array(noises), np.array([channel.full_range for channel in compared])
     wrong = [(channel.channel, fault) for channel, fault in zip(compared, faults, strict=True) if fault is not None]
     good = [
-        np.ones(len(own)) if fault is None else 1.0 - fault.samples for own, fault in zip(values, faults, strict=True)
+        np.ones(len(series)) if fault is None else 1.0 - fault.samples
+        for series, fault in zip(values, faults, strict=True)
     ]
     record = Record(
         measured=measured,
@@ -145,15 +145,15 @@ def _wrong_samples(values: Floats, residuals: Floats, channel: ChannelAgreement,
     """Return the faulty samples of a channel: constant signal, clipping, or outliers in the samples or residuals."""
     if np.ptp(values) == 0.0:
         locked = argument_text("motion", "locked")
-        held = f"the vane was locked ({locked}), or " if channel.channel == ANGLE else ""
-        words = f"never changes: {held}its sensor is dead or not connected"
+        other_cause = f"the vane was locked ({locked}), or " if channel.channel == ANGLE else ""
+        words = f"never changes: {other_cause}its sensor is dead or not connected"
         return _Wrong(words, np.ones(len(values), dtype=bool))
     clipped = _clipped_samples(values)
     if clipped is not None:
         return clipped
-    is_out, on_flank = isolated_samples(values, channel.noise), isolated_samples(residuals, channel.noise)
+    is_out, is_out_on_flank = isolated_samples(values, channel.noise), isolated_samples(residuals, channel.noise)
     # On a flank an outlier shows only beside a model that follows it; at the ends a delay makes one of a step.
-    is_out[1:-1] |= on_flank[1:-1]
+    is_out[1:-1] |= is_out_on_flank[1:-1]
     count = int(is_out.sum())
     if not count:
         return None
@@ -180,10 +180,10 @@ def _clipped_samples(values: Floats) -> _Wrong | None:
     ]
     if not limits:
         return None
-    said = " and ".join(
+    counts = " and ".join(
         f"{int((values == limit).sum())} samples are exactly its {word} value" for limit, word in limits
     )
-    return _Wrong(f"is clipped: {said}", np.isin(values, [limit for limit, _ in limits]))
+    return _Wrong(f"is clipped: {counts}", np.isin(values, [limit for limit, _ in limits]))
 
 
 def starts_without_wrong(record: Record, device: Device, share: float) -> dict[str, float]:
@@ -194,12 +194,12 @@ def starts_without_wrong(record: Record, device: Device, share: float) -> dict[s
     actuator, supply, count = device.actuator, device.supply, samples_at_rest(record.measured.recording)
     starts = {}
     for name, values, good in zip(record.channels, record.values * record.noise[:, None], record.good, strict=True):
-        of_sensor = values[:count][good[:count] > 0.0]
-        if name in SENSORS and len(of_sensor) < count:
+        valid = values[:count][good[:count] > 0.0]
+        if name in SENSORS and len(valid) < count:
             low, high = supply.atmospheric_pressure, max(supply.pressure, supply.dorsiflexion_pressure)
             if name == ANGLE:
                 low, high = actuator.angle_min, actuator.angle_max
-            starts[name] = float(of_sensor.mean()) if len(of_sensor) else low + share * (high - low)
+            starts[name] = float(valid.mean()) if len(valid) else low + share * (high - low)
     return starts
 
 
@@ -222,7 +222,7 @@ def readings_of(record: Record, replayed: Replayed, change: ModelChange, offset:
     return np.asarray(np.stack(rows) / record.noise[:, None])
 
 
-def left_of(record: Record, replayed: Replayed, change: ModelChange, longest_delay: float) -> Left:
+def residuals_of(record: Record, replayed: Replayed, change: ModelChange, longest_delay: float) -> ScaledResiduals:
     """Return the residuals after fitting the common delay, at most ``longest_delay`` [s], and the initial values.
 
     The fit of the delay starts both from 0 and from the delay of the unchanged model, which a wrong model may distort.
@@ -230,11 +230,11 @@ def left_of(record: Record, replayed: Replayed, change: ModelChange, longest_del
     good = np.ones_like(record.good) if change.start is None else record.good
     # No quantity stands twice in one fit: beside a delay of its own a change gets no free one, which would take a part.
     longest_delay = 0.0 if change.has_delay else longest_delay
-    firsts = {0.0, record.delay} if longest_delay > 0.0 else {0.0}
-    options = [_errors_from(record, replayed, change, good, first, longest_delay) for first in firsts]
+    delays = {0.0, record.delay} if longest_delay > 0.0 else {0.0}
+    options = [_errors_from(record, replayed, change, good, delay, longest_delay) for delay in delays]
     errors = min(options, key=lambda option: float(option @ option))
     squares = np.square(errors.reshape(good.shape)).sum(axis=1) / np.maximum(good.sum(axis=1), 1.0)
-    return Left(squares, errors)
+    return ScaledResiduals(squares, errors)
 
 
 def _errors_from(
@@ -249,13 +249,13 @@ def _errors_from(
     errors = np.zeros(good.size)
     for _ in range(STEPS + 1):
         readings = readings_of(record, replayed, change, delay)
-        late = [np.gradient(readings, axis=1)] * (longest_delay > 0.0)
+        by_delay = [np.gradient(readings, axis=1)] if longest_delay > 0.0 else []
         errors = ((record.values - readings) * good).ravel()
-        if late or record.starts:
-            columns = (np.stack([*late, *record.starts]) * good).reshape(-1, good.size)
+        if by_delay or record.starts:
+            columns = (np.stack([*by_delay, *record.starts]) * good).reshape(-1, good.size)
             sizes = np.linalg.solve(columns @ columns.T + np.eye(len(columns)), columns @ errors)
             errors = errors - sizes @ columns
-        if not late:
+        if not by_delay:
             break
         delay = min(max(delay - interval * float(sizes[0]), -longest_delay), longest_delay)
     return errors

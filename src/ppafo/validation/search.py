@@ -22,10 +22,19 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.recorded.channels import COMMAND
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
-from ppafo.validation.agreement import ReplaySettings, replay_of
+from ppafo.validation.agreement import replay_of
 from ppafo.validation.change import SWAPPED, CandidateCause, ModelChange, joined
-from ppafo.validation.record import ONLY_NOISE, STEPS, Left, Record, at_rate, left_of, starts_without_wrong
+from ppafo.validation.record import (
+    ONLY_NOISE,
+    STEPS,
+    Record,
+    ScaledResiduals,
+    at_rate,
+    residuals_of,
+    starts_without_wrong,
+)
 from ppafo.validation.replay import Replay, Replayed, replay_together, replayed_scenario
+from ppafo.validation.settings import ReplaySettings
 
 _TOGETHER = 32
 """Number of changes replayed in one batch; limits memory and lets progress be shown."""
@@ -46,7 +55,7 @@ class SizedCause(NamedTuple):
 
     candidate: CandidateCause
     size: float
-    left: Left
+    residuals: ScaledResiduals
     gain: float
 
     @property
@@ -67,7 +76,7 @@ class SizedCause(NamedTuple):
     @property
     def explains(self) -> bool:
         """True if the residuals of every channel are noise and G is positive."""
-        return self.left.is_noise and self.gain > 0.0
+        return self.residuals.is_noise and self.gain > 0.0
 
 
 class Slope(NamedTuple):
@@ -104,27 +113,29 @@ class CauseSearch:
         """Logarithm of the number of samples: cost of a fitted magnitude, and least G that separates two causes."""
         return math.log(sum(record.values.size for record in self.records))
 
-    def evaluated(self, changes: Sequence[ModelChange]) -> list[Left | None]:
+    def evaluated(self, changes: Sequence[ModelChange]) -> list[ScaledResiduals | None]:
         """Return the residuals under each change; None if the changed device could not have produced the recordings."""
-        left: list[Left | None] = []
-        for first in range(0, len(changes), _TOGETHER):
-            self.report(Progress("searching for causes", first, len(changes), noun="changes"))
-            together = changes[first : first + _TOGETHER]
-            requests = [[self._request(record, change) for record in self.records] for change in together]
-            replayed = iter(replay_together([one for of_change in requests for one in of_change if one is not None]))
-            for change, of_change in zip(together, requests, strict=True):
-                results = [None if request is None else next(replayed) for request in of_change]
-                parts = [
-                    left_of(record, result, change, self.settings.longest_delay)
+        evaluated: list[ScaledResiduals | None] = []
+        for start in range(0, len(changes), _TOGETHER):
+            self.report(Progress("searching for causes", start, len(changes), noun="changes"))
+            batch = changes[start : start + _TOGETHER]
+            requests = [[self._request(record, change) for record in self.records] for change in batch]
+            valid = [request for row in requests for request in row if request is not None]
+            replayed = iter(replay_together(valid))
+            for change, row in zip(batch, requests, strict=True):
+                results = [None if request is None else next(replayed) for request in row]
+                residuals = [
+                    residuals_of(record, result, change, self.settings.longest_delay)
                     for record, result in zip(self.records, results, strict=True)
                     if isinstance(result, Replayed)
                 ]
-                if len(parts) < len(self.records):
-                    left.append(None)
+                if len(residuals) < len(self.records):
+                    evaluated.append(None)
                     continue
-                squares = np.concatenate([part.squares for part in parts])
-                left.append(Left(squares, np.concatenate([part.errors for part in parts])))
-        return left
+                squares = np.concatenate([item.squares for item in residuals])
+                errors = np.concatenate([item.errors for item in residuals])
+                evaluated.append(ScaledResiduals(squares, errors))
+        return evaluated
 
     def _request(self, record: Record, change: ModelChange) -> Replay | None:
         """Return the replay of the corrected recording on the changed device; None if the device is invalid."""
@@ -154,7 +165,7 @@ class CauseSearch:
             return None
         return replace(request, device=device)
 
-    def compared(self, candidates: Sequence[CandidateCause], none: Left) -> list[SizedCause]:
+    def compared(self, candidates: Sequence[CandidateCause], none: ScaledResiduals) -> list[SizedCause]:
         """Return each candidate at its best magnitude: the best of a grid, refined by two Gauss-Newton steps.
 
         ``none`` are the residuals without a change. Candidates whose best magnitude is at an end of the grid are
@@ -164,54 +175,56 @@ class CauseSearch:
         trials = [(candidate, size) for candidate in candidates for size in candidate.grid]
         for step in range(STEPS + 1):
             changes = [candidate.at(size) for candidate, size in trials]
-            for (candidate, size), left in zip(trials, self.evaluated(changes), strict=True):
-                if left is not None:
-                    gain = self._gain(left, none) - self.penalty * candidate.has_size
-                    now = SizedCause(candidate=candidate, size=size, left=left, gain=gain)
-                    before = best.get(candidate.name)
+            for (candidate, size), residuals in zip(trials, self.evaluated(changes), strict=True):
+                if residuals is not None:
+                    gain = self._gain(residuals, none) - self.penalty * candidate.has_size
+                    cause = SizedCause(candidate=candidate, size=size, residuals=residuals, gain=gain)
+                    previous = best.get(candidate.name)
                     # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
-                    if before is None or (gain, now.is_inside) > (before.gain, before.is_inside):
-                        best[candidate.name] = now
+                    if previous is None or (gain, cause.is_inside) > (previous.gain, previous.is_inside):
+                        best[candidate.name] = cause
             if step < STEPS:
-                trials = self._improved([tried for tried in best.values() if tried.candidate.has_size])
-        return [tried for tried in best.values() if tried.is_inside or not tried.candidate.has_size]
+                trials = self._improved([cause for cause in best.values() if cause.candidate.has_size])
+        return [cause for cause in best.values() if cause.is_inside or not cause.candidate.has_size]
 
-    def _gain(self, left: Left, none: Left) -> float:
+    def _gain(self, residuals: ScaledResiduals, none: ScaledResiduals) -> float:
         """Return the gain G [-] of a change without the penalty for its fitted magnitude."""
         counts = np.concatenate([np.full(len(record.channels), record.values.shape[1]) for record in self.records])
-        return float(counts @ (np.log(np.maximum(none.squares, 1.0)) - np.log(np.maximum(left.squares, 1.0))))
+        return float(counts @ (np.log(np.maximum(none.squares, 1.0)) - np.log(np.maximum(residuals.squares, 1.0))))
 
-    def _improved(self, tried: Sequence[SizedCause]) -> list[tuple[CandidateCause, float]]:
+    def _improved(self, causes: Sequence[SizedCause]) -> list[tuple[CandidateCause, float]]:
         """Return the magnitude of each candidate after a Gauss-Newton step, limited to the neighbouring grid points."""
         ends = []
-        for each in tried:
-            grid = sorted(each.candidate.grid)
-            nearest = int(np.argmin(np.abs(np.array(grid) - each.size)))
+        for cause in causes:
+            grid = sorted(cause.candidate.grid)
+            nearest = int(np.argmin(np.abs(np.array(grid) - cause.size)))
             ends.append((grid[max(0, nearest - 1)], grid[min(len(grid) - 1, nearest + 1)]))
         lengths = [_DIFFERENCE * (high - low) for low, high in ends]
-        moved = [each.candidate.at(each.size + length) for each, length in zip(tried, lengths, strict=True)]
+        changes = [cause.candidate.at(cause.size + length) for cause, length in zip(causes, lengths, strict=True)]
         improved = []
-        for each, left, length, (low, high) in zip(tried, self.evaluated(moved), lengths, ends, strict=True):
-            if left is not None:
-                slope = (left.errors - each.left.errors) / length
-                size = each.size - float(slope @ each.left.errors) / max(float(slope @ slope), _SMALLEST)
-                improved.append((each.candidate, min(max(size, low), high)))
+        for cause, moved, length, (low, high) in zip(causes, self.evaluated(changes), lengths, ends, strict=True):
+            if moved is not None:
+                slope = (moved.errors - cause.residuals.errors) / length
+                size = cause.size - float(slope @ cause.residuals.errors) / max(float(slope @ slope), _SMALLEST)
+                improved.append((cause.candidate, min(max(size, low), high)))
         return improved
 
-    def slopes(self, change: ModelChange, left: Left, candidates: Sequence[CandidateCause]) -> list[Slope]:
+    def slopes(
+        self, change: ModelChange, residuals: ScaledResiduals, candidates: Sequence[CandidateCause]
+    ) -> list[Slope]:
         """Return the derivatives of the errors under a change by the magnitude of each further candidate."""
         # A delay of all sensors is free already, unless the change has one itself.
         is_free = self.settings.longest_delay > 0.0 and not change.has_delay
-        candidates = [each for each in candidates if not (is_free and each.at(each.grid[0]).has_delay)]
+        candidates = [item for item in candidates if not (is_free and item.at(item.grid[0]).has_delay)]
         steps = [_SMALL * min(map(abs, candidate.grid)) for candidate in candidates]
         changes = [joined(change, candidate.at(step)) for candidate, step in zip(candidates, steps, strict=True)]
         return [
-            Slope(candidate, (moved.errors - left.errors) / step)
+            Slope(candidate, (moved.errors - residuals.errors) / step)
             for candidate, step, moved in zip(candidates, steps, self.evaluated(changes), strict=True)
             if moved is not None
         ]
 
-    def together(self, usual: Sequence[CandidateCause], none: Left) -> list[CandidateCause]:
+    def together(self, usual: Sequence[CandidateCause], none: ScaledResiduals) -> list[CandidateCause]:
         """Return the likeliest usual errors of all sensors as one change; an empty list if together they are unusual.
 
         Only errors of single sensors are used; errors of groups would add to them beyond their limits. In each channel
@@ -223,17 +236,17 @@ class CauseSearch:
             return []
         sized = _bounded(slopes, none.errors)
         counts = [record.values.shape[1] for record in self.records for _ in record.channels]
-        sums = np.add.reduceat(np.stack([each.slope for each in sized], axis=1), np.cumsum([0, *counts[:-1]]))
-        deviations = [deviation_of_limit(each.candidate.usual) for each in sized]
-        found = np.square(sums @ [each.size for each in sized])
-        squares = found / np.maximum(np.square(sums * deviations).sum(axis=1), _SMALLEST)
+        sums = np.add.reduceat(np.stack([item.slope for item in sized], axis=1), np.cumsum([0, *counts[:-1]]))
+        deviations = [deviation_of_limit(item.candidate.usual) for item in sized]
+        explained = np.square(sums @ [item.size for item in sized])
+        squares = explained / np.maximum(np.square(sums * deviations).sum(axis=1), _SMALLEST)
         if len(counts) * float(chi2.sf(squares.max(), 1)) < _UNUSUAL:
             return []
-        change = reduce(joined, [each.change for each in sized])
+        change = reduce(joined, [item.change for item in sized])
         words = "zeros, gains and delays of several sensors seem to be off"
         return [CandidateCause("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
 
-    def beside_usual(self, slopes: Sequence[Slope], none: Left, known: Collection[str]) -> list[SizedCause]:
+    def beside_usual(self, slopes: Sequence[Slope], none: ScaledResiduals, known: Collection[str]) -> list[SizedCause]:
         """Return unusually large changes that explain the recordings in combination with usual sensor errors.
 
         Magnitudes come from a linear fit, and a replay verifies each. Usual errors cost no penalty. Names in ``known``
@@ -249,19 +262,19 @@ class CauseSearch:
             others = [other for other in usual if other is not slope]
             fitted = _bounded([unbounded, *others], none.errors)
             size = fitted[0].size
-            left = none.errors + sum(each.size * each.slope for each in fitted)
+            errors = none.errors + sum(item.size * item.slope for item in fitted)
             # A straight line leaves some more; what leaves far more is no small change, nor is what its grid does not
             # reach: of a logarithm such a size would be no number any more.
             is_inside = min(candidate.grid) < size < max(candidate.grid)
-            if is_inside and float(left @ left) < 2.0 * ONLY_NOISE * len(left) and abs(size) > candidate.usual:
+            if is_inside and float(errors @ errors) < 2.0 * ONLY_NOISE * len(errors) and abs(size) > candidate.usual:
                 sized.append(_Sized(candidate, size, slope.errors))
-                changes.append(reduce(joined, [each.change for each in fitted[1:]], candidate.at(size)))
-        tried = [
-            SizedCause(candidate=candidate, size=size, left=left, gain=self._gain(left, none) - self.penalty)
-            for (candidate, size, _), left in zip(sized, self.evaluated(changes), strict=True)
-            if left is not None
+                changes.append(reduce(joined, [item.change for item in fitted[1:]], candidate.at(size)))
+        causes = [
+            SizedCause(candidate, size, residuals, gain=self._gain(residuals, none) - self.penalty)
+            for (candidate, size, _), residuals in zip(sized, self.evaluated(changes), strict=True)
+            if residuals is not None
         ]
-        return [each for each in tried if each.explains and each.is_inside]
+        return [cause for cause in causes if cause.explains and cause.is_inside]
 
     def needs_another(self, first: SizedCause, slopes: Sequence[Slope]) -> bool:
         """Return whether a second, unusually large change is needed to explain the residuals left by the first.
@@ -273,7 +286,7 @@ class CauseSearch:
         """
         if not slopes:
             return False
-        errors = first.left.errors
+        errors = first.residuals.errors
         step = _SMALL * min(map(abs, first.candidate.grid))
         moved = self.evaluated([first.candidate.at(first.size + step)])[0]
         along_first = np.zeros_like(errors) if moved is None else moved.errors - errors
@@ -313,7 +326,7 @@ def _bounded(slopes: Sequence[Slope], errors: Floats) -> list[_Sized]:
     )
     limits = np.array([1.0 if math.isfinite(slope.candidate.usual) else math.inf for slope in slopes])
     columns = np.stack([slope.errors for slope in slopes], axis=1) * scales
-    known = np.diag(np.where(np.isfinite(limits), 1.0 / deviation_of_limit(1.0), 0.0))
-    rows, left = np.concatenate([columns, known]), np.concatenate([-errors, np.zeros(len(limits))])
-    sizes = lsq_linear(rows, left, (-limits, limits)).x * scales
+    prior = np.diag(np.where(np.isfinite(limits), 1.0 / deviation_of_limit(1.0), 0.0))
+    rows, right_side = np.concatenate([columns, prior]), np.concatenate([-errors, np.zeros(len(limits))])
+    sizes = lsq_linear(rows, right_side, (-limits, limits)).x * scales
     return [_Sized(slope.candidate, float(size), slope.errors) for slope, size in zip(slopes, sizes, strict=True)]

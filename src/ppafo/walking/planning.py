@@ -52,7 +52,8 @@ from ppafo.walking.preparation import (
     walk_step_counts,
     with_leg,
 )
-from ppafo.walking.task_sequence import PlannedSequence, TaskSequence, plan_task_sequence, standing_gait
+from ppafo.walking.task_sequence import TaskSequence
+from ppafo.walking.task_sequence_plan import PlannedSequence, plan_task_sequence, standing_gait
 from ppafo.walking.wearer import leg_parameters
 
 NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})

@@ -23,7 +23,7 @@ from ppafo.walking.person import crowd_of, draw_people
 from ppafo.walking.planning import plan_walks, task_sequence_of_walk, unrecorded
 from ppafo.walking.result import REMEDY
 from ppafo.walking.safety_events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
-from ppafo.walking.task_sequence import turns_walked
+from ppafo.walking.task_sequence_plan import turns_walked
 from ppafo.walking.walk import Progress, lasting, silent
 
 MAXIMUM_WEARERS = 1_000_000

@@ -49,7 +49,7 @@ from ppafo.walking.strides import (
     task_sequence_metrics,
     walk_metrics,
 )
-from ppafo.walking.task_sequence import PlannedSequence, pace_in_time
+from ppafo.walking.task_sequence_plan import PlannedSequence, pace_in_time
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,7 +18,7 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.gait_series import ankle_path, gait_timing
 from ppafo.walking.motion import walk_of
-from ppafo.walking.task_sequence import PlannedSequence
+from ppafo.walking.task_sequence_plan import PlannedSequence
 
 PHASES = np.linspace(0.0, 1.0, 101)
 """Phases [strides] from heel strike to heel strike at which curves are averaged."""

@@ -81,7 +81,7 @@ def test_a_phase_with_a_single_result_stores_it_in_its_history_for_one_run_as_fo
 def shown(parts: Program, lanes: Any) -> None:
     """A loop that shows one sample."""
     for lane in lanes:
-        meters.trace(parts, lane, 0.0, 0, 1.0, 0)
+        meters.store_trace(parts, lane, 0.0, 0, 1.0, 0)
 
 
 @pytest.mark.parametrize("channels", [("torque",), ("torque", "angle")])

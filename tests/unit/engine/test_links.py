@@ -8,6 +8,7 @@ import pytest
 from ppafo.engine import linking
 from ppafo.engine.generator import StepText
 from ppafo.engine.linking import link_effects, link_program
+from ppafo.engine.replacements import Replacements
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.errors import ProgramError
 from ppafo.model.declaration import Number
@@ -116,7 +117,7 @@ SECOND = replace(FIRST, name="second", laws={place: second_law})
 def collected(*effects: Effect) -> SourceCollector:
     """A collector with these effects."""
     collector = SourceCollector("")
-    link_effects(effects, collector)
+    link_effects(effects, collector.replacements)
     return collector
 
 
@@ -186,7 +187,7 @@ def test_an_effect_that_cannot_act_says_why(change: dict[str, Any], said: str) -
 def test_a_name_that_other_rows_have_is_refused() -> None:
     program = plan_run(load_scenario("step-response")).program
     with pytest.raises(ProgramError, match="other rows of a program have this name"):
-        link_program(replace(program, effects=(replace(FIRST, name="valve", laws={}),)), SourceCollector(""))
+        link_program(replace(program, effects=(replace(FIRST, name="valve", laws={}),)), Replacements())
 
 
 def sprung(driving: float, friction: float, damping: float, angle: float, angular_velocity: float) -> float:
@@ -202,7 +203,7 @@ def test_a_spring_in_equation_1_is_refused_with_the_place_where_friction_knows_i
     with pytest.raises(
         ProgramError, match=r"test_links\.py:\d+: net_torque takes 1 N m of a joint at rest.*load_torque"
     ):
-        link_program(program, SourceCollector("@inline"))
+        link_program(program, Replacements())
 
 
 def sets_more(parts: Any, lane: Any) -> None:

@@ -292,3 +292,14 @@ def test_a_search_that_ends_where_no_run_succeeds_has_not_converged_and_names_th
     assert bounded.has_converged
     assert not bounded.edge
     assert bounded.by_name["rate"] == pytest.approx(0.9 * side, rel=1e-6)
+
+
+def test_a_number_beside_whose_start_no_run_succeeds_is_refused_by_name() -> None:
+    def residuals(points: Floats) -> Floats:
+        line = _TIME[:, None] * points[0] + points[1]
+        return np.asarray(np.where(points[1] == 1.0, line, np.nan))
+
+    numbers = (FitVariable("slope", 1.0, 0.0, 9.0, 1.0), FitVariable("level", 1.0, 0.0, 9.0, 1.0))
+    for is_motion in (False, True):
+        with pytest.raises(IdentificationError, match="level: no run succeeds near 1; give other bounds"):
+            fit(residuals, numbers, (ResidualBlock("line", "only", slice(0, _COUNT)),), is_motion=is_motion)

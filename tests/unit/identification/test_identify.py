@@ -15,7 +15,8 @@ from ppafo.cli.main import main
 from ppafo.errors import IdentificationError, PpafoError
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import with_estimates
-from ppafo.identification.problem import FreeDecayProblem, ProcedureContext, VaneLeakProblem, json_schema, parse_problem
+from ppafo.identification.problem import json_schema, parse_problem
+from ppafo.identification.procedures import FreeDecayProblem, ProcedureContext, VaneLeakProblem
 from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory import FittedExperiment, tolerance_parameters
 from ppafo.identification.trajectory.tolerances import stated_by

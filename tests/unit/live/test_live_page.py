@@ -363,7 +363,9 @@ def test_a_recording_of_one_s_own_is_compared_as_validate_does(chromium: Any, fi
     import numpy as np
 
     from ppafo.running import simulate
-    from ppafo.validation.agreement import DEFAULT_LIMIT, ComparedCurve, channel_agreement, estimate_delay
+    from ppafo.validation.agreement import channel_agreement
+    from ppafo.validation.delay import ComparedCurve, estimate_delay
+    from ppafo.validation.settings import DEFAULT_LIMIT
 
     recording = simulate(load_scenario("torque-task-solenoid")).recording
     time = recording.time[50:2900:3]

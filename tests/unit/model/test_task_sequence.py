@@ -20,15 +20,8 @@ from ppafo.model.gait import (
 )
 from ppafo.walking.gait_series import gait_series, gait_timing
 from ppafo.walking.planning import planned_task_sequence
-from ppafo.walking.task_sequence import (
-    FILE,
-    PlannedSequence,
-    TaskSegment,
-    TaskSequence,
-    load_task_sequence,
-    pace_in_time,
-    turns_walked,
-)
+from ppafo.walking.task_sequence import FILE, TaskSegment, TaskSequence, load_task_sequence
+from ppafo.walking.task_sequence_plan import PlannedSequence, pace_in_time, turns_walked
 from ppafo.walking.wearer import paper_subject
 
 GAIT = load_gait("falisse2019-subject1")

@@ -10,7 +10,8 @@ import ppafo
 from ppafo.analyses.stored_figures import draw_folder, names_in
 from ppafo.arguments.reading import quantity, units_given
 from ppafo.parameters.parameter_set import written_units
-from ppafo.rig.experiments import record, write_rig_recording
+from ppafo.rig.experiments import record
+from ppafo.rig.folder import write_rig_recording
 from ppafo.studies.varying import given_in, varied_path
 from ppafo.units.shown import shown_in, shown_text, written_text
 

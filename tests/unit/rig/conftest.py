@@ -4,9 +4,10 @@ from collections.abc import Callable
 
 import pytest
 
-from ppafo.rig.experiments import rig_run
-from ppafo.rig.preset import ExperimentRequest, Preset, load_preset
+from ppafo.rig.preset import Preset, load_preset
+from ppafo.rig.setup import ExperimentRequest
 from ppafo.rig.solution import RigRun
+from ppafo.rig.transient import rig_run
 from ppafo.simulation.loading import load_scenario
 
 

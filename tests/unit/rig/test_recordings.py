@@ -10,8 +10,10 @@ import pytest
 
 from ppafo.errors import DataError, ParameterError, PpafoError
 from ppafo.rig import list_presets, load_preset, record
-from ppafo.rig.experiments import EXPERIMENTS, on_scale, write_rig_recording
+from ppafo.rig.experiments import EXPERIMENTS
+from ppafo.rig.folder import write_rig_recording
 from ppafo.rig.preset import PATHS, SECTIONS, Preset, json_schema
+from ppafo.rig.steady import on_scale
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage import read_csv
 from ppafo.storage.comma_separated import marked_csv_bytes

@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,8 +19,7 @@ from ppafo.engine.step import loop
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.sensors import Measurement
 from ppafo.running import simulate
-from ppafo.simulation.ensemble import COMPLETED, DIVERGED, run_ensemble
-from ppafo.simulation.ensemble import _result as ensemble_result
+from ppafo.simulation.ensemble import COMPLETED, DIVERGED, _ensemble_result, run_ensemble
 from ppafo.simulation.ensemble.running import MeteredRuns, OutputRequest
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
@@ -339,7 +337,7 @@ def test_runs_of_an_ensemble_and_walks_with_too_many_parts_say_so_too() -> None:
     outcome = MeteredRuns(2, OutputRequest({}, (), 1.0, np.empty(0)))
     outcome.failure_time[:] = 1.5
     outcome.too_many_parts[1] = True
-    told = ensemble_result(SimpleNamespace(reasons={}), outcome, {}).reasons  # type: ignore[arg-type]
+    told = _ensemble_result(outcome, {}, {}).reasons
     assert told == {0: f"diverged at t = 1.5 s; {REMEDY}", 1: f"diverged at t = 1.5 s; {TOO_MANY_PARTS}"}
 
 

@@ -8,8 +8,8 @@ import pytest
 
 from ppafo.errors import StudyError
 from ppafo.simulation.loading import load_scenario
-from ppafo.studies.distributions import effective_sample_size, fraction_interval, quantile_interval, replicates_interval
 from ppafo.studies.draws import choose_configuration, drawn_in, study_of, uncertainty_in, uncertainty_of
+from ppafo.studies.intervals import effective_sample_size, fraction_interval, quantile_interval, replicates_interval
 from ppafo.studies.limits import MetricLimit, check_metrics
 from ppafo.studies.loading import load_study
 

@@ -15,13 +15,14 @@ from ppafo.analyses.sweep.statistic_kind import Statistic, mean_of, quantile_of
 from ppafo.analyses.sweep.stopping import StoppingRule
 from ppafo.errors import StudyError
 from ppafo.report.kind import ConfidenceInterval
-from ppafo.studies.distributions import Floats, NormalAround, noise_interval
+from ppafo.studies.distributions import Floats, NormalAround
 from ppafo.studies.draws import Uncertainty, uncertainty_of
+from ppafo.studies.intervals import noise_interval
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import NOISE, other_noise, with_noise
 from ppafo.studies.study import RandomValue
 from ppafo.study.blocks import drawn_values
-from ppafo.study.runs import Runs
+from tests.model_runs import model_runs
 
 NOISY = ["run.duration=0.3 s", "sensors.pressure_noise=5 kPa_d"]
 DOCUMENT: dict[str, Any] = {
@@ -141,7 +142,7 @@ def test_a_statistic_says_how_much_is_noise(statistic: Statistic) -> None:
         return {"rms_error": columns["x"] + 0.5 * noise}
 
     def share_in(uncertainty: Uncertainty) -> ConfidenceInterval | None:
-        runs = Runs.of_model(model, ["rms_error"])
+        runs = model_runs(model, ["rms_error"])
         return draw_until(runs, uncertainty, "rms_error", statistic, rule, 1).found.share_of_noise
 
     drawn = (RandomValue("x", NormalAround(0.0, 1.0)),)

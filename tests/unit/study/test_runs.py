@@ -11,14 +11,15 @@ from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats
 from ppafo.study.blocks import runs_at_once
-from ppafo.study.runs import FAILED, RunCounter, Runs, settled
+from ppafo.study.runs import FAILED, RunCounter, Runs, scenario_runs, settled
+from tests.model_runs import model_runs
 
 SHORT = ("run.duration=0.2 s",)
 
 
 def runs_of(*metrics: str) -> Runs:
     """Runs of a short task."""
-    return Runs(load_scenario("torque-task-proportional", SHORT), metrics, RunCounter(1, None))
+    return scenario_runs(load_scenario("torque-task-proportional", SHORT), metrics, RunCounter(1, None))
 
 
 def test_each_run_gives_what_it_gives_alone() -> None:
@@ -42,7 +43,7 @@ def test_a_run_that_is_refused_is_a_failure_with_its_reason() -> None:
 
 
 def test_rows_that_lack_a_metric_are_refused_as_those_that_failed() -> None:
-    runs = Runs.of_model(lambda columns: {"y": columns["x"], FAILED: np.zeros(4, dtype=np.bool_)}, ["y"])
+    runs = model_runs(lambda columns: {"y": columns["x"], FAILED: np.zeros(4, dtype=np.bool_)}, ["y"])
     rows = runs.run({"x": np.array([1.0, np.nan, 3.0, 4.0])})
     with pytest.raises(StudyError, match="trial: 1 of 4 runs have no 'y'; choose another metric"):
         runs.check(rows, 0.2, "trial", ["y"])
@@ -61,7 +62,7 @@ def test_the_table_has_all_rows_with_the_values_that_made_them() -> None:
     def model(columns: Mapping[str, Floats]) -> dict[str, Floats]:
         return {"y": np.sqrt(columns["x"])}
 
-    runs = Runs.of_model(model, ["y"])
+    runs = model_runs(model, ["y"])
     with np.errstate(invalid="ignore"):
         runs.run({"x": np.array([1.0, -4.0])})
     last = runs.run({"x": np.array([9.0])})

@@ -8,8 +8,9 @@ from ppafo.parameters.device import Device
 from ppafo.running import simulate
 from ppafo.signals import Recording
 from ppafo.simulation.loading import load_scenario
-from ppafo.validation.agreement import ReplaySettings, compare_recording
+from ppafo.validation.agreement import compare_recording
 from ppafo.validation.measured import check_recording
+from ppafo.validation.settings import ReplaySettings
 
 
 @pytest.fixture(scope="session")

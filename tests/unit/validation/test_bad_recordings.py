@@ -14,8 +14,8 @@ from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
 from ppafo.validation import parse_thresholds
-from ppafo.validation.initial import parse_initial
 from ppafo.validation.measured import check_recording, read_measured
+from ppafo.validation.settings import parse_initial
 
 Step = tuple[Device, Recording]
 HEADER = "time [s],command [-],angle [deg],pressure_1 [psi_g],pressure_2 [psi_g]"

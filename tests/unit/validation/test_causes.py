@@ -15,11 +15,12 @@ from ppafo.progress import Progress
 from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
-from ppafo.validation.agreement import ReplaySettings, compare_recording
+from ppafo.validation.agreement import compare_recording
 from ppafo.validation.candidates import sizes
 from ppafo.validation.causes import Diagnosis, causes_of
 from ppafo.validation.compared import COMPARED
 from ppafo.validation.measured import check_recording
+from ppafo.validation.settings import ReplaySettings
 
 ROOM = 101325.0
 SUPPLY = ["supply.pressure=55 psi_g", "supply.dorsiflexion_pressure=55 psi_g"]

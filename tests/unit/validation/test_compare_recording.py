@@ -13,8 +13,9 @@ from ppafo.parameters.device import Device
 from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
-from ppafo.validation.agreement import ComparedCurve, channel_agreement
+from ppafo.validation.agreement import channel_agreement
 from ppafo.validation.compared import parse_thresholds
+from ppafo.validation.delay import ComparedCurve
 
 Agree = Callable[..., Any]
 Step = tuple[Device, Recording]

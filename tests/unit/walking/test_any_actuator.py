@@ -13,7 +13,8 @@ from ppafo.engine.run import batch_of
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.walking import load_walk, walk
-from ppafo.walking.figures.legs import animation, strip_figure
+from ppafo.walking.figures.animation import animation
+from ppafo.walking.figures.gait_strip import strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk

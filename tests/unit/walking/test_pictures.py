@@ -15,7 +15,9 @@ from ppafo.report.finding import Section, text_of
 from ppafo.signals import Channel, Recording
 from ppafo.walking import WalkComparison, WalkResult, compare_walks, load_walk, walk, walk_population
 from ppafo.walking.figures import task_sequence, whole_walk
-from ppafo.walking.figures.legs import animation, drags, frames_figure, last_phases, legs_of, strip_figure
+from ppafo.walking.figures.animation import animation
+from ppafo.walking.figures.gait_strip import strip_figure
+from ppafo.walking.figures.legs import drags, frames_figure, last_phases, legs_of
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.population import population_figure
 from ppafo.walking.figures.whole_walk import whole_walk_figure

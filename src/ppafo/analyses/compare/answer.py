@@ -20,7 +20,8 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.tracking import Tracking
 from ppafo.simulation.tracking.pair_step import coarse_pair
-from ppafo.studies.distributions import Floats, fraction_text, is_carried
+from ppafo.studies.distributions import Floats
+from ppafo.studies.intervals import fraction_text, is_carried
 from ppafo.study.runs import Rows
 from ppafo.units import without_exponent
 from ppafo.wording import count_of

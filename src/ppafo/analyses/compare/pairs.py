@@ -8,14 +8,9 @@ from numpy.typing import NDArray
 
 from ppafo.metrics.tracking import ONE_INSTANT, TRACKING
 from ppafo.report.kind import ConfidenceInterval
-from ppafo.studies.distributions import (
-    Floats,
-    effective_sample_size,
-    noise_interval,
-    replicates_interval,
-    share_interval,
-)
+from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import REPLICATES
+from ppafo.studies.intervals import effective_sample_size, noise_interval, replicates_interval, share_interval
 
 Masks = NDArray[np.bool_]
 OUTER_QUANTILES = (0.05, 0.95)

@@ -21,7 +21,7 @@ from ppafo.studies.limits import CONFIDENCE, check_fraction
 from ppafo.studies.sampling import NOISE, with_new_noise
 from ppafo.studies.study import Configuration, Study, with_overrides
 from ppafo.studies.varying import value_at, varied_path
-from ppafo.study.runs import Rows, RunCounter, Runs, failures_of, unvaried
+from ppafo.study.runs import Rows, RunCounter, failures_of, scenario_runs, unvaried
 from ppafo.wording import first_twice, nearest_name
 
 AS_WRITTEN = "as written"
@@ -196,7 +196,7 @@ def _runs_over_draws(
     counter = RunCounter(runs_of_scenario * len(scenarios), draws.progress)
     drawn = {}
     for (task, name), scenario in scenarios.items():
-        runs = Runs(scenario, metrics, counter, uncertainty.gauge, draws.threads)
+        runs = scenario_runs(scenario, metrics, counter, uncertainty.gauge, draws.threads)
         # The noise is in all configurations, even if the study varies other paths in some of them only.
         paths = [path for path in columns if study is None or path == NOISE or study.varies(path, name)]
         rows = runs.run({path: columns[path] for path in paths} or unvaried(scenario, draws.count))

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.endurance.discharge import check_schedule, discharge, discharge_of_life, smallest_mass_when_warm
@@ -20,6 +21,7 @@ from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import RUN_FILE
 from ppafo.walking import WalkResult
 from ppafo.walking.bottle.coupling import Schedule
+from ppafo.walking.bottle.supply import is_of_bottle
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import bottle_life
@@ -78,9 +80,24 @@ def endurance_of_gas_use(
         recording, units = use, {}
     else:
         recording, run = read_recording(Path(str(use))), Path(str(use)) / RUN_FILE
-        units = dict(stated_units(run, read_json(run))) if run.is_file() else {}
+        document = read_json(run) if run.is_file() else {}
+        units = dict(stated_units(run, document)) if document else {}
+        _check_gas(run, document, full)
     endurance = follow_bottle(full, demand_of_recording(recording, stride_time), schedule)
     return replace(endurance, is_of_recording=stride_time is None, device_units=units)
+
+
+def _check_gas(run: Path, document: Any, bottle: Bottle) -> None:
+    """Raise DataError for a run whose device was fed with another gas than the bottle holds."""
+    gas: Any = document
+    for key in ("scenario", "device", "gas"):
+        gas = gas.get(key) if isinstance(gas, dict) else None
+    molar_mass, fluid = gas.get("molar_mass") if isinstance(gas, dict) else None, bottle.fluid.name
+    if isinstance(molar_mass, float) and not is_of_bottle(molar_mass, bottle):
+        raise DataError(
+            f"{run}: its device is fed with gas of {1.0e3 * molar_mass:.4g} g/mol, and bottle '{bottle.name}' holds "
+            f"{fluid}: take a bottle of that gas (ppafo bottle --list), or simulate with gas.species={fluid}"
+        )
 
 
 @checked

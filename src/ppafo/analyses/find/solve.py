@@ -14,7 +14,7 @@ from ppafo.studies.draws import seeds_of_noise
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, given_in, varied_path
-from ppafo.study.runs import RunCounter, Runs, oscillating, settled, tracking_violation, with_companions
+from ppafo.study.runs import RunCounter, Runs, oscillating, scenario_runs, settled, tracking_violation, with_companions
 from ppafo.units import split_quantity
 from ppafo.wording import one_line
 
@@ -172,7 +172,7 @@ def outermost(
     # The same streams for all values, so that neighbours differ by the value alone.
     seeds = seeds_of_noise([base], [path.path], 0, _STREAMS, _SEED)
     tally = RunCounter(grid * max(1, seeds.size), progress)
-    runs = Runs(base, with_companions([condition.metric], base), tally, (), threads)
+    runs = scenario_runs(base, with_companions([condition.metric], base), tally, (), threads)
     search = FindResult(base.name, path, condition, highest, seeds.size, runs, np.empty(0, TRIED))
     search = search.with_values(base, np.linspace(low, high, grid), seeds, True)
     if not np.isfinite(search.tried["judged"]).any():

@@ -8,14 +8,8 @@ from ppafo.analyses.identify.answer import Identification
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.new_set import with_estimates
-from ppafo.identification.problem import (
-    PROCEDURES,
-    ProblemFile,
-    ProcedureContext,
-    ProcedureProblem,
-    run_procedure,
-    window_of,
-)
+from ppafo.identification.problem import ProblemFile
+from ppafo.identification.procedures import PROCEDURES, ProcedureContext, ProcedureProblem, run_procedure, window_of
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, source_of
 from ppafo.identification.tolerances import tolerances_of
 from ppafo.identification.trajectory.layout import ExperimentSection

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import StudyError
-from ppafo.studies.distributions import Floats, jackknife_reach
+from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import Uncertainty, replicate_seed
+from ppafo.studies.intervals import jackknife_reach
 
 SCRAMBLES = 8
 """Number of independent scrambles of the Sobol sequence, to which base points are assigned in turn."""

@@ -65,7 +65,7 @@ def sensitivity(
     from ppafo.errors import StudyError
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.studies.draws import drawn_in
-    from ppafo.study.runs import RunCounter, Runs, with_companions
+    from ppafo.study.runs import RunCounter, scenario_runs, with_companions
     from ppafo.wording import nearest_name
 
     if method is not None and method not in METHODS:
@@ -82,6 +82,6 @@ def sensitivity(
     settings = SensitivitySettings(count, chosen.sample.seed if seed is None else seed, confidence, maximum_failed)
     tally = RunCounter(count * by.block_rows(len(used.drawn)), progress)
     warn_of_coarse_pairs([base.scenario])
-    runs = Runs(base.scenario, with_companions(requested, base.scenario), tally, used.gauge, threads)
+    runs = scenario_runs(base.scenario, with_companions(requested, base.scenario), tally, used.gauge, threads)
     with shown_in(chosen.shown_for(base.scenario)):
         return finding_of(analyse(runs, used, by, settings, f"{chosen.name}, {base.name}", base.scenario, requested))

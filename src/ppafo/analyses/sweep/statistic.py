@@ -20,12 +20,12 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding
 from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
-from ppafo.studies.distributions import floored_interval, noise_interval
 from ppafo.studies.draws import REPLICATES, Columns, Uncertainty, drawn_in
+from ppafo.studies.intervals import floored_interval, noise_interval
 from ppafo.studies.limits import atmosphere_of, check_metrics
 from ppafo.studies.sampling import with_new_noise
 from ppafo.studies.study import Study
-from ppafo.study.runs import RunCounter, Runs
+from ppafo.study.runs import RunCounter, Runs, scenario_runs
 from ppafo.units.shown import shown_in
 
 DEFAULT_WIDTH = "1 %"
@@ -101,7 +101,7 @@ def estimate(
     asked = width or (PROBABILITY_WIDTH if what.threshold is not None else DEFAULT_WIDTH)
     rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
     warn_of_coarse_pairs([base.scenario])
-    runs = Runs(base.scenario, wanted, RunCounter(rule.first, progress), uncertainty.gauge, threads)
+    runs = scenario_runs(base.scenario, wanted, RunCounter(rule.first, progress), uncertainty.gauge, threads)
     with shown_in(chosen.shown_for(base.scenario)):
         first = chosen.sample.seed if seed is None else seed
         return draw_until(runs, uncertainty, metric, what, rule, first, wanted[1:])

@@ -11,7 +11,8 @@ from ppafo.report.finding import Finding, Section, columns_of
 from ppafo.report.kind import ConfidenceInterval, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import GREY, VERMILION
-from ppafo.studies.distributions import Floats, fraction_text
+from ppafo.studies.distributions import Floats
+from ppafo.studies.intervals import fraction_text
 
 _RULE_OF_THREE = 3.0
 """Numerator of the rule of three: 3 / n bounds the probability of an event missing in n draws (95 %)."""

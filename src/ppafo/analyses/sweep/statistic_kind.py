@@ -15,14 +15,9 @@ import numpy as np
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.report.kind import ConfidenceInterval
-from ppafo.studies.distributions import (
-    Floats,
-    effective_sample_size,
-    floored_interval,
-    fraction_interval,
-    quantile_interval,
-)
+from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import REPLICATES, Columns, Uncertainty
+from ppafo.studies.intervals import effective_sample_size, floored_interval, fraction_interval, quantile_interval
 from ppafo.studies.limits import level_of
 
 FEWEST_SEEN = 10_000

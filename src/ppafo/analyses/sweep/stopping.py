@@ -13,8 +13,9 @@ from ppafo.analyses.sweep.statistic_kind import Statistic
 from ppafo.documents.json_text import plain
 from ppafo.errors import StudyError, UnitError, refused_as
 from ppafo.report.kind import ConfidenceInterval
-from ppafo.studies.distributions import Floats, is_carried
+from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS
+from ppafo.studies.intervals import is_carried
 from ppafo.studies.limits import CONFIDENCE, check_fraction, difference_of
 from ppafo.units import number_text, parse_quantity
 

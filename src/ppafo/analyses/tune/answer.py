@@ -21,7 +21,7 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLACK, BLUE, COLOURS, GREY, VERMILION
 from ppafo.simulation.tracking.pair_step import coarse_pair
-from ppafo.studies.distributions import fraction_text
+from ppafo.studies.intervals import fraction_text
 from ppafo.units import percentage, without_exponent
 from ppafo.units.shown import in_units, quantity_of_unit
 from ppafo.wording import count_of

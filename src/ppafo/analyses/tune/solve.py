@@ -25,7 +25,8 @@ from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
 from ppafo.simulation.tracking.metered import shortfall
-from ppafo.studies.distributions import Floats, noise_interval
+from ppafo.studies.distributions import Floats
+from ppafo.studies.intervals import noise_interval
 from ppafo.studies.sampling import NOISE_DRAWS, with_new_noise
 from ppafo.studies.study import with_overrides
 from ppafo.study.runs import (
@@ -33,6 +34,7 @@ from ppafo.study.runs import (
     RunCounter,
     Runs,
     oscillating,
+    scenario_runs,
     settled,
     tracking_violation,
     with_companions,
@@ -58,7 +60,9 @@ def solve_tuning(problem: Problem, threads: int | None, progress: Report | None)
     """Return the result of a tuning: search, and evaluation of the gains before and after."""
     spread = problem.spread
     metrics = with_companions(problem.metrics, problem.scenario)
-    runs = Runs(problem.scenario, metrics, RunCounter(_largest_runs(problem), progress), problem.gauge, threads)
+    runs = scenario_runs(
+        problem.scenario, metrics, RunCounter(_largest_runs(problem), progress), problem.gauge, threads
+    )
     draws = {} if spread is None else spread.uncertainty.random_columns(0, spread.draws, spread.seed)
     scales = _scales(problem, _metrics_of_gains(runs, problem, problem.before, draws))
 

@@ -86,9 +86,10 @@ def validate(
     from ppafo.analyses.validate.answer import finding_of
     from ppafo.analyses.validate.result import Validation
     from ppafo.parameters import load_device
-    from ppafo.validation.agreement import compare_recording, replay_settings
+    from ppafo.validation.agreement import compare_recording
     from ppafo.validation.causes import causes_of
     from ppafo.validation.measured import read_all
+    from ppafo.validation.settings import replay_settings
 
     report = progress or report_nothing
     device = load_device(parameter_set, overrides=overrides, valve=valve)

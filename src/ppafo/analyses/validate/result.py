@@ -8,9 +8,10 @@ from ppafo.report.display_units import display_value
 from ppafo.report.kind import Kind
 from ppafo.units.shown import quantity_of_unit
 from ppafo.validation import ChannelAgreement
-from ppafo.validation.agreement import RecordingAgreement, ReplaySettings
+from ppafo.validation.agreement import RecordingAgreement
 from ppafo.validation.causes import Diagnosis, ResidualCause
 from ppafo.validation.compared import COMPARED
+from ppafo.validation.settings import ReplaySettings
 from ppafo.version import __version__
 
 _EXPLAINS = 0.5

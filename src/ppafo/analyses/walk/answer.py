@@ -32,7 +32,9 @@ from ppafo.simulation.tracking import Tracking
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
-from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
+from ppafo.walking.figures.animation import animation
+from ppafo.walking.figures.gait_strip import strip_figure
+from ppafo.walking.figures.legs import frames_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.whole_walk import whole_walk_figure
 from ppafo.walking.motion import person_remarks, walk_of

@@ -36,7 +36,8 @@ def rig_simulate(
     written: rig (valve-map.csv, rig.json)
     """
     from ppafo.cli.output import CommandOutput, blame_out_option
-    from ppafo.rig.experiments import NOTICE, check_rig_folder, find_experiment, record, write_rig_recording
+    from ppafo.rig.experiments import NOTICE, find_experiment, record
+    from ppafo.rig.folder import check_rig_folder, write_rig_recording
 
     # An unknown name and a refused folder are told before anything runs.
     find_experiment(experiment)

@@ -117,42 +117,43 @@ def begin_step(parts: Program, lanes: Lanes, now: Now, steps_per_sample: int) ->
 def take_sample(
     parts: Program,
     lanes: Lanes,
-    moment: float,
+    elapsed: float,
     index: int,
     interval: float,
     last_record: int,
     trace_every: int,
 ) -> None:
-    """Record a sample; or, in programs without records, update meters and traces."""
+    """Record the sample ``elapsed`` steps after the start; without records, update meters and traces."""
     if not parts.takes_samples:
         lanes.record(index)
     if parts.follows_reference and index == 0:
-        look_at_reference(parts, lanes, interval, last_record)
+        summarise_reference(parts, lanes, interval, last_record)
     if parts.meters:
         if index == 0:
             for lane in lanes:
-                meters.start(parts, lane, moment, index, interval)
+                meters.start_meters(parts, lane, elapsed, index, interval)
         else:
             for lane in lanes:
-                meters.update(parts, lane, moment, index, interval)
+                meters.update_meters(parts, lane, elapsed, index, interval)
     if parts.traced and lanes.traces(index, trace_every):
-        kept = lanes.slot(index, trace_every)
+        slot = lanes.slot(index, trace_every)
         for lane in lanes:
-            meters.trace(parts, lane, moment, index, interval, kept)
+            meters.store_trace(parts, lane, elapsed, index, interval, slot)
 
 
-def look_at_reference(parts: Program, lanes: Lanes, interval: float, last_record: int) -> None:
+def summarise_reference(parts: Program, lanes: Lanes, interval: float, last_record: int) -> None:
     """Evaluate the whole reference before the first sample: final value, largest value, and start of the final hold."""
     for lane in lanes:
-        meters.begin_course(parts, lane, interval, last_record)
-    # A monotone one is largest at one of its ends, and where its hold starts shows on the way.
+        meters.begin_reference_summary(parts, lane, interval, last_record)
+    # A monotone one is largest at one of its ends, and where its hold starts shows on the way. The sample is no
+    # ``index``: this text is inserted into that of the caller, who needs his own ``index`` afterwards.
     if not parts.reference.is_monotone:
-        for place in range(last_record):
+        for number in range(last_record):
             for lane in lanes:
-                meters.raise_largest(parts, lane, interval, place)
-        for place in range(last_record - 1, -1, -1):
+                meters.update_largest_reference(parts, lane, interval, number)
+        for number in range(last_record - 1, -1, -1):
             for lane in lanes:
-                meters.look_for_hold(parts, lane, interval, place)
+                meters.search_final_hold(parts, lane, interval, number)
             # The search ends as soon as every lane has found its hold.
             if not any(lane.course.hold_start == 0.0 for lane in lanes):
                 break

@@ -1,4 +1,12 @@
-"""Samples for meters and traces, with the channels of a recording, in programs that record nothing."""
+"""Samples for meters and traces, with the channels of a recording, in programs that record nothing.
+
+Sample ``index`` of a run, counted from 0, lies ``index * interval`` steps after the start, with ``interval`` the number
+of steps between samples. ``elapsed`` is the same time [steps] as the loop has reached it, a step and a fraction.
+
+The loop over steps calls, before the first sample, ``begin_reference_summary`` and, unless the reference is monotone,
+``update_largest_reference`` for each sample and ``search_final_hold`` for each from the last one backwards. It then
+calls ``start_meters`` at the first sample, ``update_meters`` at the others, and ``store_trace`` at traced samples.
+"""
 
 from ppafo.engine.program import Program
 from ppafo.engine.step.lane import Lane
@@ -25,14 +33,14 @@ NO_STRIDE = StrideSample(**dict.fromkeys(StrideSample._fields, 0.0))
 """Stride data of a sample without a walk, or of a foot on a shank without a gait."""
 
 
-def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
-    """Set the sample ``number`` at time ``moment`` [steps]."""
+def make_sample(parts: Program, lane: Lane, elapsed: float, index: int, interval: float) -> None:
+    """Set ``lane.sample`` to the present values of a run."""
     pressure_1, pressure_2 = present_pressures(parts, lane)
     torque = parts.actuator.torque(lane.plant, lane.state.angle, pressure_1, pressure_2)
-    time = moment * lane.timing.step
+    time = elapsed * lane.timing.step
     # Extremes over the chambers are of chamber 1 where it is the only one.
     lane.sample = Sample(
-        number=float(number),
+        number=float(index),
         angle=lane.state.angle,
         angular_velocity=lane.state.angular_velocity,
         pressure_1=pressure_1,
@@ -40,13 +48,13 @@ def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval
         torque=torque,
         command=lane.result.command,
         value=parts.controlled_value(lane.state.angle, pressure_1, pressure_2, torque),
-        reference=wanted_at(parts, lane, time),
+        reference=set_point_at(parts, lane, time),
         temperature_1=temperature(lane.thermal, lane.state.mass_1, lane.masses.mass_1) if parts.is_thermal else 0.0,
-        temperature_2=second_temperature(parts, lane) if parts.is_thermal else 0.0,
-        gas=gas_of(parts, lane),
-        energy=energy_of(parts, lane),
+        temperature_2=temperature_of_chamber_2(parts, lane) if parts.is_thermal else 0.0,
+        gas=gas_sample(parts, lane),
+        energy=energy_sample(parts, lane),
         foot=parts.foot.sample(parts, lane, time) if parts.foot is not None and parts.is_on_gait else NO_FOOT,
-        stride=stride_of(parts, lane, number, interval),
+        stride=stride_sample(parts, lane, index, interval),
     )
 
 
@@ -55,14 +63,14 @@ def temperature(thermal: ThermalParameters, content: float, mass: float) -> floa
     return thermal.temperature * (content / mass)
 
 
-def second_temperature(parts: Program, lane: Lane) -> float:
+def temperature_of_chamber_2(parts: Program, lane: Lane) -> float:
     """Temperature of the gas in chamber 2, or in the only chamber [K]."""
     if parts.has_one_chamber:
         return temperature(lane.thermal, lane.state.mass_1, lane.masses.mass_1)
     return temperature(lane.thermal, lane.state.mass_2, lane.masses.mass_2)
 
 
-def gas_of(parts: Program, lane: Lane) -> GasSample:
+def gas_sample(parts: Program, lane: Lane) -> GasSample:
     """Gas masses in the chambers and totals [kg]; true masses for real gas and for gas with an energy balance."""
     return GasSample(
         supplied_mass=lane.state.supplied_mass,
@@ -73,7 +81,7 @@ def gas_of(parts: Program, lane: Lane) -> GasSample:
     )
 
 
-def energy_of(parts: Program, lane: Lane) -> EnergySample:
+def energy_sample(parts: Program, lane: Lane) -> EnergySample:
     """Energies of the gas and energy totals [J]; zeros for gas without an energy balance."""
     if not parts.is_thermal:
         return NO_ENERGY
@@ -87,14 +95,14 @@ def energy_of(parts: Program, lane: Lane) -> EnergySample:
     )
 
 
-def wanted_at(parts: Program, lane: Lane, time: float) -> float:
+def set_point_at(parts: Program, lane: Lane, time: float) -> float:
     """Reference at a time [s]; in a walk, the torque requested by the controller [N m]; 0 without a reference."""
     if parts.leg is not None:
         return float(lane.controller_state.request.torque) if parts.requests_torque else 0.0
     return reference_at(parts, lane, time) if parts.has_reference else 0.0
 
 
-def stride_of(parts: Program, lane: Lane, number: int, interval: float) -> StrideSample:
+def stride_sample(parts: Program, lane: Lane, index: int, interval: float) -> StrideSample:
     """Stride data of a walk at a sample; zeros without a walk."""
     if parts.leg is None:
         return NO_STRIDE
@@ -107,14 +115,19 @@ def stride_of(parts: Program, lane: Lane, number: int, interval: float) -> Strid
         toe_landings=lane.walk.toe_landings,
         phase=lane.controller_state.phase.phase if parts.has_phase else 0.0,
         level=lane.controller_state.safety.level if parts.has_level_of_help else 0.0,
-        time=number * (lane.timing.step * interval),
+        time=index * (lane.timing.step * interval),
     )
 
 
 # The whole reference, before the first sample.
 
 
-def origin_of(parts: Program, lane: Lane) -> float:
+def reference_of_sample(parts: Program, lane: Lane, index: int, interval: float) -> float:
+    """Reference at the nominal time of a sample, in the unit of the controlled quantity."""
+    return reference_at(parts, lane, index * interval * lane.timing.step)
+
+
+def reference_origin(parts: Program, lane: Lane) -> float:
     """Origin for the magnitude of the reference: zero for torque, else the initial value of the controlled quantity."""
     if parts.controlled == TORQUE:
         return 0.0
@@ -123,57 +136,57 @@ def origin_of(parts: Program, lane: Lane) -> float:
     return float(parts.controlled_value(lane.state.angle, pressure_1, pressure_2, torque))
 
 
-def begin_course(parts: Program, lane: Lane, interval: float, last: int) -> None:
+def begin_reference_summary(parts: Program, lane: Lane, interval: float, last_index: int) -> None:
     """Set the last value of the reference and the larger distance of its ends from the origin, without a hold."""
-    value, origin = reference_at(parts, lane, last * interval * lane.timing.step), origin_of(parts, lane)
-    largest = max(abs(reference_at(parts, lane, 0 * interval * lane.timing.step) - origin), abs(value - origin))
+    first, last = reference_of_sample(parts, lane, 0, interval), reference_of_sample(parts, lane, last_index, interval)
+    origin = reference_origin(parts, lane)
+    largest = max(abs(first - origin), abs(last - origin))
     lane.course = ReferenceSummary(
-        last=value, largest=largest, tolerance=SAME_LEVEL * largest, hold_start=0.0, samples=last + 1.0
+        last=last, largest=largest, tolerance=SAME_LEVEL * largest, hold_start=0.0, samples=last_index + 1.0
     )
 
 
-def raise_largest(parts: Program, lane: Lane, interval: float, index: int) -> None:
-    """Update the largest distance of the reference from its origin with the sample ``index``."""
-    value = reference_at(parts, lane, index * interval * lane.timing.step)
-    largest = max(lane.course.largest, abs(value - origin_of(parts, lane)))
+def update_largest_reference(parts: Program, lane: Lane, interval: float, index: int) -> None:
+    """Update the largest distance of the reference from its origin with a sample."""
+    value = reference_of_sample(parts, lane, index, interval)
+    largest = max(lane.course.largest, abs(value - reference_origin(parts, lane)))
     lane.course = lane.course._replace(largest=largest, tolerance=SAME_LEVEL * largest)
 
 
-def look_for_hold(parts: Program, lane: Lane, interval: float, index: int) -> None:
-    """Search backwards from the end for the start of the final hold."""
-    value = reference_at(parts, lane, index * interval * lane.timing.step)
+def search_final_hold(parts: Program, lane: Lane, interval: float, index: int) -> None:
+    """Set the start of the final hold, if this sample is the last one away from the final value."""
+    value = reference_of_sample(parts, lane, index, interval)
     is_last_away = lane.course.hold_start == 0.0 and is_away(value, lane.course.last, lane.course.tolerance)
-    hold_start = index + 1.0 if is_last_away else lane.course.hold_start
-    lane.course = lane.course._replace(hold_start=hold_start)
+    lane.course = lane.course._replace(hold_start=index + 1.0 if is_last_away else lane.course.hold_start)
 
 
-# At each sample.
+# Meters and traces, at each sample.
 
 
-def follow_course(parts: Program, lane: Lane) -> None:
-    """Update the summary of a monotone reference, whose hold is found while the run proceeds."""
+def sample_with_summary(parts: Program, lane: Lane, elapsed: float, index: int, interval: float) -> None:
+    """Set ``lane.sample``, and extend the summary of a monotone reference, whose hold is found during the run."""
+    make_sample(parts, lane, elapsed, index, interval)
     if parts.follows_reference and parts.reference.is_monotone:
         lane.course = advance_course(lane.course, lane.sample)
 
 
-def start(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
+def start_meters(parts: Program, lane: Lane, elapsed: float, index: int, interval: float) -> None:
     """Set every meter to its state at the first sample."""
-    make_sample(parts, lane, moment, number, interval)
-    follow_course(parts, lane)
+    sample_with_summary(parts, lane, elapsed, index, interval)
     for group, kind in parts.meter_groups.items():
         lane[group] = kind.start(lane.course, lane.sample)
 
 
-def update(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
-    """Update every meter with one more sample; meters of motion are skipped for a locked vane."""
-    make_sample(parts, lane, moment, number, interval)
-    follow_course(parts, lane)
-    for group, kind in parts.moving_meters.items():
-        lane[group] = kind.update(lane[group], lane.course, lane.sample)
+def update_meters(parts: Program, lane: Lane, elapsed: float, index: int, interval: float) -> None:
+    """Update every meter with one more sample; meters of motion keep their first state for a locked vane."""
+    sample_with_summary(parts, lane, elapsed, index, interval)
+    for group, kind in parts.meter_groups.items():
+        if not (parts.is_locked and kind.of_motion):
+            lane[group] = kind.update(lane[group], lane.course, lane.sample)
 
 
-def trace(parts: Program, lane: Lane, moment: float, number: int, interval: float, slot: int) -> None:
-    """Write the traced channels of the present sample to ``slot``."""
-    make_sample(parts, lane, moment, number, interval)
-    for row, path in parts.traced_paths.items():
-        lane.trace[slot, row] = lane[path]
+def store_trace(parts: Program, lane: Lane, elapsed: float, index: int, interval: float, slot: int) -> None:
+    """Write the traced channels of the present sample to ``slot`` of the ring buffer of traces."""
+    make_sample(parts, lane, elapsed, index, interval)
+    for row, name in enumerate(parts.traced):
+        lane.trace[slot, row] = lane[parts.traces.get(name, name)]

@@ -19,6 +19,7 @@ from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, HANDED
 from ppafo.engine.linking import link_program
 from ppafo.engine.loop_text import LOOP_ARRAYS, LOOP_NUMBERS, lane_loop, run_loop
 from ppafo.engine.program import Program
+from ppafo.engine.replacements import Replacements
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_of, struct_of_numbers
 from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, Further, places_of
@@ -65,7 +66,7 @@ class _ForOneRun(ast.NodeTransformer):
 
 def _collector() -> SourceCollector:
     """Return a collector that also accepts functions applied to columns in Python, specialised for one run."""
-    return SourceCollector(INLINE, for_one_run, links=dict(FOR_ONE_RUN))
+    return SourceCollector(INLINE, for_one_run, replacements=Replacements(everywhere=dict(FOR_ONE_RUN)))
 
 
 LOOP_TYPES: tuple[Type, ...] = (
@@ -95,7 +96,7 @@ def c_text_of_run(
 
     collector = _collector()
     program, structs = exported.program, Structs()
-    link_program(program, collector)
+    link_program(program, collector.replacements)
     entries = [metrics_entry(exported, collector, structs)] if exported.metrics else []
     entries += [add(collector, structs) for add in further]
     steps = _steps_of(exported, collector)
@@ -183,7 +184,7 @@ def composed_library(exported: ExportedProgram, further: Further | None, togethe
     from ppafo.translation.c99 import documents_of
 
     collector = _collector()
-    link_program(exported.program, collector)
+    link_program(exported.program, collector.replacements)
     arrays = Arrays()
     entries = [metrics_entry(exported, collector, arrays), *([] if further is None else [further(collector, arrays)])]
     steps = _steps_of(exported, collector)

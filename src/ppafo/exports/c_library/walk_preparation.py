@@ -54,7 +54,7 @@ from ppafo.walking.preparation import (
     walk_step_counts,
     with_leg,
 )
-from ppafo.walking.task_sequence import flat_foot
+from ppafo.walking.task_sequence_plan import flat_foot
 from ppafo.walking.wearer import WEARER, leg_parameters
 
 _FORCES = ("force_bandwidth", "force_noise", "force_resolution", "lost_share")

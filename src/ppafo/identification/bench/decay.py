@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.source import RecordingSource, check_moves, check_no_gap, window
+from ppafo.identification.bench.checks import check_moves, check_no_gap
+from ppafo.identification.source import RecordingSource, window
 from ppafo.signals import Recording
 from ppafo.signals.faults import is_at_limit, noise_of, plateaus
 from ppafo.signals.recording import Floats

@@ -32,6 +32,20 @@ LINEAR_RATIO = 0.99999
 
 The parameter ``flow.linear_ratio`` of a set belongs to the numerics of the engine, not to a measured opening.
 """
+CRITICAL_RATIOS = 0.2, 0.01, 0.95
+"""Critical ratio of ISO 6358 [-] if it is estimated: start, lowest and highest value."""
+NEXT_LAW: Mapping[Law, str] = {
+    "orifice": "try law = 'both', or for a valve 'iso6358'",
+    "laminar": "try law = 'both'",
+    "iso6358": "try law = 'both'",
+    "both": "neither an orifice nor a laminar gap nor both explain them",
+}
+"""Remedy, by law, if the readings do not fit one opening; the law ``both`` contains each of its parts."""
+
+TEMPERATURE, GAS_LAW, METER, SENSORS = "gas temperature", "gas law", "gain of the flow meter", "gain of the pressures"
+ZERO = "zero of the flow meter"
+APPARENT = "gap that a gain of the flow meter looks like"
+"""Names of the tolerances of a flow bench."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +71,6 @@ class GasAt:
     def flow_per_sonic_conductance(self) -> float:
         """Choked mass flow divided by C and upstream pressure [kg/m^3], rho_0 sqrt(T_0 / T) of ISO 6358-1:2013."""
         return sonic_conductance_mass(1.0, self.specific_gas_constant, self.temperature)
-
-
-TEMPERATURE, GAS_LAW, METER, SENSORS = "gas temperature", "gas law", "gain of the flow meter", "gain of the pressures"
-ZERO = "zero of the flow meter"
-APPARENT = "gap that a gain of the flow meter looks like"
 
 
 def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[FitVariable, ...]:
@@ -181,10 +190,6 @@ class Opening:
         return OpeningSizes(size, ratio, *beside), OpeningSizes(float(alone[0]), ratio, *alone[1:].tolist())
 
 
-CRITICAL_RATIOS = 0.2, 0.01, 0.95
-"""Critical ratio of ISO 6358 [-] if it is estimated: start, lowest and highest value."""
-
-
 class Paths(NamedTuple):
     """Names of the estimated quantities of an opening; an empty name means that the quantity is not estimated."""
 
@@ -236,12 +241,3 @@ def solve_flow(
         *(within(APPARENT, tolerances.gain_of("mass_flow") * alone.beside) if opening.law == "both" else ()),
     )
     return solve(law, readings, numbers, confidence)
-
-
-NEXT_LAW: Mapping[Law, str] = {
-    "orifice": "try law = 'both', or for a valve 'iso6358'",
-    "laminar": "try law = 'both'",
-    "iso6358": "try law = 'both'",
-    "both": "neither an orifice nor a laminar gap nor both explain them",
-}
-"""Remedy, by law, if the readings do not fit one opening; the law ``both`` contains each of its parts."""

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ppafo.identification.bench.checks import check_sources
 from ppafo.identification.bench.decay import (
     ANGLE,
     FEWEST_SMOOTHED,
@@ -30,8 +31,9 @@ from ppafo.identification.bench.decay import (
 )
 from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought, tolerance, within
 from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
+from ppafo.identification.bench.wrong_readings import without_wrong_samples
 from ppafo.identification.residuals import FitVariable
-from ppafo.identification.source import RecordingSource, check_sources, without_wrong_samples
+from ppafo.identification.source import RecordingSource
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel

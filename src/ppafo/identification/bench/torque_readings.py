@@ -6,16 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError
+from ppafo.identification.bench.checks import check_moves, check_not_clipped, check_sources
 from ppafo.identification.bench.law import recordings_of
-from ppafo.identification.source import (
-    RecordingSource,
-    check_moves,
-    check_no_wrong_reading,
-    check_not_alone,
-    check_not_clipped,
-    check_sources,
-    pool,
-)
+from ppafo.identification.bench.wrong_readings import check_no_wrong_reading, check_not_alone
+from ppafo.identification.source import RecordingSource, pool
 from ppafo.signals.recording import Floats
 
 PROCEDURE = "static-torque"

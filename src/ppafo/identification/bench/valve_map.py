@@ -15,11 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.errors import IdentificationError
+from ppafo.identification.bench.checks import check_sources
 from ppafo.identification.bench.flow import GasAt, flow_tolerances, orifice_shape, read_flow, true_pressure
 from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought
 from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
+from ppafo.identification.bench.wrong_readings import check_no_wrong_reading, meter_readings
 from ppafo.identification.residuals import FitVariable
-from ppafo.identification.source import RecordingSource, check_no_wrong_reading, check_sources, meter_readings, pool
+from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.effects.spool_play import spool_position
 from ppafo.report.kind import Kind

@@ -20,6 +20,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from ppafo.errors import IdentificationError
+from ppafo.identification.bench.checks import check_moves, check_no_gap, check_not_clipped, check_sources
 from ppafo.identification.bench.flow import (
     GAS_LAW,
     NEXT_LAW,
@@ -34,19 +35,9 @@ from ppafo.identification.bench.flow import (
 )
 from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought, tolerance, within
 from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
+from ppafo.identification.bench.wrong_readings import check_no_wrong_reading, meter_readings, without_wrong_samples
 from ppafo.identification.residuals import FitVariable
-from ppafo.identification.source import (
-    RecordingSource,
-    check_moves,
-    check_no_gap,
-    check_no_wrong_reading,
-    check_not_clipped,
-    check_sources,
-    meter_readings,
-    pool,
-    window,
-    without_wrong_samples,
-)
+from ppafo.identification.source import RecordingSource, pool, window
 from ppafo.identification.tolerances import DEFAULTS, HELD, Tolerances
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals

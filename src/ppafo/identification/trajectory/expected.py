@@ -11,11 +11,14 @@ from ppafo.identification.noise import Noise, whiten
 from ppafo.identification.residuals import FitRuns
 from ppafo.identification.trajectory.experiment import FITTED_CHANNELS
 from ppafo.identification.trajectory.fitting import TrajectoryFit
-from ppafo.identification.trajectory.numbers import reach_of
+from ppafo.identification.trajectory.numbers import FitNumber, reach_of
 from ppafo.identification.trajectory.runs import FitChannel, columns_in, numbers_in, prepare_samples, signals_at
 from ppafo.progress import report_nothing
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
+
+_WHOLE = 1.0e-6
+"""Fraction of a sample interval [-] by which rounding may shorten the last one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,48 +55,55 @@ def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExper
 
     Raises IdentificationError for a candidate without noise in any channel that can be fitted.
     """
-    return tuple(sorted((_benefit(fit, one) for one in candidates), key=lambda one: -one.gain))
+    benefits = [_benefit(fit, candidate) for candidate in candidates]
+    return tuple(sorted(benefits, key=lambda benefit: -benefit.gain))
 
 
 def _benefit(fit: TrajectoryFit, candidate: CandidateExperiment) -> ExpectedBenefit:
+    """Return the expected benefit of one candidate: its whitened Jacobian, added to the information of the fit."""
     noise = dict(candidate.noise) or dict(fit.fit.noise)
-    if not noise or any(name not in FITTED_CHANNELS or not one > 0.0 for name, one in noise.items()):
+    if not noise or any(name not in FITTED_CHANNELS or not deviation > 0.0 for name, deviation in noise.items()):
         raise IdentificationError(
             f"candidate '{candidate.label}': noise must be above 0 for at least one of {', '.join(FITTED_CHANNELS)}"
         )
     # What belongs to one recording, such as its trigger, another experiment says nothing of.
-    place = [index for index, item in enumerate(fit.numbers) if not item.recordings]
-    acting = [fit.numbers[index] for index in place]
-    point, scale = fit.fit.values[place], np.array([item.free.scale for item in acting])
-    count = math.floor(candidate.scenario.run.duration / candidate.interval + 1.0e-6)
+    common = [index for index, number in enumerate(fit.numbers) if not number.recordings]
+    slopes = _slopes(candidate, noise, [fit.numbers[index] for index in common], fit.fit.values[common])
+    blocks = []
+    for block, (name, deviation) in zip(np.split(slopes, len(noise)), noise.items(), strict=True):
+        sensor = fit.fit.sensors.get(name)
+        blocks.append(whiten(block, replace(sensor, deviation=deviation) if sensor else Noise(deviation)))
+    # In units of today's standard errors, for pascals and radians differ by many powers of ten.
+    errors = np.sqrt(np.diag(fit.fit.covariance))
+    jacobian = np.concatenate(blocks) * errors[common]
+    before = fit.fit.covariance / np.outer(errors, errors)
+    information = np.linalg.inv(before)
+    information[np.ix_(common, common)] += jacobian.T @ jacobian
+    after = np.linalg.inv(information)
+    unknowns = [index for index, number in enumerate(fit.numbers) if not number.is_tolerance]
+    shrinkage = {fit.numbers[index].free.name: math.sqrt(max(after[index, index], 0.0)) for index in unknowns}
+    rows = np.ix_(unknowns, unknowns)
+    gain = 0.5 * float(np.linalg.slogdet(before[rows])[1] - np.linalg.slogdet(after[rows])[1])
+    return ExpectedBenefit(candidate.label, gain, shrinkage, min(shrinkage, key=lambda name: shrinkage[name]))
+
+
+def _slopes(
+    candidate: CandidateExperiment, noise: Mapping[str, float], numbers: Sequence[FitNumber], point: Floats
+) -> Floats:
+    """Return the Jacobian [SI] (samples of all channels, numbers) of the samples of a candidate at a point [SI]."""
+    count = math.floor(candidate.scenario.run.duration / candidate.interval + _WHOLE)
     times = candidate.interval * np.arange(count + 1, dtype=np.float64)
     channels = [FitChannel(name, np.zeros(times.size)) for name in noise]
-    given = numbers_in("", acting, point)
-    prepared = prepare_samples(candidate.label, candidate.scenario, times, channels, reach_of(acting), given)
+    values = numbers_in("", numbers, point)
+    prepared = prepare_samples(candidate.label, candidate.scenario, times, channels, reach_of(numbers), values)
 
     def samples(points: Floats) -> Floats:
-        signals = signals_at(prepared, columns_in("", acting, points), points.shape[1])
+        signals = signals_at(prepared, columns_in("", numbers, points), points.shape[1])
         return np.concatenate([signals[name] for name in noise])
 
-    work = FitRuns(samples, tuple(item.free for item in acting), (), report_nothing, 0, is_motion=True)
-    weight = 1.0 / np.repeat(list(noise.values()), times.size)
+    runs = FitRuns(samples, tuple(number.free for number in numbers), (), report_nothing, 0, is_motion=True)
     with refused_as(IdentificationError, f"candidate '{candidate.label}'", IdentificationError):
-        # As in the fit, the second differences are as long as changes the samples by three units of noise in all.
-        *_, slopes = (work.jacobian(point / scale, weight) for _ in range(2))
-    rows = []
-    for own, (name, deviation) in zip(np.split(slopes / scale, len(noise)), noise.items(), strict=True):
-        known = fit.fit.sensors.get(name)
-        rows.append(whiten(own, replace(known, deviation=deviation) if known else Noise(deviation)))
-    whole = fit.fit.covariance
-    sizes = np.sqrt(np.diag(whole))
-    jacobian = np.concatenate(rows) * sizes[place]
-    before = whole / np.outer(sizes, sizes)
-    # In units of today's standard errors, for pascals and radians differ by many powers of ten.
-    information = np.linalg.inv(before)
-    information[np.ix_(place, place)] += jacobian.T @ jacobian
-    after = np.linalg.inv(information)
-    sought = [index for index, item in enumerate(fit.numbers) if not item.is_tolerance]
-    shrinkage = {fit.numbers[index].free.name: math.sqrt(max(after[index, index], 0.0)) for index in sought}
-    part = np.ix_(sought, sought)
-    gain = 0.5 * float(np.linalg.slogdet(before[part])[1] - np.linalg.slogdet(after[part])[1])
-    return ExpectedBenefit(candidate.label, gain, shrinkage, min(shrinkage, key=lambda name: shrinkage[name]))
+        # As in the fit, a difference is as long as changes the samples by three units of noise in all.
+        weight = 1.0 / np.repeat(list(noise.values()), times.size)
+        runs.adapt_steps(runs.jacobian(point / runs.scale), weight)
+        return np.asarray(runs.jacobian(point / runs.scale) / runs.scale)

@@ -1,130 +1,35 @@
-"""Checks of torques, damping, friction and inertia against each other and publications. Equations (1), (2), (10)."""
+"""Checks of the torques of an actuator: largest one at the supply, vacuum, published torques. Equation (2)."""
 
 import math
 from collections.abc import Iterator
 
-from ppafo.errors import ParameterError, UnitError
+from ppafo.errors import ParameterError
 from ppafo.model.gas import choked_flow_constant
 from ppafo.model.orifice import isentropic_flow_function
-from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, ReportedRange, Severity
+from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, Severity
 from ppafo.parameters.device import VANE, Gas
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.reach import torque_reach
 from ppafo.units import from_si, to_si
 from ppafo.units.shown import shown_in, shown_unit
 
-# Do damping and dynamic friction agree with the inertia and the reported ratios they were computed from?
-
-_INERTIA = "foot_plate.inertia"
-_DAMPING = "friction.viscous_damping"
-_FRICTION = "friction.dynamic_torque"
-_DECAY = "reported.acceleration_over_velocity"
-_DECAY_INVERSE = "reported.velocity_over_acceleration"
-_DECELERATION = "reported.stopping_deceleration"
-# Powers of ten by which a slipped decimal point or a prefix changes a number.
-_SHIFTS = (-3, -2, -1, 1, 2, 3)
-
-
-def check_inertia(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for each product that does not hold, and a note on a single inertia for which both would hold."""
-    inertia = evidence.magnitude(_INERTIA)
-    decay_path, decay = _decay_rate(evidence)
-    if inertia is None:
-        return
-    agreeing = []
-    for product, rate_path, rate, name in (
-        (_DAMPING, decay_path, decay, "damping"),
-        (_FRICTION, _DECELERATION, evidence.magnitude(_DECELERATION), "dynamic friction"),
-    ):
-        reported = evidence.magnitude(product)
-        if reported is None or rate is None or inertia.times(rate).meets(reported):
-            continue
-        agreeing.append(reported.over(rate))
-        given, number = evidence.number(_INERTIA) or 0.0, evidence.number(product) or 0.0
-        expected, needed = given * _middle(rate), number / _middle(rate)
-        ratio, unit = evidence.values_of(rate_path)[0], evidence.declared[product].unit
-        yield AuditFinding(
-            id=f"{name.replace(' ', '-')}-against-inertia",
-            severity="error",
-            title=f"{name} is not the product of inertia and the reported ratio",
-            values=evidence.values_of(product, _INERTIA, rate_path),
-            sides=(
-                ComparedNumber(f"reported {name}", number, unit),
-                ComparedNumber("inertia times ratio", expected, unit),
-                ComparedNumber("inertia that would agree", needed, "kg m^2"),
-            ),
-            paragraph=(
-                f"Inertia {evidence.in_set_unit(_INERTIA, given)} times {abs(float(ratio.value)):g} {ratio.unit} is "
-                f"{evidence.in_set_unit(product, expected)}, reported is {evidence.in_set_unit(product, number)}: "
-                f"a factor {number / expected:.3g}. Would be consistent with an inertia of "
-                f"{evidence.in_set_unit(_INERTIA, needed)}, or with {evidence.in_set_unit(product, expected)} as the "
-                f"{name}."
-            ),
-        )
-    # One inertia can be tested only where both products disagree with the reported one.
-    if len(agreeing) > 1:
-        yield from _one_inertia(evidence, agreeing[0], agreeing[1], decay_path)
-
-
-def _decay_rate(evidence: Evidence) -> tuple[str, ReportedRange | None]:
-    """Return beta/I [1/s] and its path, from the ratio or its inverse; an inverse given in 1/s is the ratio."""
-    direct = evidence.magnitude(_DECAY)
-    inverse = evidence.magnitude(_DECAY_INVERSE)
-    if direct is not None or inverse is None:
-        return _DECAY, direct
-    try:
-        to_si(1.0, evidence.parameter_set.numbers[_DECAY_INVERSE].unit, "s")
-    except UnitError:
-        return _DECAY_INVERSE, inverse
-    return _DECAY_INVERSE, ReportedRange(1.0, 1.0).over(inverse)
-
-
-def _middle(interval: ReportedRange) -> float:
-    return 0.5 * (interval.low + interval.high)
-
-
-def _one_inertia(
-    evidence: Evidence, damping: ReportedRange, friction: ReportedRange, decay_path: str
-) -> Iterator[AuditFinding]:
-    """Search an inertia that fits both products within their digits, first the reported one with a shifted point."""
-    if not damping.meets(friction):
-        return
-    common = ReportedRange(max(damping.low, friction.low), min(damping.high, friction.high))
-    reported = evidence.number(_INERTIA) or 0.0
-    shifted = [reported * 10.0**shift for shift in _SHIFTS if common.low <= reported * 10.0**shift <= common.high]
-    # A moved decimal point is the likeliest slip; else the middle of what both allow.
-    best = shifted[0] if shifted else _middle(common)
-    written = evidence.in_set_unit(_INERTIA, best)
-    slip = (
-        f" {written} is the reported {evidence.in_set_unit(_INERTIA, reported)} with the decimal point moved: "
-        "either the inertia or both products carry the slip, and only a weighing can tell which."
-        if shifted
-        else ""
-    )
-    yield AuditFinding(
-        id="one-inertia-for-both",
-        severity="note",
-        title=f"damping and dynamic friction both agree with an inertia of {written}",
-        values=evidence.values_of(_INERTIA, _DAMPING, _FRICTION, decay_path, _DECELERATION),
-        sides=(
-            ComparedNumber("reported inertia", reported, "kg m^2"),
-            ComparedNumber("reconciling inertia", best, "kg m^2"),
-            ComparedNumber("lowest that agrees", common.low, "kg m^2"),
-            ComparedNumber("highest that agrees", common.high, "kg m^2"),
-        ),
-        paragraph=(
-            f"Within the reported digits both products hold for any inertia from "
-            f"{evidence.in_set_unit(_INERTIA, common.low)} to {evidence.in_set_unit(_INERTIA, common.high)}.{slip}"
-        ),
-    )
-
-
-# What is the largest torque at this supply, and is it enough? Equation (2).
-
 _TORQUE_CONSTANT = "actuator.torque_constant"
 _DEMAND = "reported.demanded_torque"
 _STATIC = "friction.static_torque"
 _SUPPLIES = ("supply.pressure", "supply.dorsiflexion_pressure", "reported.other_supply_pressure")
+_TOLERANCE = 0.1
+"""Relative tolerance of a torque published with one or two digits."""
+_REACHED = 0.9
+"""Fraction of the torque that defines the filling time; the final value is approached asymptotically."""
+_PUSH_OFF = 0.2
+"""Time [s] of push-off: from 42 to 61 % of the built-in gait's stride of 1.04 s."""
+_TOE_OFF = math.radians(110.0)
+"""Angle [rad] of the vane at toe-off: 20 deg of plantarflexion."""
+_INTERVALS = 200
+"""Number of pressure intervals in which a filling time is summed up."""
+_ANGLES = 40
+"""Number of intervals between the stops in which the torque of an actuator is evaluated."""
+_LIMIT = "A reference above that cannot be followed by any valve or controller."
 
 
 def check_torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
@@ -142,7 +47,7 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
         unit = shown_unit("Pa_d")
     per_unit = evidence.torque(constant * to_si(1.0, unit, "Pa_d"), "#.3g")
     pressures = {path: evidence.in_set_unit(path, value) for path, value in supplies.items()}
-    held = (f"{evidence.torque(ceilings[path], '#.3g')} at {pressures[path]} ({path})" for path in supplies)
+    torques = (f"{evidence.torque(ceilings[path], '#.3g')} at {pressures[path]} ({path})" for path in supplies)
     yield AuditFinding(
         id="torque-ceiling",
         severity=severity,
@@ -151,7 +56,7 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
         sides=tuple(ComparedNumber(f"ceiling at {path}", value, "N m") for path, value in ceilings.items()),
         paragraph=(
             f"The torque constant is {per_unit}/{unit.removesuffix('_d')}. With one chamber at supply and "
-            f"the other at atmosphere the vane gives {', '.join(held)}, before friction.{verdict}"
+            f"the other at atmosphere the vane gives {', '.join(torques)}, before friction.{verdict}"
         ),
     )
 
@@ -163,7 +68,7 @@ def check_vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
         if entry is None or pressure is None or not 0.0 < pressure < evidence.atmosphere():
             continue
         depth, chamber = evidence.atmosphere() - pressure, 1 if path == _SUPPLIES[0] else 2
-        way = "lowers" if chamber == 1 else "raises"
+        effect = "lowers" if chamber == 1 else "raises"
         doubt = f" If {entry.value:g} {entry.unit} was read from a gauge, write '_g' for '_a'."
         yield AuditFinding(
             id=f"vacuum-{chamber}",
@@ -173,7 +78,7 @@ def check_vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
             sides=(ComparedNumber("depth of the vacuum", depth, "Pa"),),
             paragraph=(
                 f"A valve that joins chamber {chamber} to it draws its gas out, and the room fills it again: that "
-                f"{way} the torque.{doubt if entry.unit.endswith('_a') else ''}"
+                f"{effect} the torque.{doubt if entry.unit.endswith('_a') else ''}"
             ),
         )
 
@@ -187,39 +92,36 @@ def _ceiling_by_angle(evidence: Evidence) -> Iterator[AuditFinding]:
     except ParameterError:
         return
     chambers = "its chamber at supply or" if device.actuator.has_one_chamber else "one chamber at supply and the other"
-    stops = float(device.actuator.angle_min), float(device.actuator.angle_max)
-    angles = [stops[0] + (stops[1] - stops[0]) * number / _PLACES for number in range(_PLACES + 1)]
-    reaches = [torque_reach(device, angle) for angle in angles]
+    lowest, highest = float(device.actuator.angle_min), float(device.actuator.angle_max)
+    angles = [lowest + (highest - lowest) * number / _ANGLES for number in range(_ANGLES + 1)]
+    downward, upward = zip(*(torque_reach(device, angle) for angle in angles), strict=True)
     texts, sides, ceiling = [], [], 0.0
-    for way, place in (("up", 1), ("down", 0)):
-        torques = [reach[place] if place else -reach[place] for reach in reaches]
-        most, least = max(torques), min(torques)
-        at = math.degrees(angles[torques.index(most)])
+    for direction, torques in (("up", list(upward)), ("down", [-torque for torque in downward])):
+        largest = max(torques)
+        angle = math.degrees(angles[torques.index(largest)])
         texts.append(
-            f"{evidence.torque(most, '#.3g')} {way} at {at:.3g} deg, and {evidence.torque(least, '#.3g')} at least"
+            f"{evidence.torque(largest, '#.3g')} {direction} at {angle:.3g} deg, and "
+            f"{evidence.torque(min(torques), '#.3g')} at least"
         )
-        sides.append(ComparedNumber(f"most {way}", most, "N m"))
-        ceiling = max(ceiling, most)
+        sides.append(ComparedNumber(f"most {direction}", largest, "N m"))
+        ceiling = max(ceiling, largest)
     static = evidence.number(_STATIC)
-    holds = static is not None and static >= ceiling
+    sticks = static is not None and static >= ceiling
     yield AuditFinding(
         id="torque-ceiling",
-        severity="error" if holds else "note",
+        severity="error" if sticks else "note",
         title=f"the supply allows at most {evidence.torque(ceiling, '#.3g')}",
         values=evidence.values_of(*_SUPPLIES, _STATIC),
         sides=tuple(sides),
         paragraph=(
             f"With {chambers} at atmosphere the actuator gives {' and '.join(texts)}, before friction. "
-            f"{'Static friction is more: the joint cannot move.' if holds else _ABOVE}"
+            f"{'Static friction is more: the joint cannot move.' if sticks else _LIMIT}"
         ),
     )
 
 
-_PLACES = 40
-_ABOVE = "A reference above that cannot be followed by any valve or controller."
-
-
 def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Severity, str]:
+    """Return severity and sentence on a torque ceiling [N m] of a vane with a torque constant [N m/Pa]."""
     static, demand = evidence.number(_STATIC), evidence.number(_DEMAND)
     with shown_in(evidence.parameter_set.shown):
         unit = shown_unit("Pa_d")
@@ -232,20 +134,7 @@ def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Sever
             f" The requested {evidence.torque(demand)} lie above it, so that every valve and controller keeps an "
             f"error of {evidence.torque(demand - ceiling)}; it would take {needed} of supply, or a smaller request."
         )
-    return "note", " A reference above that cannot be followed by any valve or controller."
-
-
-# Does the set give the torques that other publications report of the device, at rest and within one push-off?
-
-_ROOM = 0.1
-"""Relative tolerance of a torque published with one or two digits."""
-_REACHED = 0.9
-"""Fraction of the torque that defines the filling time; the final value is approached asymptotically."""
-_PUSH_OFF = 0.2
-"""Time [s] of push-off: from 42 to 61 % of the built-in gait's stride of 1.04 s."""
-_TOE_OFF = math.radians(110.0)
-"""Angle [rad] of the vane at toe-off: 20 deg of plantarflexion."""
-_PARTS = 200
+    return "note", f" {_LIMIT}"
 
 
 def check_published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
@@ -260,19 +149,19 @@ def check_published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
             continue
         constant, torque, pressure = numbers
         note = evidence.parameter_set.numbers[paths[0]].note
-        held = constant * (pressure - evidence.atmosphere())
-        agrees = abs(held / torque - 1.0) <= _ROOM
+        at_rest = constant * (pressure - evidence.atmosphere())
+        agrees = abs(at_rest / torque - 1.0) <= _TOLERANCE
         yield AuditFinding(
             id=f"{name}-torque",
             severity="note" if agrees else "warning",
             title=f"the published {name} torque {'agrees' if agrees else 'does not agree'} with the torque constant",
             values=evidence.values_of(_TORQUE_CONSTANT, *paths),
             sides=(
-                ComparedNumber("torque constant times pressure", held, "N m"),
+                ComparedNumber("torque constant times pressure", at_rest, "N m"),
                 ComparedNumber("published", torque, "N m"),
             ),
             paragraph=(
-                f"At {evidence.in_set_unit(paths[1], pressure)} the vane gives {evidence.torque(held)}, published "
+                f"At {evidence.in_set_unit(paths[1], pressure)} the vane gives {evidence.torque(at_rest)}, published "
                 f"are {evidence.torque(torque)}. This speaks of the torque constant alone: "
                 f"a vane at rest has any volume. {note}"
             ).rstrip(),
@@ -312,9 +201,9 @@ def _while_walking(evidence: Evidence, torque: float, pressure: float) -> Iterat
 
 def _filling_time(gas: Gas, volume: float, area: float, pressures: tuple[float, float, float]) -> float:
     """Return the time [s] to fill a fixed volume [m^3] through Cd A [m^2]; pressures [Pa]: from, to, supply."""
-    first, last, supply = pressures
+    initial, final, supply = pressures
     choked = area * choked_flow_constant(gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature) * supply
-    part = (last - first) / _PARTS
-    middles = (first + (number + 0.5) * part for number in range(_PARTS))
-    paces = (1.0 / isentropic_flow_function(middle / supply, gas.heat_capacity_ratio) for middle in middles)
-    return volume * part * sum(paces) / (gas.specific_gas_constant * gas.temperature * choked)
+    interval = (final - initial) / _INTERVALS
+    middles = (initial + (number + 0.5) * interval for number in range(_INTERVALS))
+    slowings = (1.0 / isentropic_flow_function(middle / supply, gas.heat_capacity_ratio) for middle in middles)
+    return volume * interval * sum(slowings) / (gas.specific_gas_constant * gas.temperature * choked)

@@ -15,7 +15,7 @@ from ppafo.model.controlled import CONTROLLED
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.check import MARGIN, finer
 from ppafo.simulation.ensemble.columns import check_columns
-from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
+from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.ensemble.running import MeteredRuns, OutputRequest, intervals, offered
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import REMEDY
@@ -91,32 +91,38 @@ def run_ensemble(
         longest = max(float((intervals(batch) * (batch.clock.samples - 1)).max()) for _, batch in plan.batches)
         times = np.arange(int(longest / interval * (1.0 + _ROUNDING)) + 1, dtype=np.float64) * interval
     request = OutputRequest(metrics, tuple(dict.fromkeys(bands)), interval, times, base.controller.custom)
-    outcome = MeteredRuns(checked.runs, request)
-    outcome.run_all(plan.batches, threads)
+    runs = MeteredRuns(checked.runs, request)
+    runs.run_all(plan.batches, threads)
     estimated = {}
     if errors:
         # For the metrics alone: nobody asks for the error of a trace.
-        alone = OutputRequest(metrics, (), interval, np.empty(0), base.controller.custom)
-        fine = MeteredRuns(checked.runs, alone)
+        metrics_alone = OutputRequest(metrics, (), interval, np.empty(0), base.controller.custom)
+        fine = MeteredRuns(checked.runs, metrics_alone)
         fine.run_all(plan_ensemble(checked, finer).batches, threads)
-        for name, values in outcome.metrics.items():
+        for name, values in runs.metrics.items():
             # Where the finer run has no value this one may be wrong by anything; without a value it has no error.
             changes = np.where(np.isfinite(fine.metrics[name]), np.abs(fine.metrics[name] - values), np.inf)
             estimated[name] = np.where(np.isfinite(values), MARGIN * changes, np.nan)
-    return _result(plan, outcome, estimated)
+    return _ensemble_result(runs, plan.reasons, estimated)
 
 
-def _result(plan: EnsemblePlan, outcome: MeteredRuns, errors: dict[str, Floats]) -> EnsembleResult:
-    status = np.where(outcome.is_completed, COMPLETED, DIVERGED).astype(np.int8)
+def _ensemble_result(runs: MeteredRuns, refusals: Mapping[int, str], errors: dict[str, Floats]) -> EnsembleResult:
+    """Result of an ensemble; ``refusals`` map the index of each refused run to the reason."""
+    status = np.where(runs.is_completed, COMPLETED, DIVERGED).astype(np.int8)
     # Runs that were refused are in no batch, so that until here they count as diverged.
-    status[list(plan.reasons)] = REFUSED
-    reasons = dict(plan.reasons)
+    status[list(refusals)] = REFUSED
+    reasons = dict(refusals)
     for run in np.flatnonzero(status == DIVERGED).tolist():
-        remedy = TOO_MANY_PARTS if outcome.too_many_parts[run] else REMEDY
-        reasons[run] = f"diverged at t = {outcome.failure_time[run]:.6g} s; {remedy}"
-    times = outcome.request.times
+        remedy = TOO_MANY_PARTS if runs.too_many_parts[run] else REMEDY
+        reasons[run] = f"diverged at t = {runs.failure_time[run]:.6g} s; {remedy}"
     return EnsembleResult(
-        status, outcome.failure_time, dict(sorted(reasons.items())), outcome.metrics, times, outcome.traces, errors
+        status=status,
+        failure_time=runs.failure_time,
+        reasons=dict(sorted(reasons.items())),
+        metrics=runs.metrics,
+        times=runs.request.times,
+        traces=runs.traces,
+        errors=errors,
     )
 
 

@@ -11,9 +11,9 @@ from ppafo.errors import ScenarioError
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.parameters.overrides import either, in_two_forms, one_path
+from ppafo.parameters.overrides import either, in_two_forms
 from ppafo.simulation.declaration import TEXTS, WALL_AREA
-from ppafo.simulation.numbers import ORIFICES, declared_numbers, moving_together, other_form
+from ppafo.simulation.numbers import ORIFICES, chosen_path, declared_numbers, moving_together, other_form
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import nearest_name
 
@@ -58,16 +58,16 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
         raise ScenarioError(f"{base.name}: has no controller; give one with controlled_by")
     # Effects of other packages are known by their paths once they are loaded.
     find_effects(columns)
-    # valve.area and valves.NAME.area are one number of the chosen valve.
-    paths = {given: one_path(given, base.device.valve_name) for given in columns}
     declared = declared_numbers(base)
     values: dict[str, Floats] = {}
-    for given, path in paths.items():
+    for typed, column in columns.items():
+        # valve.area and valves.NAME.area are one number of the chosen valve.
+        path = chosen_path(typed, base)
         if path not in declared:
-            raise ScenarioError(f"{base.name}: {_why_not(base, given, path, declared)}")
+            raise ScenarioError(f"{base.name}: {_why_not(base, typed, path, declared)}")
         if path in values:
-            raise ScenarioError(f"{base.name}: '{given}' and '{path}' are the same value; give one of them")
-        values[path] = np.ascontiguousarray(columns[given], dtype=np.float64)
+            raise ScenarioError(f"{base.name}: '{typed}' and '{path}' are the same value; give one of them")
+        values[path] = np.ascontiguousarray(column, dtype=np.float64)
     shapes = {path: column.shape for path, column in values.items()}
     if len(set(shapes.values())) != 1 or any(len(shape) != 1 or shape[0] == 0 for shape in shapes.values()):
         raise ScenarioError(
@@ -87,8 +87,8 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
     gas, heat_varies = base.gas_model, "gas_model.heat_transfer_coefficient" in values
     if heat_varies and WALL_AREA not in values and gas is not None and gas.wall_area_per_volume == 0.0:
         raise ScenarioError(f"{base.name}: its heat transfer varies, and '{WALL_AREA}' is 0: give the area")
-    every = moving_together(base, absolute(base, values, gauge))
-    return ScenarioColumns(base, every, {path: declared[path] for path in every}, frozenset(values))
+    varied = moving_together(base, absolute(base, values, gauge))
+    return ScenarioColumns(base, varied, {path: declared[path] for path in varied}, frozenset(values))
 
 
 def absolute(base: Scenario, columns: Mapping[str, Floats], gauge: Collection[str]) -> dict[str, Floats]:
@@ -97,14 +97,14 @@ def absolute(base: Scenario, columns: Mapping[str, Floats], gauge: Collection[st
     return {path: column + atmosphere if path in gauge else column for path, column in columns.items()}
 
 
-def _why_not(base: Scenario, given: str, path: str, declared: Mapping[str, Quantity]) -> str:
+def _why_not(base: Scenario, typed: str, path: str, declared: Mapping[str, Quantity]) -> str:
     """Return the reason why a path of an ensemble names no number that can vary."""
     if path in _TEXTS:
-        return f"'{given}' is a text and cannot vary; run an ensemble for each value"
+        return f"'{typed}' is a text and cannot vary; run an ensemble for each value"
     if base.controller.is_outside and path.startswith("controller."):
         return (
-            f"'{given}' cannot vary: a Python object has no declared settings; "
+            f"'{typed}' cannot vary: a Python object has no declared settings; "
             "a module with a KIND has them (docs/how-to/extend.md)"
         )
     hint = nearest_name(path, declared) or f"; for example {', '.join(list(declared)[:6])}"
-    return f"there is no number '{given}' that could vary{hint}"
+    return f"there is no number '{typed}' that could vary{hint}"

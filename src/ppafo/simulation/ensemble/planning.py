@@ -1,7 +1,7 @@
 """Planning of an ensemble: batches of columns with one program and one clock; contradictory runs are refused."""
 
 import operator
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -22,6 +22,9 @@ from ppafo.simulation.motion_kind import RunTimes
 from ppafo.simulation.numbers import WHOLE_NUMBERS, declared_numbers, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_text
+
+_SHAPE = ("angle_min", "angle_max", "dead_volume_1", "dead_volume_2")
+"""Numbers of an actuator that have to fit its settings."""
 
 
 @dataclass(slots=True)
@@ -53,46 +56,46 @@ class ValidRuns:
             self._scenario = scenario
         return self._scenario
 
-    def at(self, places: Members) -> "ValidRuns":
-        """Return the subset of runs at ``places``, which shares ``reasons``."""
+    def subset(self, indices: Members) -> "ValidRuns":
+        """Return the runs at ``indices`` among the remaining ones, with the same ``reasons``."""
         clock = self.clock
         if clock is not None:
             times = clock.duration, clock.step, clock.output_interval, clock.period
-            kept: list[Any] = [time[places] if isinstance(time, np.ndarray) else time for time in times]
-            clock = RunTimes(*kept)
-        values = {path: column[places] for path, column in self.columns.values.items()}
-        return ValidRuns(replace(self.columns, values=values), self.members[places], self.reasons, clock)
+            selected: list[Any] = [time[indices] if isinstance(time, np.ndarray) else time for time in times]
+            clock = RunTimes(*selected)
+        values = {path: column[indices] for path, column in self.columns.values.items()}
+        return ValidRuns(replace(self.columns, values=values), self.members[indices], self.reasons, clock)
 
     def refuse(self, is_bad: Any, line: Callable[[int], str]) -> None:
-        """Drop runs by a mask over the remaining ones, or all by one truth value; ``line(place)`` gives the reason."""
+        """Drop runs by a mask over the remaining ones, or all by one truth value; ``line(index)`` gives the reason."""
         bad = np.broadcast_to(np.asarray(is_bad, dtype=bool), self.members.shape)
         if not bad.any():
             return
-        for place in np.flatnonzero(bad):
-            self.reasons[int(self.members[place])] = line(int(place))
-        left = self.at(np.flatnonzero(~bad))
-        self.members, self.columns, self.clock, self._scenario = left.members, left.columns, left.clock, None
+        for index in np.flatnonzero(bad):
+            self.reasons[int(self.members[index])] = line(int(index))
+        valid = self.subset(np.flatnonzero(~bad))
+        self.members, self.columns, self.clock, self._scenario = valid.members, valid.columns, valid.clock, None
 
 
 def screen_columns(columns: ScenarioColumns) -> ValidRuns:
     """Runs whose values are in range and consistent."""
-    screen = ValidRuns(columns, np.arange(columns.runs), {})
+    valid = ValidRuns(columns, np.arange(columns.runs), {})
     for path in columns.values:
         # A default that follows others goes where they lead it, as it does in a single run.
         if path in columns.given or not columns.declared[path].follows:
-            screen.refuse(*_out_of_range(screen.columns, path))
-    times = {path: column for path, column in screen.columns.values.items() if path in TIMES}
-    if times and screen.members.size:
-        screen.clock, problems = columns.base.motion.motion_kind.clock(columns.base, times)
+            valid.refuse(*_out_of_range(valid.columns, path))
+    times = {path: column for path, column in valid.columns.values.items() if path in TIMES}
+    if times and valid.members.size:
+        valid.clock, problems = columns.base.motion.motion_kind.clock(columns.base, times)
         for is_bad, line in problems:
-            screen.refuse(is_bad, line)
+            valid.refuse(is_bad, line)
     # After each problem that some runs have, the others are checked again: their numbers may have fewer.
-    while screen.members.size:
-        found = next((problem for problem in _contradictory_numbers(screen.scenario) if np.any(problem[0])), None)
-        if found is None:
+    while valid.members.size:
+        problem = _first_problem(_contradictory_numbers(valid.scenario))
+        if problem is None:
             break
-        screen.refuse(*found)
-    return screen
+        valid.refuse(*problem)
+    return valid
 
 
 def _out_of_range(columns: ScenarioColumns, path: str) -> Problem:
@@ -100,12 +103,13 @@ def _out_of_range(columns: ScenarioColumns, path: str) -> Problem:
     unit = quantity.unit
 
     def line(run: int) -> str:
-        said = f"{path} = {values[run]:.9g} {unit}".rstrip()
-        if not np.isfinite(values[run]):
-            return f"{said}: is not a finite number"
-        if path in WHOLE_NUMBERS and values[run] != np.floor(values[run]):
-            return f"{said}: must be a whole number"
-        return f"{said}: {range_rule(quantity, unit)}"
+        value = values[run]
+        written = f"{path} = {value:.9g} {unit}".rstrip()
+        if not np.isfinite(value):
+            return f"{written}: is not a finite number"
+        if path in WHOLE_NUMBERS and value != np.floor(value):
+            return f"{written}: must be a whole number"
+        return f"{written}: {range_rule(quantity, unit)}"
 
     is_good = np.isfinite(values) & is_within(values, quantity)
     if path in WHOLE_NUMBERS:
@@ -123,25 +127,25 @@ class EnsemblePlan:
 
 def plan_ensemble(columns: ScenarioColumns, change: Callable[[Run], Run] | None = None) -> EnsemblePlan:
     """Batches of all valid runs; rows are bit for bit as from ``plan_run`` for one run, with ``change`` applied."""
-    screen = screen_columns(columns)
+    valid = screen_columns(columns)
     batches: list[tuple[Members, Batch]] = []
-    for places in _of_one_program(screen.scenario, screen.members.size) if screen.members.size else ():
-        part = screen.at(places)
-        while part.members.size:
-            run, problems = part.scenario.motion.motion_kind.plan(part.scenario)
-            bad = next((problem for problem in problems if np.any(problem[0])), None)
-            if bad is None:
+    for indices in _groups_of_one_program(valid.scenario, valid.members.size) if valid.members.size else ():
+        group = valid.subset(indices)
+        while group.members.size:
+            run, problems = group.scenario.motion.motion_kind.plan(group.scenario)
+            problem = _first_problem(problems)
+            if problem is None:
                 run = run if change is None else change(run)
-                batches += [(part.members[members], batch) for members, batch in batches_of(run, part.members.size)]
+                batches += [(group.members[members], batch) for members, batch in batches_of(run, group.members.size)]
                 break
-            part.refuse(*bad)
-    return EnsemblePlan(tuple(batches), screen.reasons)
+            group.refuse(*problem)
+    return EnsemblePlan(tuple(batches), valid.reasons)
 
 
-def _of_one_program(scenario: Scenario, runs: int) -> list[Members]:
+def _groups_of_one_program(scenario: Scenario, runs: int) -> list[Members]:
     """Indices of the runs, grouped by program: the same effects, and zeros in the same settings."""
-    own = scenario.motion.motion_kind.switches(scenario)
-    settings: tuple[Any, ...] = (*scenario.device.valve.settings.values(), *own)
+    of_motion = scenario.motion.motion_kind.switches(scenario)
+    settings: tuple[Any, ...] = (*scenario.device.valve.settings.values(), *of_motion)
     varied_settings = [setting > 0.0 for setting in settings if isinstance(setting, np.ndarray)]
     varied_settings += [is_on for is_on in switches_of(scenario.device).values() if isinstance(is_on, np.ndarray)]
     if not varied_settings:
@@ -151,6 +155,11 @@ def _of_one_program(scenario: Scenario, runs: int) -> list[Members]:
     for setting in varied_settings:
         patterns = 2 * patterns + setting
     return [np.flatnonzero(patterns == pattern) for pattern in np.unique(patterns)]
+
+
+def _first_problem(problems: Iterable[Problem]) -> Problem | None:
+    """First problem that any run has; None if no run has one."""
+    return next((problem for problem in problems if np.any(problem[0])), None)
 
 
 def _contradictory_numbers(scenario: Scenario) -> Iterator[Problem]:
@@ -167,11 +176,11 @@ def _contradictory_numbers(scenario: Scenario) -> Iterator[Problem]:
         return
 
     def line_of_regulator(run: int) -> str:
-        first, second = (
+        supplied, dorsiflexion = (
             shown_text(at(pressure, run), "Pa_a", atmosphere=at(supply.atmospheric_pressure, run))
             for pressure in (supply.pressure, supply.dorsiflexion_pressure)
         )
-        return f"supply.dorsiflexion_pressure = {second}: with [supply_line] at most supply.pressure, {first}"
+        return f"supply.dorsiflexion_pressure = {dorsiflexion}: with [supply_line] at most supply.pressure, {supplied}"
 
     yield np.atleast_1d(supply.dorsiflexion_pressure > supply.pressure), line_of_regulator
 
@@ -190,24 +199,17 @@ def _misshapen(scenario: Scenario) -> tuple[Problem, ...]:
     actuator = scenario.device.actuator
     if ACTUATORS[actuator.kind].problem is None and actuator.table is None:
         return ()
-    stops = actuator.angle_min, actuator.angle_max, actuator.dead_volume_1, actuator.dead_volume_2
-    varied: list[Any] = [value for value in (*stops, *actuator.settings.values()) if isinstance(value, np.ndarray)]
+    numbers: list[Any] = [*(getattr(actuator, name) for name in _SHAPE), *actuator.settings.values()]
+    varied = [value for value in numbers if isinstance(value, np.ndarray)]
     if not varied:
         return ()
 
-    def words(run: int) -> str:
-        low, high, dead_1, dead_2 = (at(value, run) for value in stops)
-        alone = replace(
-            actuator,
-            angle_min=low,
-            angle_max=high,
-            dead_volume_1=dead_1,
-            dead_volume_2=dead_2,
-            settings={name: at(value, run) for name, value in actuator.settings.items()},
-        )
-        problem = actuator_problem(alone)
+    def problem_of(run: int) -> str:
+        numbers: dict[str, Any] = {name: at(getattr(actuator, name), run) for name in _SHAPE}
+        settings = {name: at(value, run) for name, value in actuator.settings.items()}
+        problem = actuator_problem(replace(actuator, **numbers, settings=settings))
         return f"actuator: {problem}" if problem else ""
 
     # A kind checks single numbers, so the runs are gone through one by one.
-    problems = [words(run) for run in range(varied[0].size)]
+    problems = [problem_of(run) for run in range(varied[0].size)]
     return ((np.array([bool(line) for line in problems]), lambda run: problems[run]),)

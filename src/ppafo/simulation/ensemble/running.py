@@ -20,7 +20,8 @@ from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Scenario
 
-_SAME = 1.0e-6
+_SAME_INTERVAL = 1.0e-6
+"""Relative difference up to which two intervals count as the same [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +66,7 @@ class MeteredRuns:
         states = np.empty_like(batch.states)
         read_from_traces = {name: np.full(members.size, np.nan) for name, kind in task.metrics.items() if kind.traced}
 
-        def take(runs: slice, result: BatchResult) -> None:
+        def store(runs: slice, result: BatchResult) -> None:
             states[:, runs] = result.states
             for name, values in read_from_traces.items():
                 values[runs] = _read(task, name, task.readings(states[:, runs], runs, result.record))
@@ -74,20 +75,20 @@ class MeteredRuns:
                 self.traces[name][: len(trace), members[runs]] = trace
 
         if self.request.custom is None:
-            run_blocks(batch, take, threads)
+            run_blocks(batch, store, threads)
         else:
             # An object has one state, so that it cannot be in charge of two runs at a time.
             for run in range(members.size):
-                one = slice(run, run + 1)
-                alone = Batch(batch.program, batch.clock, batch.parameters[:, one], batch.states[:, one])
-                take(one, run_sampled(alone, self.request.custom))
-        self._judge(task, states)
+                column = slice(run, run + 1)
+                single = Batch(batch.program, batch.clock, batch.parameters[:, column], batch.states[:, column])
+                store(column, run_sampled(single, self.request.custom))
+        self._set_completed(task, states)
         readings = task.readings(states, slice(None), None)
         for name in task.metrics:
             values = read_from_traces[name] if name in read_from_traces else _read(task, name, readings)
             self.metrics[name][members] = np.where(self.is_completed[members], values, np.nan)
 
-    def _judge(self, task: "_MeteredBatch", states: Floats) -> None:
+    def _set_completed(self, task: "_MeteredBatch", states: Floats) -> None:
         """Set the completed runs, by the rule for a single run: valid throughout, and finite at the end."""
         members = task.members
         result = group_of("result", task.batch.program.state_rows(), states)
@@ -100,9 +101,8 @@ class MeteredRuns:
         end = task.interval * (task.samples - 1)
         time = np.where(failed < NEVER_FAILED, failed, end)
         self.failure_time[members] = np.where(completed, np.nan, time)
-        lost = members[~completed]
         for trace in self.traces.values():
-            trace[:, lost] = np.nan
+            trace[:, members[~completed]] = np.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +161,7 @@ def _meter_batch(plain: Batch, members: Members, request: OutputRequest) -> _Met
     interval = intervals(plain)
     stride = max(1, round(request.every / float(interval[0]))) if request.bands else 1
     # Runs of one batch may have other steps, but traces are rows of one array.
-    if request.bands and np.abs(stride * interval - request.every).max() > _SAME * request.every:
+    if request.bands and np.abs(stride * interval - request.every).max() > _SAME_INTERVAL * request.every:
         raise ScenarioError(
             f"traces every {request.every:.6g} s need an output interval that divides it in every run, not "
             f"{interval.max():.6g} s; give run.output_interval a value that does"

@@ -29,15 +29,17 @@ def contradictory_numbers(scenario: Scenario) -> tuple[Problem, ...]:
 
     def angle_line(run: int) -> str:
         low, high = (shown_text(at(stop, run), "rad") for stop in (stops.lowest, stops.highest))
-        said = f"{path_of_locked_angle(scenario) or LOCKED_ANGLE} = {shown_text(at(profile.level, run), 'rad')}"
-        return f"{said}: must be between the stops of {device.name}, {low} to {high}"
+        path, angle = path_of_locked_angle(scenario) or LOCKED_ANGLE, shown_text(at(profile.level, run), "rad")
+        return f"{path} = {angle}: must be between the stops of {device.name}, {low} to {high}"
 
     def delay_line(run: int) -> str:
         longest = shown_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
         return f"sensors.delay = {at(delay, run):.9g} s: must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps"
 
-    is_held = profile.kind == "constant"
-    angle = (_is_beyond(stops, profile), angle_line) if is_held else _beyond(scenario, stops, profile, "motion.profile")
+    if profile.kind == "constant":
+        angle_problem: Problem = (_is_beyond(stops, profile), angle_line)
+    else:
+        angle_problem = _beyond(scenario, stops, profile, "motion.profile")
     problems = [
         (
             delay > scenario.run.duration,
@@ -47,7 +49,7 @@ def contradictory_numbers(scenario: Scenario) -> tuple[Problem, ...]:
     ]
     if followed.reach is not None and scenario.follows_reference:
         problems.insert(0, _beyond(scenario, limits_of(device, followed), scenario.reference, "reference"))
-    return angle, *problems
+    return angle_problem, *problems
 
 
 def _is_beyond(limits: Limits, profile: ProfileChoice) -> NDArray[np.bool_]:
@@ -63,9 +65,10 @@ def _beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, section:
     # The bounds hold for all time; a run that may leave them is checked at its own times.
     problems: dict[int, str] = {}
     for run in np.flatnonzero(outside).tolist():
-        own = ProfileChoice(profile.kind, {name: at(value, run) for name, value in profile.settings.items()})
+        settings = {name: at(value, run) for name, value in profile.settings.items()}
         duration, step = at(scenario.run.duration, run), at(scenario.run.step, run)
-        problems[run] = profile_problem(limits.of_run(run), own, duration, step, section)
+        profile_of_run = ProfileChoice(profile.kind, settings)
+        problems[run] = profile_problem(limits.of_run(run), profile_of_run, duration, step, section)
         outside[run] = bool(problems[run])
     return outside, lambda run: problems[run]
 
@@ -73,22 +76,21 @@ def _beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, section:
 def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[RunTimes, tuple[Problem, ...]]:
     """Return the clock for columns of times [s] by path, and the problems of contradictory times.
 
-    Times are read as in a file, once for each combination.
+    Times are read as in a file, once for each combination, of which an ensemble has few.
     """
-    # Once for each combination: times are read as the texts of a file are, and an ensemble has few of them.
     texts = time_texts(base)
-    rows, places = np.unique(np.stack(list(times.values()), axis=1), axis=0, return_inverse=True)
-    places = places.reshape(-1)
-    reasons, table = [""] * len(rows), np.full((len(rows), 4), np.nan)
-    for number, row in enumerate(rows.tolist()):
+    combinations, index_of_run = np.unique(np.stack(list(times.values()), axis=1), axis=0, return_inverse=True)
+    index_of_run = index_of_run.reshape(-1)
+    reasons, table = [""] * len(combinations), np.full((len(combinations), 4), np.nan)
+    for index, combination in enumerate(combinations.tolist()):
         try:
-            read = clock_with(base.name, texts, dict(zip(times, row, strict=True)))
+            run_times = clock_with(base.name, texts, dict(zip(times, combination, strict=True)))
         except ScenarioError as error:
-            reasons[number] = str(error)
+            reasons[index] = str(error)
         else:
-            table[number] = read.duration, read.step, read.output_interval, read.period
-    refused = np.array([bool(reason) for reason in reasons])[places]
-    return RunTimes(*table[places].T.copy()), ((refused, lambda run: reasons[places[run]]),)
+            table[index] = run_times.duration, run_times.step, run_times.output_interval, run_times.period
+    is_refused = np.array([bool(reason) for reason in reasons])[index_of_run]
+    return RunTimes(*table[index_of_run].T.copy()), ((is_refused, lambda run: reasons[index_of_run[run]]),)
 
 
 def lacks(scenario: Scenario, kind: MetricKind) -> str:

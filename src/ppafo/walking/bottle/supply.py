@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ppafo.constants import GRAMS_PER_KILOGRAM
+from ppafo.constants import GRAMS_PER_KILOGRAM, UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError, ScenarioError, refused_as
 from ppafo.model.cold_gas import Isobar, SupplyNow, SupplyState, following_rates, isobar, supply_now
 from ppafo.model.declaration import Quantity
+from ppafo.model.gas import specific_gas_constant
 from ppafo.model.source import content_energy, densest_gas, has_liquid, liquid_density
 from ppafo.parameters.bottles.bottle import Bottle, is_of_catalogue, load_bottle
 from ppafo.parameters.bottles.declaration import PATHS
@@ -197,10 +198,16 @@ def _numbers(reading: DocumentReader, section: Mapping[str, Any], bottle: Bottle
     return numbers
 
 
+def is_of_bottle(molar_mass: float, bottle: Bottle) -> bool:
+    """Return True if a gas of some molar mass [kg/mol] is the gas of a bottle."""
+    ratio = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass) / bottle.fluid.table.gas_constant
+    return abs(ratio - 1.0) <= _SAME_GAS
+
+
 def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> None:
     """Raise ScenarioError for settings of a walk that conflict with a bottle."""
     fluid, regulator = supply.bottle.fluid, supply.bottle.regulator
-    if abs(device.gas.specific_gas_constant / fluid.table.gas_constant - 1.0) > _SAME_GAS:
+    if not is_of_bottle(device.gas.molar_mass, supply.bottle):
         raise reading.refusal(
             BOTTLE_NAME,
             f"holds {fluid.name}, and the device is fed with {device.gas.species}: set gas.species={fluid.name}, or "

@@ -1,10 +1,12 @@
 """How a run ends and why, rests, and gas uses from recordings."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import ppafo
 from ppafo.analyses.endurance.answer import Endurance, Endurances
 from ppafo.analyses.endurance.gas_demand import demand_of_numbers, demand_of_recording
 from ppafo.analyses.endurance.question import bottle as endurance
@@ -176,3 +178,10 @@ def test_the_verb_takes_recordings_one_or_several() -> None:
     alike = endurance([one, two], rest=60.0).found
     assert isinstance(alike, Endurances)
     assert list(alike.uses) == [one.label, f"{one.label} (2)"]
+
+
+def test_a_run_on_another_gas_than_the_bottle_holds_is_refused(tmp_path: Path) -> None:
+    ppafo.simulate("torque-task-proportional", ["gas.species=air"]).save(tmp_path / "task")
+    with pytest.raises(ppafo.DataError, match=r"fed with gas of 28\.9. g/mol, and bottle 'paper-co2-9oz' holds CO2"):
+        ppafo.bottle(tmp_path / "task")
+    assert ppafo.bottle(tmp_path / "task", bottle="air-48ci-3000psi").found.discharge.walking_time > 0.0

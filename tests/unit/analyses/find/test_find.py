@@ -18,7 +18,7 @@ from ppafo.cli.main import main
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
 from ppafo.report.finding import Finding
-from ppafo.study.runs import Runs
+from tests.model_runs import model_runs
 
 Floats = NDArray[np.float64]
 TASK = "torque-task-proportional"
@@ -37,7 +37,7 @@ def of_curve(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Finding[Threshold
         def model(columns: Mapping[str, Floats]) -> dict[str, Floats]:
             return {metric: curve(columns["supply.pressure"] / BAR)}
 
-        monkeypatch.setattr("ppafo.analyses.find.solve.Runs", lambda *_: Runs.of_model(model, [metric]))
+        monkeypatch.setattr("ppafo.analyses.find.solve.scenario_runs", lambda *_: model_runs(model, [metric]))
         return find(TASK, vary=RANGE, such_that=condition, **options)
 
     return search
@@ -182,7 +182,7 @@ def test_the_value_rests_on_many_noise_streams_and_not_on_the_seed_of_the_scenar
         seen.append(seeds)
         return {"final_error": 6.3 - pressure + noise(seeds)}
 
-    monkeypatch.setattr("ppafo.analyses.find.solve.Runs", lambda *_: Runs.of_model(model, ["final_error"]))
+    monkeypatch.setattr("ppafo.analyses.find.solve.scenario_runs", lambda *_: model_runs(model, ["final_error"]))
     found = [
         find(
             TASK, vary=RANGE, such_that=LIMIT, overrides=["sensors.pressure_noise=1 kPa_d", f"sensors.seed={seed}"]

@@ -16,7 +16,7 @@ from ppafo.errors import StudyError
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, OneOf, UniformBetween
 from ppafo.studies.draws import Uncertainty
 from ppafo.studies.study import RandomValue
-from ppafo.study.runs import Runs
+from tests.model_runs import model_runs
 
 METRIC = "rms_error"
 A, B = 7.0, 0.1
@@ -26,7 +26,7 @@ ANGLES = Uncertainty(tuple(RandomValue(name, UniformBetween(-math.pi, math.pi)) 
 
 def analysed(model: Model, uncertainty: Uncertainty, method: str, settings: SensitivitySettings) -> Influences:
     """What comes of a formula in place of a simulation."""
-    return analyse(Runs.of_model(model, [METRIC]), uncertainty, METHODS[method], settings)
+    return analyse(model_runs(model, [METRIC]), uncertainty, METHODS[method], settings)
 
 
 def ishigami(columns: Mapping[str, Floats]) -> dict[str, Floats]:

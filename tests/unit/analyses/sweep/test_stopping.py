@@ -11,10 +11,11 @@ from ppafo.analyses.sweep.statistic import draw_until, estimate
 from ppafo.analyses.sweep.statistic_kind import Statistic, mean_of, parse_statistic, probability_of, quantile_of
 from ppafo.analyses.sweep.stopping import StatisticEstimate, StoppingRule, stopping_rule
 from ppafo.errors import StudyError
-from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, UniformBetween, replicates_interval
+from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, UniformBetween
 from ppafo.studies.draws import REPLICATES, Uncertainty
+from ppafo.studies.intervals import replicates_interval
 from ppafo.studies.study import RandomValue
-from ppafo.study.runs import Runs
+from tests.model_runs import model_runs
 
 METRIC = "rms_error"
 SIGMA = 0.5
@@ -36,7 +37,7 @@ def drawn_until(
     model: Model, uncertain: Uncertainty, statistic: Statistic, rule: StoppingRule, seed: int
 ) -> StatisticEstimate:
     """What is found on a formula in place of a simulation."""
-    return draw_until(Runs.of_model(model, [METRIC]), uncertain, METRIC, statistic, rule, seed).found
+    return draw_until(model_runs(model, [METRIC]), uncertain, METRIC, statistic, rule, seed).found
 
 
 def failing(share: float) -> Model:
@@ -179,7 +180,7 @@ def test_a_mean_that_is_met_holds_beside_a_jump_that_hardly_ever_comes(share: fl
 
 def test_a_mean_of_fewer_draws_than_would_show_a_rare_value_is_not_met_and_says_so() -> None:
     rule = StoppingRule(0.5, is_relative=True, first=64, maximum=1024)
-    finding = draw_until(Runs.of_model(value, [METRIC]), UNCERTAIN, METRIC, mean_of("N m"), rule, 1)
+    finding = draw_until(model_runs(value, [METRIC]), UNCERTAIN, METRIC, mean_of("N m"), rule, 1)
     assert not finding.found.is_met
     assert "a mean needs at least 10,000 draws, and the maximum is 1,024" in finding.said[0]
 
@@ -285,7 +286,7 @@ def test_further_metrics_are_means_over_the_same_draws_that_have_a_value() -> No
         return {METRIC: x, "final_error": np.where(x > 1.0, 2.0 * x, np.nan)}
 
     rule = StoppingRule(10.0, is_relative=False, first=256, maximum=256)
-    runs = Runs.of_model(model, [METRIC, "final_error"])
+    runs = model_runs(model, [METRIC, "final_error"])
     finding = draw_until(runs, UNCERTAIN, METRIC, mean_of("N m"), rule, 1, ["final_error"])
     found, mean = finding.found, finding.found.also["final_error"]
     above = found.values[found.values > 1.0]

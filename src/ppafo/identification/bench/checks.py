@@ -1,0 +1,119 @@
+"""Checks of recordings for the needs of a bench procedure; every message names the file and a remedy."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ppafo.errors import IdentificationError
+from ppafo.identification.bench.wrong_readings import check_not_alone
+from ppafo.identification.source import RecordingSource
+from ppafo.signals import CHANNELS, Recording
+from ppafo.signals.faults import longest_gap, plateaus
+from ppafo.signals.recording import Floats
+from ppafo.wording import nearest_name
+
+_SHARE_THAT_IS_CLIPPED = 0.05
+"""Fraction of samples at one extreme value [-] from which a sensor counts as saturated."""
+_FEWEST_CLIPPED = 4
+"""Least number of equal samples for saturation."""
+_FRACTION_THAT_MOVES = 0.02
+"""Least change of the driving quantity, relative to its largest value [-], for a constant channel to be saturated."""
+_LARGEST_NUMBER = 1.0e12
+"""Largest plausible magnitude of a measured value, in any SI unit."""
+
+
+def check_sources(
+    sources: tuple[RecordingSource, ...],
+    procedure: str,
+    channels: Iterable[str],
+    fewest: int,
+    moving: Iterable[str] = (),
+    absolute: Iterable[str] = (),
+) -> None:
+    """Raise IdentificationError for recordings that lack a channel or have too few samples for a procedure.
+
+    A ``moving`` channel must change, and an ``absolute`` pressure must be positive. The message names the recording.
+    """
+    if not sources:
+        raise IdentificationError(f"{procedure}: no recording was given")
+    for source in sources:
+        recording = source.recording
+        for name in channels:
+            if name not in recording:
+                known, hint = CHANNELS[name], nearest_name(name, recording.names)
+                raise IdentificationError(
+                    f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; "
+                    f"the file has {', '.join(recording.names) or 'only time'}; a column map can name it"
+                )
+        for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):
+            worst = int(np.argmax(np.abs(values)))
+            if abs(values[worst]) > _LARGEST_NUMBER:
+                raise IdentificationError(
+                    f"{source.name}: {procedure}: '{name}' is {values[worst]:g} at sample {worst + 1}, more than any "
+                    f"sensor measures: the line is damaged"
+                )
+        if len(recording) < fewest:
+            raise IdentificationError(
+                f"{source.name}: {procedure} needs at least {fewest} samples, it has {len(recording)}"
+            )
+        for name in moving:
+            check_moves(source, procedure, name)
+        for name in absolute:
+            # Gauge pressures, passed for absolute, are 0 or less where the other side is open.
+            low = int(np.argmin(recording[name]))
+            if recording[name][low] <= 0.0:
+                raise IdentificationError(
+                    f"{source.name}: {procedure}: '{name}' is {source.shown(name, recording[name][low])} at sample "
+                    f"{low + 1}, which is not an absolute pressure: use psi_g, bar_g or kPa_g for gauge"
+                )
+            check_not_alone(source, procedure, name)
+
+
+def check_moves(source: RecordingSource, procedure: str, name: str) -> None:
+    """Raise IdentificationError, naming the recording, for a constant channel, which carries no information."""
+    values = source.recording[name]
+    if values.max() == values.min():
+        raise IdentificationError(
+            f"{source.name}: {procedure}: channel '{name}' is {source.shown(name, values[0])} throughout; "
+            f"the sensor is stuck, or nothing was done"
+        )
+
+
+def check_not_clipped(
+    source: RecordingSource,
+    procedure: str,
+    name: str,
+    driver: str,
+    driving: Floats,
+    fraction: float = _FRACTION_THAT_MOVES,
+) -> None:
+    """Raise IdentificationError for a saturated sensor: a channel constant at an extreme value while its cause changes.
+
+    ``driving`` are the values of the driving quantity ``driver``, which must change by ``fraction`` [-] of its largest
+    value. The message names the recording and the channel.
+    """
+    values = source.recording[name]
+    longest, _ = plateaus(values)
+    # A reading that stays where nothing moves is right.
+    moves = float(np.ptp(driving[longest.first : longest.last + 1])) > fraction * float(np.abs(driving).max())
+    if moves and longest.count >= max(_FEWEST_CLIPPED, _SHARE_THAT_IS_CLIPPED * values.size):
+        raise IdentificationError(
+            f"{source.name}: {procedure}: channel '{name}' stays at {source.shown(name, values.max())} for "
+            f"{longest.count} samples, up to sample {longest.last + 1}, while '{driver}' moves: the sensor is "
+            f"saturated; leave those samples out"
+        )
+
+
+def check_no_gap(source: RecordingSource, procedure: str, part: Recording) -> int:
+    """Return the number of samples before a part of a recording. Raises IdentificationError for a part with a gap.
+
+    The message gives the time of the gap.
+    """
+    skipped = int(np.searchsorted(source.recording.time, part.time[0]))
+    gap = longest_gap(part.time)
+    if gap is not None:
+        raise IdentificationError(
+            f"{source.name}: {procedure}: there is a gap of {gap.duration:.4g} s after {part.time[gap.index]:.6g} s "
+            f"(sample {skipped + gap.index + 1}); give start or end to exclude it"
+        )
+    return skipped

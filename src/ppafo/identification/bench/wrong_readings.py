@@ -1,0 +1,205 @@
+"""Readings that cannot be right: samples far off their neighbours, and flow against its direction."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NoReturn
+
+import numpy as np
+
+from ppafo.errors import IdentificationError
+from ppafo.identification.residuals import Flags
+from ppafo.identification.source import RecordingSource, pool, window
+from ppafo.signals.faults import noise_of, outlying_samples, resolution_of
+from ppafo.signals.recording import Floats
+
+_MOST_IMPOSSIBLE = 0.1
+"""Largest fraction of impossible flow meter readings [-]; more means wrong signs or columns."""
+_FINE_SAMPLE, _GROSS_SAMPLE, _GROSS_READING = 0.01, 1.0 / 6.0, 0.25
+"""Outlier limits as fractions of the usual range [-]: of samples over time (a sixth of the limit), fine and gross; of
+readings, gross.
+
+A glitch of a third of the range in a real logger is one of many samples, and no reason to refuse the recording.
+"""
+_MOST_LEFT_OUT = 0.02
+"""Largest fraction of the samples of a recording over time that may be left out as outliers [-]."""
+_COARSEST = 0.05
+"""Converter step divided by the largest valid sample [-], above which it is no step: two outliers may be equal."""
+_NO_DECAY = 0.5
+"""Fraction of the range by which the first two samples may differ from the median of the first five [-]."""
+_ALIKE, _FEWEST_ALIKE = 6, 8
+"""Number of neighbours with which a reading is compared, and least number of readings for the comparison."""
+
+
+def without_wrong_samples(
+    sources: tuple[RecordingSource, ...], procedure: str, names: Sequence[str], start: float | None, end: float | None
+) -> tuple[tuple[RecordingSource, ...], tuple[str, ...]]:
+    """Return recordings over time without outliers in the channels ``names``, and remarks on the samples left out.
+
+    An outlier is far off its neighbours, by the rule of the fit of motion, between ``start`` and ``end`` [s]; a step of
+    the converter is no outlier. Raises IdentificationError if more than 2 in 100 samples are outliers, with the
+    recording, the sample, its value and the median of its neighbours.
+    """
+    cleaned, remarks = [], []
+    for source in sources:
+        recording = source.recording
+        inside = np.flatnonzero(np.isin(recording.time, window(recording, start, end).time))
+        most = max(1, int(_MOST_LEFT_OUT * inside.size))
+        is_right = np.ones(len(recording), dtype=np.bool_)
+        for name in (name for name in names if name in recording):
+            values = recording[name][inside]
+            is_out = _outliers(values, most, _FINE_SAMPLE)
+            if np.count_nonzero(is_out) > most:
+                is_out = _outliers(values, most, _GROSS_SAMPLE)
+            wrong = np.flatnonzero(is_out)
+            if not wrong.size:
+                continue
+            first = int(wrong[0])
+            if wrong.size > most:
+                around = float(np.median(values[max(first - 2, 0) : first + 3]))
+                _refuse_outlier(source, procedure, name, inside[wrong].tolist(), float(values[first]), around)
+            is_right[inside[wrong]] = False
+            remarks.append(
+                f"left out: {wrong.size} of {inside.size} samples with '{name}' far off those around them; the first "
+                f"is sample {inside[first] + 1} of {source.name}, {source.shown(name, values[first])}"
+            )
+        channels = {
+            name: replace(channel, values=channel.values[is_right]) for name, channel in recording.channels.items()
+        }
+        cleaned.append(replace(source, recording=replace(recording, time=recording.time[is_right], channels=channels)))
+    return tuple(cleaned), tuple(remarks)
+
+
+def _outliers(values: Floats, most: int, share: float) -> Flags:
+    """Return flags of samples off their neighbours by 6 times the noise, and 6 times a share of the usual range.
+
+    With more than ``most`` outliers the step of the converter is looked for among all samples.
+    """
+    # Of samples that stand still the noise is 0, and what moves first among them is no error.
+    noise = max(noise_of(values), share * usual_range(values))
+    is_out = outlying_samples(values, noise)
+    # One wrong sample among samples that stand still is no step of their converter.
+    step = resolution_of(values if np.count_nonzero(is_out) > most else values[~is_out])
+    if step <= _COARSEST * np.abs(values[~is_out]).max(initial=0.0):
+        is_out &= outlying_samples(values, math.hypot(noise, step / math.sqrt(12.0)))
+    # A decay is fast at its start, with no sample before: there only what no decay does is an error.
+    is_out[:2] &= np.abs(values - np.median(values[:5]))[:2] > _NO_DECAY * np.ptp(values)
+    return is_out
+
+
+def check_not_alone(source: RecordingSource, procedure: str, name: str) -> None:
+    """Raise IdentificationError for an isolated extreme value of a channel, naming the sample.
+
+    A value is isolated if its distance from the next one exceeds twice the range of all others and their median
+    magnitude. The check applies to driving quantities, for which there is no other check.
+    """
+    values = source.recording[name]
+    order = np.argsort(values)
+    for wrong, others in ((order[-1], order[:-1]), (order[0], order[1:][::-1])):
+        away = abs(float(values[wrong] - values[others[-1]])) if others.size >= _FEWEST_ALIKE else 0.0
+        if away > max(2.0 * float(np.ptp(values[others])), float(np.median(np.abs(values)))):
+            _refuse_outlier(source, procedure, name, [int(wrong)], float(values[wrong]), float(values[others[-1]]))
+
+
+def check_no_wrong_reading(
+    sources: tuple[RecordingSource, ...], procedure: str, name: str, drivers: Sequence[Floats], used: Flags
+) -> None:
+    """Raise IdentificationError for a reading far off the six readings with the most similar driving quantities.
+
+    An example is a typing error. ``drivers`` are the driving quantities of the readings of all recordings, ``used``
+    marks the readings that count. No law is needed: far off means by more than 10 times the usual distance, a quarter
+    of the usual range, and 3 times the range of the six readings, one of which may be wrong too. The message names the
+    recording, the sample, its value and the median of the six.
+    """
+    from scipy.spatial import cKDTree
+
+    values, samples = pool(sources, name)[used], np.flatnonzero(used)
+    if values.size < _FEWEST_ALIKE:
+        return
+    # By the usual size, not the range, which one wrong reading would stretch.
+    sizes = [float(np.median(np.abs(driver[used]))) or 1.0 for driver in drivers]
+    points = np.stack([driver[used] / size for driver, size in zip(drivers, sizes, strict=True)], axis=1)
+    _, nearest = cKDTree(points).query(points, k=_ALIKE + 1)
+    is_itself = nearest == np.arange(values.size)[:, None]
+    # Of more readings in one place a reading may not be among its own nearest.
+    is_itself[~is_itself.any(axis=1), -1] = True
+    around = np.sort(values[nearest[~is_itself].reshape(-1, _ALIKE)], axis=1)
+    middle = np.median(around, axis=1)
+    away = np.abs(values - middle)
+    spread = np.minimum(np.ptp(around[:, 1:], axis=1), np.ptp(around[:, :-1], axis=1))
+    least = max(10.0 * float(np.median(away)), _GROSS_READING * usual_range(values))
+    wrong = np.flatnonzero(away > 3.0 * spread + least)
+    if wrong.size:
+        first = int(wrong[np.argmax(away[wrong])])
+        source, before = _recording_with(sources, int(samples[first]))
+        numbers = samples[wrong] - before
+        in_recording = numbers[(numbers >= 0) & (numbers < len(source.recording))]
+        # The worst one first, which the message describes.
+        worst_first = sorted(in_recording.tolist(), key=lambda sample: sample != samples[first] - before)
+        _refuse_outlier(source, procedure, name, worst_first, float(values[first]), float(middle[first]))
+
+
+def meter_readings(
+    sources: tuple[RecordingSource, ...],
+    procedure: str,
+    direction: Floats,
+    zero: float,
+    used: Flags | None = None,
+) -> tuple[Floats, Flags, tuple[str, ...]]:
+    """Return flow meter readings with their sign [kg/s], flags of the possible ones, and remarks on the others.
+
+    Under every law gas flows from the higher to the lower pressure. A meter that never shows a negative flow has no
+    sign; if the flow was reversed in many readings, each reading gets the sign of ``direction``. Otherwise a reading
+    against its direction is impossible, with a signed meter only beyond its ``zero`` error [fraction of the largest
+    reading].
+
+    Arguments: ``direction`` (readings,) of all recordings, positive for a positive flow; ``used`` marks the readings
+    that count, default all. Raises IdentificationError if more than a tenth are impossible.
+    """
+    flow = pool(sources, "mass_flow")
+    counted = np.ones(flow.size, dtype=np.bool_) if used is None else used
+    largest = float(np.abs(flow[counted]).max(initial=0.0))
+    has_sign = bool((flow[counted] < 0.0).any())
+    against = counted & (direction * flow < 0.0) & (np.abs(flow) > (zero * largest if has_sign else 0.0))
+    many = _MOST_IMPOSSIBLE * np.count_nonzero(counted)
+    if not has_sign and np.count_nonzero(against) > many:
+        remark = f"{procedure}: the flow meter has no sign; the flow has the direction that the other channels give it"
+        return np.where(direction < 0.0, -flow, flow), counted, (remark,)
+    wrong = np.flatnonzero(against)
+    if wrong.size > many:
+        raise IdentificationError(
+            f"{sources[0].name}: {procedure}: the flow runs against the direction that pressures and command give it "
+            f"in {wrong.size} of {np.count_nonzero(counted)} readings; reverse the sign of 'mass_flow'"
+        )
+    if not wrong.size:
+        return flow, counted, ()
+    source, before = _recording_with(sources, int(wrong[0]))
+    remark = (
+        f"left out: {wrong.size} of {np.count_nonzero(counted)} readings with a flow against the direction that "
+        f"pressures and command give it, which no opening has; the first is sample {int(wrong[0]) - before + 1} of "
+        f"{source.name}"
+    )
+    return flow, counted & ~against, (remark,)
+
+
+def _recording_with(sources: tuple[RecordingSource, ...], sample: int) -> tuple[RecordingSource, int]:
+    """Return the recording that contains a pooled sample, and the number of samples before that recording."""
+    ends = np.cumsum([len(source.recording) for source in sources])
+    index = int(np.searchsorted(ends, sample, side="right"))
+    return sources[index], int(ends[index]) - len(sources[index].recording)
+
+
+def usual_range(values: Floats) -> float:
+    """Return the range between the 5 % and 95 % quantiles, in the unit of the values."""
+    return float(np.subtract(*np.quantile(values, (0.95, 0.05))))
+
+
+def _refuse_outlier(
+    source: RecordingSource, procedure: str, name: str, samples: list[int], value: float, around: float
+) -> NoReturn:
+    """Raise IdentificationError for outliers of a channel: the first one with its value, the others by number."""
+    others = f", and so are samples {', '.join(str(sample + 1) for sample in samples[1:4])}" if samples[1:] else ""
+    raise IdentificationError(
+        f"{source.name}: {procedure}: '{name}' is {source.shown(name, value)} at sample {samples[0] + 1}, where its "
+        f"neighbours are at {source.shown(name, around)}: a wrong reading{others}; correct it or leave it out"
+    )

@@ -1,0 +1,311 @@
+"""Bench procedures of a problem file: their tables, completed with values from a parameter set, and their runs.
+
+The recommended order matters where one procedure uses results of another: torque and friction come first because they
+need no others, the flow of the open valve comes before the valve map, and the leak comes last, because its chambers
+must be known to be closed.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ppafo.documents.models import StrictTable, Text
+from ppafo.errors import IdentificationError
+from ppafo.identification.bench.flow import GasAt, Law
+from ppafo.identification.bench.free_decay import free_decay
+from ppafo.identification.bench.open_valve_flow import open_valve_flow
+from ppafo.identification.bench.result import BenchResult
+from ppafo.identification.bench.static_torque import static_torque
+from ppafo.identification.bench.valve_map import valve_map
+from ppafo.identification.bench.vane_leak import vane_leak
+from ppafo.identification.keys import Columns, Confidence, positive_in, quantity_in
+from ppafo.identification.new_set import stated_half_width
+from ppafo.identification.source import RecordingSource
+from ppafo.identification.tolerances import DEFAULTS, Tolerances
+from ppafo.model.gas import SPECIES
+from ppafo.parameters.device import VANE
+from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si, with_followers
+from ppafo.simulation.recorded.usual_errors import deviation_of_limit
+from ppafo.wording import nearest_name
+
+PROCEDURES = "static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak"
+"""Kinds of procedures in the recommended order."""
+_Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
+_Start = Annotated[Text | None, Field(description="first time to use, such as '2 s'")]
+_End = Annotated[Text | None, Field(description="last time to use, such as '8 s'")]
+_Gas = Annotated[Text | None, Field(description="species of the gas on the bench; default: the set's")]
+_Temperature = Annotated[Text | None, Field(description="of the gas on the bench, '17 degC'; default: the set's")]
+_Valve = Annotated[Text | None, Field(description="name of a valve of the set; default: the chosen one")]
+
+_UNKNOWN = "unknown"
+_COLDEST, _HOTTEST = 150.0, 600.0
+"""Lowest and highest gas temperature [K] of a bench."""
+_THERMOMETER = 1.0
+"""Limit [K] of the error of a temperature stated in the problem."""
+_MOST_OF_STOPS = 10.0
+"""Largest ratio of angle travelled in a decay to angle between the stops [-]; more means a wrong unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProcedureContext:
+    """Context of a procedure: parameter set, chosen valve, ``label`` of the section in messages, bench tolerances."""
+
+    parameter_set: ParameterSet
+    valve: str
+    label: str
+    tolerances: Tolerances = DEFAULTS
+
+    def number(self, path: str) -> float:
+        """Return the value at a path [SI]. Raises IdentificationError if the set has none."""
+        value = number_in_si(with_followers(self.parameter_set), path)
+        if value is None:
+            raise IdentificationError(f"{self.label}: needs {path}, which {self.parameter_set.file} does not have")
+        return value
+
+    def gas(self, problem: "OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem") -> GasAt:
+        """Return the gas of the bench; species and temperature default to the values of the set.
+
+        Raises IdentificationError for an unknown species.
+        """
+        temperature = quantity_in(problem, "temperature", "K", self.label, _COLDEST, _HOTTEST)
+        if temperature is None:
+            temperature = self.number("gas.temperature")
+            deviation = self.deviation("gas.temperature", temperature, "K")
+        else:
+            limit = self.tolerances.gas_temperature
+            deviation = deviation_of_limit(_THERMOMETER if limit is None else limit)
+        if problem.gas is None:
+            molar_mass, heat_capacity_ratio = self.number("gas.molar_mass"), self.number("gas.heat_capacity_ratio")
+            return GasAt(molar_mass, heat_capacity_ratio, temperature, deviation)
+        if problem.gas not in SPECIES:
+            hint = nearest_name(problem.gas, SPECIES)
+            known = ", ".join(SPECIES)
+            raise IdentificationError(f"{self.label}: gas = {problem.gas!r} is unknown{hint}; available: {known}")
+        species = SPECIES[problem.gas]
+        return GasAt(species.molar_mass, species.heat_capacity_ratio, temperature, deviation)
+
+    def deviation(self, path: str, value: float, unit: str) -> float:
+        """Return the standard deviation of a number, given its value [unit], from the bench, the set, or defaults."""
+        entry = with_followers(self.parameter_set).numbers.get(path)
+        return self.tolerances.deviation_of(path, value, 0.0 if entry is None else stated_half_width(entry, unit))
+
+    def valve_path(self, name: str | None) -> str:
+        """Return the path of a valve in the set, such as ``valves.main``; None is the chosen valve."""
+        return f"valves.{chosen_valve(self.parameter_set, name or self.valve)}"
+
+
+class StaticTorqueProblem(StrictTable):
+    """Static torque over rising and falling pressure: torque constant and static friction."""
+
+    kind: Literal["static-torque"]
+    recordings: _Recordings
+    columns: Columns = None
+    confidence: Confidence = 0.95
+
+    def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
+        """Return the result of the procedure for recordings."""
+        return static_torque(sources, self.confidence, context.tolerances)
+
+
+class FreeDecayProblem(StrictTable):
+    """Free decay after an impulse: viscous damping and Coulomb friction."""
+
+    kind: Literal["free-decay"]
+    recordings: _Recordings
+    columns: Columns = None
+    confidence: Confidence = 0.95
+    start: _Start = None
+    end: _End = None
+    inertia: Text | None = Field(None, description="such as '8.4 g m^2', or 'unknown'; default: the set's")
+
+    def inertia_of(self, context: ProcedureContext) -> tuple[float | None, float]:
+        """Return the inertia and its standard deviation [kg m^2], by default from the set; None if unknown."""
+        path = "foot_plate.inertia"
+        if self.inertia == _UNKNOWN:
+            return None, 0.0
+        inertia = positive_in(self, "inertia", "kg m^2", context.label)
+        if inertia is not None:
+            return inertia, context.tolerances.deviation_of(path, inertia, 0.0)
+        inertia = number_in_si(context.parameter_set, path)
+        return inertia, 0.0 if inertia is None else context.deviation(path, inertia, "kg m^2")
+
+    def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
+        """Return the result of the procedure for recordings. Raises IdentificationError for an implausible angle."""
+        low, high = (number_in_si(context.parameter_set, f"actuator.angle_{end}") for end in ("min", "max"))
+        for source in sources:
+            angles = source.recording["angle"] if "angle" in source.recording else source.recording.time[:1]
+            turned = float(angles.max() - angles.min())
+            if low is not None and high is not None and turned > _MOST_OF_STOPS * (high - low) > 0.0:
+                raise IdentificationError(
+                    f"{source.name}: free-decay: 'angle' goes over {turned:.4g} rad, {turned / math.tau:.3g} turns, "
+                    f"and the stops of the set are {math.degrees(high - low):.4g} deg apart: is its unit deg?"
+                )
+        static = number_in_si(context.parameter_set, "friction.static_torque")
+        dynamic = number_in_si(context.parameter_set, "friction.dynamic_torque")
+        # Near standstill a seal grips as hard as at rest at most.
+        rise = max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0
+        start, end = times_of(self, context.label)
+        inertia, inertia_deviation = self.inertia_of(context)
+        return free_decay(
+            sources,
+            start,
+            end,
+            inertia,
+            inertia_deviation,
+            rise,
+            confidence=self.confidence,
+            tolerances=context.tolerances,
+        )
+
+
+class OpenValveFlowProblem(StrictTable):
+    """Flow through the fully open valve: Cd, or C and b of ISO 6358."""
+
+    kind: Literal["open-valve-flow"]
+    recordings: _Recordings
+    columns: Columns = None
+    confidence: Confidence = 0.95
+    gas: _Gas = None
+    temperature: _Temperature = None
+    valve: _Valve = None
+    law: Annotated[Law, Field(description="law of the flow; it is written into the set in this form")] = "orifice"
+
+    def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
+        """Return the result of the procedure for recordings."""
+        path = context.valve_path(self.valve)
+        return open_valve_flow(
+            sources,
+            context.gas(self),
+            self.law,
+            area=number_in_si(context.parameter_set, f"{path}.area"),
+            path=path,
+            critical_ratio=number_in_si(context.parameter_set, f"{path}.critical_ratio"),
+            confidence=self.confidence,
+            tolerances=context.tolerances,
+        )
+
+
+class VaneLeakProblem(StrictTable):
+    """Leak of closed chambers losing pressure, or in steady flow: area, conductance or laminar coefficient."""
+
+    kind: Literal["vane-leak"]
+    recordings: _Recordings
+    columns: Columns = None
+    confidence: Confidence = 0.95
+    gas: _Gas = None
+    temperature: _Temperature = None
+    start: _Start = None
+    end: _End = None
+    angle: Text | None = Field(None, description="vane angle, from which the set's volumes follow")
+    law: Literal["orifice", "laminar", "both"] = Field(
+        "orifice", description="an orifice is written as the set has it; both: a laminar gap beside it"
+    )
+    volume_1: Text | None = Field(None, description="volume of chamber 1 with its line, such as '40 cm^3'")
+    volume_2: Text | None = Field(None, description="volume of chamber 2 with its line")
+
+    def volumes_of(self, context: ProcedureContext) -> tuple[float | None, float | None, float]:
+        """Return both volumes [m^3], given or computed from the angle, and relative standard deviation of a volume [-].
+
+        Equations (4), (5): V1 = V_dead1 + v (theta - theta_min) and V2 = V_dead2 + v (theta_max - theta), with v the
+        displacement per radian [m^3/rad].
+        """
+        first, second = (positive_in(self, name, "m^3", context.label) for name in ("volume_1", "volume_2"))
+        angle = quantity_in(self, "angle", "rad", context.label)
+        deviation = context.tolerances.deviation_of("actuator.dead_volume_1", 1.0, 0.0)
+        if angle is not None:
+            if context.parameter_set.actuator_kind != VANE:
+                raise IdentificationError(
+                    f"{context.label}: angle = {self.angle!r}: volumes follow from the angle of a vane only; give "
+                    "volume_1 and volume_2"
+                )
+            names = ("angle_min", "angle_max", "displacement_per_radian", "dead_volume_1", "dead_volume_2")
+            lower, upper, per_angle, dead_1, dead_2 = (context.number(f"actuator.{name}") for name in names)
+            if not lower <= angle <= upper:
+                raise IdentificationError(f"{context.label}: angle = {self.angle!r} lies beyond the stops of the set")
+            # A volume that is given counts before one from the angle: its line may be another one.
+            first = first or dead_1 + per_angle * (angle - lower)
+            second = second or dead_2 + per_angle * (upper - angle)
+            of_volume = context.deviation("actuator.dead_volume_1", dead_1, "m^3")
+            of_angle = (angle - lower) * context.deviation("actuator.displacement_per_radian", per_angle, "m^3/rad")
+            deviation = math.hypot(of_volume, of_angle) / (dead_1 + per_angle * (angle - lower))
+        return first, second, deviation
+
+    def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
+        """Return the result of the procedure for recordings."""
+        first, second, deviation = self.volumes_of(context)
+        start, end = times_of(self, context.label)
+        return vane_leak(
+            sources,
+            context.gas(self),
+            first,
+            second,
+            discharge_coefficient=number_in_si(context.parameter_set, "actuator.leak.discharge_coefficient"),
+            start=start,
+            end=end,
+            confidence=self.confidence,
+            critical_ratio=number_in_si(context.parameter_set, "actuator.leak.critical_ratio"),
+            law=self.law,
+            tolerances=context.tolerances,
+            volume_deviation=deviation,
+        )
+
+
+class ValveMapProblem(StrictTable):
+    """Flow over command: dead band, gain, saturation, hysteresis."""
+
+    kind: Literal["valve-map"]
+    recordings: _Recordings
+    columns: Columns = None
+    confidence: Confidence = 0.95
+    gas: _Gas = None
+    temperature: _Temperature = None
+    valve: _Valve = None
+
+    def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
+        """Return the result of the procedure for recordings."""
+        gas = context.gas(self)
+        return valve_map(sources, gas, context.valve_path(self.valve), self.confidence, context.tolerances)
+
+
+def times_of(problem: FreeDecayProblem | VaneLeakProblem, label: str) -> tuple[float | None, float | None]:
+    """Return first and last time [s] to use, None for the start or end of the recording; ``label`` starts messages."""
+    return quantity_in(problem, "start", "s", label), quantity_in(problem, "end", "s", label)
+
+
+ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem
+
+
+def run_procedure(
+    sources: tuple[RecordingSource, ...], problem: ProcedureProblem, context: ProcedureContext
+) -> BenchResult:
+    """Return the result of a procedure for its recordings.
+
+    Raises IdentificationError, with the name of the recording or the label of the procedure first.
+    """
+    try:
+        result = problem.run(sources, context)
+    except IdentificationError as error:
+        # What is wrong with a file is told by its name, what is wrong with a procedure by its label in the problem.
+        if str(error).startswith((context.label, *(source.name for source in sources))):
+            raise
+        raise IdentificationError(f"{context.label}: {error}") from error
+    acting = ("zero",) if problem.kind == "static-torque" else ()
+    idle = [f"'{name}'" for name in context.tolerances.each_recording if name not in acting]
+    if not idle or len(sources) == 1:
+        return result
+    remark = (
+        f"bench.each_recording: {' and '.join(idle)} acts in a [trajectory], and 'zero' in static-torque; here it is "
+        f"common to all {len(sources)} recordings: give each mounting of the sensors its own [[procedure]]"
+    )
+    return replace(result, remarks=(*result.remarks, remark))
+
+
+def window_of(problem: ProcedureProblem, context: ProcedureContext) -> tuple[float, float]:
+    """Return the first and last time [s] of the recordings that a procedure uses; infinite if not limited."""
+    # Steady readings have no window: each counts by itself.
+    if not isinstance(problem, FreeDecayProblem | VaneLeakProblem):
+        return -math.inf, math.inf
+    first, last = times_of(problem, context.label)
+    return -math.inf if first is None else first, math.inf if last is None else last

@@ -1,0 +1,113 @@
+"""Checks of damping and dynamic friction against the inertia and the reported ratios they were computed from.
+
+Equations (1) and (10).
+"""
+
+from collections.abc import Iterator
+
+from ppafo.errors import UnitError
+from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, ReportedRange
+from ppafo.units import to_si
+
+_INERTIA = "foot_plate.inertia"
+_DAMPING = "friction.viscous_damping"
+_FRICTION = "friction.dynamic_torque"
+_DECAY = "reported.acceleration_over_velocity"
+_DECAY_INVERSE = "reported.velocity_over_acceleration"
+_DECELERATION = "reported.stopping_deceleration"
+_SHIFTS = (-3, -2, -1, 1, 2, 3)
+"""Powers of ten by which a slipped decimal point or a prefix changes a number."""
+
+
+def check_inertia(evidence: Evidence) -> Iterator[AuditFinding]:
+    """Yield an error for each product that does not hold, and a note on a single inertia for which both would hold."""
+    inertia = evidence.magnitude(_INERTIA)
+    decay_path, decay = _decay_rate(evidence)
+    if inertia is None:
+        return
+    inertias = []
+    for product, rate_path, rate, name in (
+        (_DAMPING, decay_path, decay, "damping"),
+        (_FRICTION, _DECELERATION, evidence.magnitude(_DECELERATION), "dynamic friction"),
+    ):
+        reported = evidence.magnitude(product)
+        if reported is None or rate is None or inertia.times(rate).meets(reported):
+            continue
+        inertias.append(reported.over(rate))
+        stated, number = evidence.number(_INERTIA) or 0.0, evidence.number(product) or 0.0
+        expected, needed = stated * _middle(rate), number / _middle(rate)
+        ratio, unit = evidence.values_of(rate_path)[0], evidence.declared[product].unit
+        yield AuditFinding(
+            id=f"{name.replace(' ', '-')}-against-inertia",
+            severity="error",
+            title=f"{name} is not the product of inertia and the reported ratio",
+            values=evidence.values_of(product, _INERTIA, rate_path),
+            sides=(
+                ComparedNumber(f"reported {name}", number, unit),
+                ComparedNumber("inertia times ratio", expected, unit),
+                ComparedNumber("inertia that would agree", needed, "kg m^2"),
+            ),
+            paragraph=(
+                f"Inertia {evidence.in_set_unit(_INERTIA, stated)} times {abs(float(ratio.value)):g} {ratio.unit} is "
+                f"{evidence.in_set_unit(product, expected)}, reported is {evidence.in_set_unit(product, number)}: "
+                f"a factor {number / expected:.3g}. Would be consistent with an inertia of "
+                f"{evidence.in_set_unit(_INERTIA, needed)}, or with {evidence.in_set_unit(product, expected)} as the "
+                f"{name}."
+            ),
+        )
+    # Only if both products disagree with the reported inertia.
+    if len(inertias) > 1:
+        yield from _one_inertia(evidence, inertias[0], inertias[1], decay_path)
+
+
+def _decay_rate(evidence: Evidence) -> tuple[str, ReportedRange | None]:
+    """Return beta/I [1/s] and its path, from the ratio or its inverse; an inverse given in 1/s is the ratio."""
+    direct = evidence.magnitude(_DECAY)
+    inverse = evidence.magnitude(_DECAY_INVERSE)
+    if direct is not None or inverse is None:
+        return _DECAY, direct
+    try:
+        to_si(1.0, evidence.parameter_set.numbers[_DECAY_INVERSE].unit, "s")
+    except UnitError:
+        return _DECAY_INVERSE, inverse
+    return _DECAY_INVERSE, ReportedRange(1.0, 1.0).over(inverse)
+
+
+def _middle(interval: ReportedRange) -> float:
+    return 0.5 * (interval.low + interval.high)
+
+
+def _one_inertia(
+    evidence: Evidence, damping: ReportedRange, friction: ReportedRange, decay_path: str
+) -> Iterator[AuditFinding]:
+    """Search an inertia that fits both products within their digits, first the reported one with a shifted point."""
+    if not damping.meets(friction):
+        return
+    common = ReportedRange(max(damping.low, friction.low), min(damping.high, friction.high))
+    reported = evidence.number(_INERTIA) or 0.0
+    shifted = [reported * 10.0**shift for shift in _SHIFTS if common.low <= reported * 10.0**shift <= common.high]
+    # A moved decimal point is the most likely error; otherwise the middle of the common range.
+    reconciling = shifted[0] if shifted else _middle(common)
+    reconciling_text = evidence.in_set_unit(_INERTIA, reconciling)
+    slip = (
+        f" {reconciling_text} is the reported {evidence.in_set_unit(_INERTIA, reported)} with the decimal point moved: "
+        "either the inertia or both products carry the slip, and only a weighing can tell which."
+        if shifted
+        else ""
+    )
+    yield AuditFinding(
+        id="one-inertia-for-both",
+        severity="note",
+        title=f"damping and dynamic friction both agree with an inertia of {reconciling_text}",
+        values=evidence.values_of(_INERTIA, _DAMPING, _FRICTION, decay_path, _DECELERATION),
+        sides=(
+            ComparedNumber("reported inertia", reported, "kg m^2"),
+            ComparedNumber("reconciling inertia", reconciling, "kg m^2"),
+            ComparedNumber("lowest that agrees", common.low, "kg m^2"),
+            ComparedNumber("highest that agrees", common.high, "kg m^2"),
+        ),
+        paragraph=(
+            f"Within the reported digits both products hold for any inertia from "
+            f"{evidence.in_set_unit(_INERTIA, common.low)} to {evidence.in_set_unit(_INERTIA, common.high)}.{slip}"
+        ),
+    )

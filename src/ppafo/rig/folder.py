@@ -1,0 +1,70 @@
+"""Folder of recordings of the rig: one CSV file for each experiment, and ``rig.json`` with the true values of all."""
+
+from pathlib import Path
+from typing import Any
+
+from ppafo.documents.json_text import json_text
+from ppafo.errors import DataError
+from ppafo.rig.experiments import NOTICE, RigRecording
+from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.storage.files import LEFT_ASIDE, add_files, check_files_can_be_added
+from ppafo.storage.owned_folder import read_json
+from ppafo.wording import reason
+
+RIG_FILE = "rig.json"
+_FORMAT = "ppafo rig"
+
+
+def check_rig_folder(folder: Path, experiment: str) -> None:
+    """Raise DataError, before any run, if a folder is not writable or contains files of another origin."""
+    _earlier(folder, f"{experiment}.csv")
+    check_files_can_be_added(folder, [f"{experiment}.csv", RIG_FILE])
+
+
+def write_rig_recording(folder: Path, recorded: RigRecording) -> tuple[str, ...]:
+    """Write recording and true parameters into a folder, beside other experiments; returns the file names.
+
+    Raises DataError if the folder contains files of another origin.
+    """
+    name = f"{recorded.truth['experiment']}.csv"
+    recordings = {**_earlier(folder, name), name: dict(recorded.truth)}
+    document = {
+        "format": _FORMAT,
+        "schema_version": 1,
+        "notice": NOTICE,
+        "recordings": {key: recordings[key] for key in sorted(recordings)},
+    }
+    # By rig.json a folder is known to be the rig's: it is there first, whenever the process is killed.
+    add_files(folder, {RIG_FILE: f"{json_text(document)}\n".encode(), name: marked_csv_bytes(recorded.recording)})
+    return name, RIG_FILE
+
+
+def _earlier(folder: Path, name: str) -> dict[str, Any]:
+    """Return the entries of ``rig.json`` for the recordings that are already in a folder.
+
+    Raises DataError if the folder was not written by the rig, or if the recording ``name`` would replace a file of
+    another origin.
+    """
+    try:
+        names = {entry.name for entry in folder.iterdir()} if folder.is_dir() else set()
+    except OSError as error:
+        raise DataError(f"{folder}: cannot be read: {reason(error)}") from error
+    # What a killed writer left is no file of others.
+    present = {entry for entry in names if LEFT_ASIDE not in entry}
+    recordings: Any = {}
+    if RIG_FILE in present:
+        path = folder / RIG_FILE
+        try:
+            document = read_json(path)
+        except DataError as error:
+            raise DataError(f"{error}, so it is not overwritten") from error
+        if not isinstance(document, dict) or document.get("format") != _FORMAT:
+            raise DataError(f"{path}: was not written by the rig, so it is not overwritten")
+        recordings = document.get("recordings")
+        if not isinstance(recordings, dict):
+            raise DataError(f"{path}: has no 'recordings', so it is not overwritten")
+    elif present:
+        raise DataError(f"{folder}: is not empty and has no recordings of the rig ({RIG_FILE}); choose another folder")
+    if name in present and name not in recordings:
+        raise DataError(f"{folder}: has a {name} that the rig did not write; move it or choose another folder")
+    return dict(recordings)
