@@ -149,7 +149,7 @@ def _initial(reading: DocumentReader, device: Device) -> tuple[Initial, Graph]:
     """Return the initial chamber pressures [Pa absolute] and their links to the supply pressures that they follow.
 
     Each pressure is given as a number or as a word: a word stands for the supply pressure that it names, and a gauge
-    pressure is relative to the atmosphere. Without a second chamber its pressure is that of the atmosphere.
+    pressure is relative to the atmosphere. A second chamber that the actuator lacks is at atmosphere.
     """
     supply = device.supply
     pressures: list[float] = []
