@@ -30,7 +30,7 @@ def row(dead: float, displacement: float | None) -> str:
     levels = SupplyLevels(supply.pressure, supply.atmospheric_pressure)
     told = step_observations(step.recording, levels, step_events(step.recording))
     swings = torque_task_observations(solenoid, proportional)
-    claims = torque_task_claims(phased_runs(solenoid), proportional, ())
+    claims = torque_task_claims(*phased_runs(solenoid), proportional, ())
     met = [not claim.is_missed for claim in claims]
     met += [all(seen.holds for seen in told), all(seen.holds for seen in swings)]
     better, pair, spool, saved = (claim.found for claim in claims)

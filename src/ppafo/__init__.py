@@ -58,7 +58,7 @@ _HOMES = {
     "ppafo.analyses.linearise.model": ("LinearModel",),
     "ppafo.analyses.parts.answer": ("Parts",),
     "ppafo.analyses.parts.question": ("parts",),
-    "ppafo.analyses.reproduce.answer": ("Reproduction",),
+    "ppafo.analyses.reproduce.result": ("Reproduction",),
     "ppafo.analyses.sets.audit": ("audit",),
     "ppafo.analyses.sweep.answer": ("load_study_results",),
     "ppafo.analyses.sweep.results": ("StudyResults",),

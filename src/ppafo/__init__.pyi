@@ -14,8 +14,8 @@ from ppafo.analyses.linearise.model import LinearModel as LinearModel
 from ppafo.analyses.linearise.question import linearise as linearise
 from ppafo.analyses.parts.answer import Parts as Parts
 from ppafo.analyses.parts.question import parts as parts
-from ppafo.analyses.reproduce.answer import Reproduction as Reproduction
 from ppafo.analyses.reproduce.question import reproduce as reproduce
+from ppafo.analyses.reproduce.result import Reproduction as Reproduction
 from ppafo.analyses.sensitivity.question import sensitivity as sensitivity
 from ppafo.analyses.sets.audit import audit as audit
 from ppafo.analyses.sweep.answer import load_study_results as load_study_results

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.analyses.reproduce.answer import Reproduction, Studies, finding_of, finding_of_studies
+from ppafo.analyses.reproduce.answer import finding_of, finding_of_studies
 from ppafo.analyses.reproduce.question import reproduce
+from ppafo.analyses.reproduce.result import Reproduction, Studies
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import build_parser, main
 from ppafo.golden_bits import golden_hashes

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from ppafo.analyses.reproduce import solve
-from ppafo.analyses.reproduce.answer import Reproduction
 from ppafo.analyses.reproduce.bench import bench_figure
 from ppafo.analyses.reproduce.claim import VERDICTS
+from ppafo.analyses.reproduce.result import Reproduction
 from ppafo.cli.main import main
 from ppafo.errors import SimulationError
 from ppafo.progress import Report

@@ -2,8 +2,8 @@
 
 import pytest
 
-from ppafo.analyses.reproduce.answer import Reproduction
 from ppafo.analyses.reproduce.claim import Claim, Observation
+from ppafo.analyses.reproduce.result import Reproduction
 from ppafo.analyses.reproduce.step_response import SupplyLevels, step_events, step_observations
 from ppafo.running import simulate
 

@@ -78,8 +78,8 @@ def what_is_there(folder: Path, names: list[str]) -> tuple[str, dict[str, Any]]:
     command = marking_command(folder)
     pictures = [name for name in names if name.endswith(_PICTURES)]
     page = next((name for name in names if name.endswith(".html")), None)
-    shown = ", ".join(pictures[:_NAMED]) + (", ..." if len(pictures) > _NAMED else "")
-    has = f"has its figures ({shown})" if pictures else "has no figures"
+    named = ", ".join(pictures[:_NAMED]) + (", ..." if len(pictures) > _NAMED else "")
+    has = f"has its figures ({named})" if pictures else "has no figures"
     opened = page or next((name for name in names if name.endswith(".txt")), MARK)
-    said = f"{folder}: the result of 'ppafo {command}' {has}; open {folder / opened}"
-    return said, {"files": [], "command": command, "figures": pictures, "open": str(folder / opened)}
+    sentence = f"{folder}: the result of 'ppafo {command}' {has}; open {folder / opened}"
+    return sentence, {"files": [], "command": command, "figures": pictures, "open": str(folder / opened)}

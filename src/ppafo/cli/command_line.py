@@ -10,7 +10,7 @@ import inspect
 import re
 import types
 import typing
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
@@ -59,19 +59,19 @@ class Command:
     listed: str = ""
     default_folder: str = ""
     first_line: str = ""
-    found: _Verb | None = None
-    """The verb itself, of another package, in place of where it is."""
+    loaded_verb: _Verb | None = None
+    """Function of a command of another package, which has no path here."""
 
     def function(self) -> _Verb:
         """Import and return the function of the command."""
-        verb: _Verb = self.found or kind_at(self.verb)
+        verb: _Verb = self.loaded_verb or kind_at(self.verb)
         return verb
 
     @property
     def summary(self) -> str:
         """First line of the function's docstring, as an entry of the list of commands."""
-        first = (self.first_line or (self.function().__doc__ or "").strip().partition("\n")[0]).rstrip(".")
-        return first[:1].lower() + first[1:]
+        first_line = self.first_line or (inspect.getdoc(self.function()) or "").split("\n", 1)[0]
+        return first_line[:1].lower() + first_line[1:].rstrip(".")
 
     @property
     def lists(self) -> bool:
@@ -96,6 +96,7 @@ _PLAIN: Mapping[type, Word] = {
 """Parser of each type without a ``Word``."""
 
 _PARAMETER = re.compile(r"(\w+): (.*)")
+"""First line of a parameter in the docstring of a verb."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,19 +152,7 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
     verb = command.function()
     readings = list(parameters_of(verb))
     names = [parameter.name for parameter, _ in readings]
-    helps: dict[str, str] = {}
-    latest, depth = "", 0
-    for line in (inspect.getdoc(verb) or "").splitlines():
-        indent = len(line) - len(line.lstrip())
-        # Only names of parameters: a sentence of the docstring may have a colon too.
-        begun = _PARAMETER.fullmatch(line.strip())
-        if latest and indent > depth:
-            helps[latest] += f" {line.strip()}"
-        elif begun is not None and begun[1] in names:
-            latest, depth = begun[1], indent
-            helps[latest] = begun[2]
-        else:
-            latest = ""
+    helps = _helps_in(inspect.getdoc(verb) or "", names)
     # argparse gives an optional word nothing where options stand between it and a repeated one.
     is_alone = sum(not option_of(parameter, reading) for parameter, reading in readings) == 1
     for parameter, reading in readings:
@@ -180,10 +169,28 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
         help="a module of yours that files may name, such as laws.py",
     )
     if OUT not in names:
-        what = "also write the result as files into this folder"
+        help_text = "also write the result as files into this folder"
         if command.default_folder:
-            what = "the result folder; default one in out/ named after what ran"
-        parser.add_argument("--out", metavar="DIR", type=Path, help=what)
+            help_text = "the result folder; default one in out/ named after what ran"
+        parser.add_argument("--out", metavar="DIR", type=Path, help=help_text)
+
+
+def _helps_in(docstring: str, names: Collection[str]) -> dict[str, str]:
+    """Return the lines on the named parameters in a docstring, each with its indented continuation."""
+    helps: dict[str, str] = {}
+    name, depth = "", 0
+    for line in docstring.splitlines():
+        indent = len(line) - len(line.lstrip())
+        # Only names of parameters: a sentence of the docstring may have a colon too.
+        first_line = _PARAMETER.fullmatch(line.strip())
+        if name and indent > depth:
+            helps[name] += f" {line.strip()}"
+        elif first_line is not None and first_line[1] in names:
+            name, depth = first_line[1], indent
+            helps[name] = first_line[2]
+        else:
+            name = ""
+    return helps
 
 
 def _add_parameter(
@@ -244,8 +251,8 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
         library: TomlKind | None = kind_at(command.library) if command.library else None
         noun = command.listed or (library.noun if library is not None else "")
         if command.listing:
-            listed: output.CommandOutput | list[dict[str, Any]] = kind_at(command.listing)()
-            listing = listed if isinstance(listed, output.CommandOutput) else output.listing(noun, listed)
+            entries: output.CommandOutput | list[dict[str, Any]] = kind_at(command.listing)()
+            listing = entries if isinstance(entries, output.CommandOutput) else output.listing(noun, entries)
         else:
             assert library is not None
             files = {name: library.parse(library.read(name), name) for name in library.names()}
@@ -334,11 +341,11 @@ class CommandParser(argparse.ArgumentParser):
 
     def options(self) -> set[str]:
         """Return all options of this parser and of its subcommands."""
-        found = {name for action in self._actions for name in action.option_strings}
+        options = {name for action in self._actions for name in action.option_strings}
         for action in self._actions:
             if isinstance(action.choices, Mapping):
-                found = found.union(*(parser.options() for parser in action.choices.values()))
-        return found
+                options = options.union(*(parser.options() for parser in action.choices.values()))
+        return options
 
 
 def check_options(words: Sequence[str], parser: CommandParser) -> None:
@@ -355,6 +362,6 @@ def check_options(words: Sequence[str], parser: CommandParser) -> None:
         )
         if not is_value and not is_known:
             # Without the dashes, which all have in common and which would make strangers look alike.
-            bare = [option.removeprefix("--") for option in known if option.startswith("--")]
-            hint = nearest_name(name.strip("-"), bare).replace("'", "'--", 1)
+            names = [option.removeprefix("--") for option in known if option.startswith("--")]
+            hint = nearest_name(name.strip("-"), names).replace("'", "'--", 1)
             raise UsageError(f"there is no option '{name}'{hint}; available: {', '.join(known)}")

@@ -21,7 +21,7 @@ def _of_scenario(verb: str, first_line: str = "") -> Command:
     return Command(verb, listing="ppafo.cli.simulate:list_descriptions", listed="scenario", first_line=first_line)
 
 
-_EVERY: dict[str, dict[str, Command | CommandGroup]] = {
+_ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
     "the paper": {
         "reproduce": Command(
             f"{_ANALYSES}.reproduce.question:reproduce",
@@ -137,22 +137,24 @@ _EVERY: dict[str, dict[str, Command | CommandGroup]] = {
 """Headings of the help, by what somebody has come for, and under each the commands, guests' too."""
 
 
-def _installed(one: Command | CommandGroup) -> Command | CommandGroup | None:
+def _installed(entry: Command | CommandGroup) -> Command | CommandGroup | None:
     """Return a command, a group without its missing commands, or None if nothing remains."""
-    if isinstance(one, Command):
-        return one if is_installed(one.verb) else None
+    if isinstance(entry, Command):
+        return entry if is_installed(entry.verb) else None
     return CommandGroup(
-        one.summary, {name: action for name, action in one.actions.items() if is_installed(action.verb)}
+        entry.summary, {name: action for name, action in entry.actions.items() if is_installed(action.verb)}
     )
 
 
 HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
-    heading: {name: there for name, one in group.items() if (there := _installed(one)) is not None}
-    for heading, group in _EVERY.items()
+    heading: {name: entry for name, listed in group.items() if (entry := _installed(listed)) is not None}
+    for heading, group in _ALL_HEADINGS.items()
 }
 """The headings with the commands that are installed."""
 
-COMMANDS: dict[str, Command | CommandGroup] = {name: one for group in HEADINGS.values() for name, one in group.items()}
+COMMANDS: dict[str, Command | CommandGroup] = {
+    name: entry for group in HEADINGS.values() for name, entry in group.items()
+}
 """The commands of this package by name."""
 
 OTHERS: Kinds[FunctionType] = Kinds("ppafo.commands", "command", FunctionType, {})
@@ -164,17 +166,17 @@ def check_words(words: list[str]) -> None:
 
     Raises KindError for a command of another package that is installed and cannot be used.
     """
-    given = [word for word in words if not word.startswith("-")]
+    named = [word for word in words if not word.startswith("-")]
     # Options alone, such as --version, are for the parser.
-    if not given:
+    if not named:
         return
-    one = next((group[given[0]] for group in _EVERY.values() if given[0] in group), None)
-    shown = given[: 2 if isinstance(one, CommandGroup) else 1]
-    if isinstance(one, CommandGroup):
-        one = one.actions.get(shown[-1])
-    if one is not None and not is_installed(one.verb):
-        raise UsageError(f"'ppafo {' '.join(shown)}' is part of {package_of(one.verb)}, which is not installed")
-    word = given[0]
+    entry = next((group[named[0]] for group in _ALL_HEADINGS.values() if named[0] in group), None)
+    shown = named[: 2 if isinstance(entry, CommandGroup) else 1]
+    if isinstance(entry, CommandGroup):
+        entry = entry.actions.get(shown[-1])
+    if entry is not None and not is_installed(entry.verb):
+        raise UsageError(f"'ppafo {' '.join(shown)}' is part of {package_of(entry.verb)}, which is not installed")
+    word = named[0]
     name_modules_in(word)
     if word not in COMMANDS and word not in OTHERS:
         known = tuple(dict.fromkeys((*COMMANDS, *OTHERS)))
@@ -182,7 +184,7 @@ def check_words(words: list[str]) -> None:
     command = COMMANDS.get(word)
     # A group alone is a mistake, unless its help is asked for, which the parser prints.
     if isinstance(command, CommandGroup) and "-h" not in words and "--help" not in words:
-        actions, action = list(command.actions), given[1] if len(given) > 1 else None
+        actions, action = list(command.actions), named[1] if len(named) > 1 else None
         if action is None and "--list" in words and "list" in actions:
             raise UsageError(f"{word}: there is no option '--list'; 'ppafo {word} list' shows what there is")
         if action is None:
@@ -196,8 +198,8 @@ def list_commands() -> str:
     """Return the list of commands with summaries, by heading, including commands of other packages."""
     # The summary of a command is in its function, so that the ones of other packages are loaded here.
     OTHERS.load_all()
-    groups = {heading: {name: one.summary for name, one in group.items()} for heading, group in HEADINGS.items()}
-    others = {name: Command("", found=verb).summary for name, verb in OTHERS.loaded().items()}
+    groups = {heading: {name: entry.summary for name, entry in group.items()} for heading, group in HEADINGS.items()}
+    others = {name: Command("", loaded_verb=verb).summary for name, verb in OTHERS.loaded().items()}
     if others:
         groups["of other packages"] = others
     width = max(len(name) for group in groups.values() for name in group)

@@ -57,11 +57,11 @@ def doctor(
     from ppafo.engine.cache import tidying
     from ppafo.engine.cache.folder import cache_folder, refusal
 
-    asked = {"--warm": warm, "--clear": clear, "--bits": bits, "--schema": schema, "--programs": programs}
-    given = [option for option, value in asked.items() if value]
+    requests = {"--warm": warm, "--clear": clear, "--bits": bits, "--schema": schema, "--programs": programs}
+    options = [option for option, value in requests.items() if value]
     # Two of them contradict each other, or are two answers.
-    if len(given) > 1:
-        raise DataError(f"{given[1]}: not allowed with {given[0]}")
+    if len(options) > 1:
+        raise DataError(f"{options[1]}: not allowed with {options[0]}")
     if schema is not None:
         if schema not in FORMATS:
             hint = nearest_name(schema, FORMATS)
@@ -89,13 +89,13 @@ def _bits() -> CommandOutput:
     from ppafo.engine.loading import compilers_to_try
     from ppafo.golden_bits import found_bits
 
-    found = dict(found_bits())
-    others = [name for name, is_equal in found.items() if not is_equal]
-    by = compilers_to_try()[0].name
-    lines = [f"bits: {len(found) - len(others)} of {len(found)} runs have the recorded bits ({by})"]
+    is_equal = dict(found_bits())
+    others = [name for name in is_equal if not is_equal[name]]
+    compiler = compilers_to_try()[0].name
+    lines = [f"bits: {len(is_equal) - len(others)} of {len(is_equal)} runs have the recorded bits ({compiler})"]
     lines += [f"  {name}: other bits; give its scenario, this computer and compiler in a report" for name in others]
     code = EXIT_CHECK_FAILED if others else EXIT_GOOD
-    return CommandOutput("\n".join(lines), {"compiler": by, "same_bits": found}, "bits", code)
+    return CommandOutput("\n".join(lines), {"compiler": compiler, "same_bits": is_equal}, "bits", code)
 
 
 def models_document(folder: Path | None, why_not: str) -> dict[str, Any]:

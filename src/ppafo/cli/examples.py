@@ -21,21 +21,22 @@ def load_examples() -> dict[str, dict[str, Any]]:
 
 def example_files(name: str) -> dict[PurePosixPath, bytes]:
     """Return the files of an example by path in its folder."""
-    found, left = {}, [(_FOLDER / name, PurePosixPath())]
-    for folder, path in left:
+    files, folders = {}, [(_FOLDER / name, PurePosixPath())]
+    for folder, path in folders:
         for item in folder.iterdir():
             if item.is_file():
-                found[path / item.name] = item.read_bytes()
+                files[path / item.name] = item.read_bytes()
             # A script of an example that was run where it is leaves one.
             elif item.name != "__pycache__":
-                left.append((item, path / item.name))
-    return dict(sorted(found.items()))
+                folders.append((item, path / item.name))
+    return dict(sorted(files.items()))
 
 
 def list_examples() -> CommandOutput:
     """Return the list of examples with summaries."""
-    said = listing("example", [{"name": name, **one} for name, one in load_examples().items()], ("name", "summary"))
-    return replace(said, text=f"{said.text}\n\nppafo new example NAME writes one into a new folder.")
+    rows = [{"name": name, **example} for name, example in load_examples().items()]
+    examples = listing("example", rows, ("name", "summary"))
+    return replace(examples, text=f"{examples.text}\n\nppafo new example NAME writes one into a new folder.")
 
 
 def write_example(name: str, folder: Path) -> CommandOutput:

@@ -39,10 +39,10 @@ def export_figure(folder: Folder, *, out: File | None = None) -> CommandOutput:
     load_drawing()
     drawn = draw_folder(folder, names)
     if not drawn:
-        said, document = what_is_there(folder, names)
+        message, document = what_is_there(folder, names)
         if out is not None:
-            raise DataError(f"--out {out}: there is no figure to draw: {said}")
-        return CommandOutput(said, document)
+            raise DataError(f"--out {out}: there is no figure to draw: {message}")
+        return CommandOutput(message, document)
     if out is not None:
         if len(drawn) > 1:
             raise DataError(

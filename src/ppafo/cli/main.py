@@ -45,11 +45,13 @@ def completion_script(shell: str) -> str:
     """Return the completion script of a shell of ``SHELLS`` for commands, options and bundled names."""
     # What may follow the first words of a line; a group after its actions.
     following: dict[str, list[str]] = {}
-    for name, one in COMMANDS.items():
-        if isinstance(one, CommandGroup):
-            following |= {f"{name} {action} ": _words(command) for action, command in one.actions.items()}
-        following[f"{name} "] = list(one.actions) if isinstance(one, CommandGroup) else _words(one)
-    cases = [f'      "{words}"*) words="{" ".join(found)}" ;;' for words, found in following.items()]
+    for name, entry in COMMANDS.items():
+        if isinstance(entry, CommandGroup):
+            following |= {f"{name} {action} ": _words(command) for action, command in entry.actions.items()}
+            following[f"{name} "] = list(entry.actions)
+        else:
+            following[f"{name} "] = _words(entry)
+    cases = [f'      "{words}"*) words="{" ".join(choices)}" ;;' for words, choices in following.items()]
     head = "autoload -U +X bashcompinit && bashcompinit\n" if shell == "zsh" else ""
     return _SCRIPT.format(head=head, commands=" ".join(COMMANDS), cases="\n".join(cases))
 
@@ -58,14 +60,14 @@ def _words(command: Command) -> list[str]:
     """Return the options of a command, and the names accepted as values."""
     parser = CommandParser(add_help=True)
     add_parameters(parser, command)
-    found = sorted(option for option in parser.options() if option.startswith("--"))
+    words = sorted(option for option in parser.options() if option.startswith("--"))
     if command.library:
-        found += kind_at(command.library).names()
+        words += kind_at(command.library).names()
     # Private, but argparse tells it nowhere else.
     for action in parser._actions:
-        found += map(str, action.choices or ())
-        found += kind_at(_NAMES[action.metavar])() if action.metavar in _NAMES else ()
-    return list(dict.fromkeys(found))
+        words += map(str, action.choices or ())
+        words += kind_at(_NAMES[action.metavar])() if action.metavar in _NAMES else ()
+    return list(dict.fromkeys(words))
 
 
 FIRST_STEPS = """\
@@ -96,7 +98,7 @@ OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
 
 def build_parser(words: Sequence[str]) -> CommandParser:
     """Return the parser; only the module of the requested command is imported, so that help is quick."""
-    chosen = [word for word in words if not word.startswith("-")]
+    names = [word for word in words if not word.startswith("-")]
     parser = CommandParser(
         prog="ppafo",
         usage="ppafo [-h] [--version] COMMAND ...",
@@ -110,21 +112,21 @@ def build_parser(words: Sequence[str]) -> CommandParser:
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", prog="ppafo", help=argparse.SUPPRESS)
     for name in dict.fromkeys((*COMMANDS, *OTHERS)):
         # Of every other command the name alone: a verb that is not called is not imported.
-        if name not in chosen[:1]:
+        if name not in names[:1]:
             subparsers.add_parser(name)
             continue
-        command = COMMANDS.get(name) or Command("", found=OTHERS[name])
+        command = COMMANDS.get(name) or Command("", loaded_verb=OTHERS[name])
         if isinstance(command, CommandGroup):
             group = subparsers.add_parser(name, description=_sentence(command.summary))
             actions = group.add_subparsers(dest="action", metavar="ACTION", required=True)
             for action, member in command.actions.items():
                 summary = member.summary
                 subparser = actions.add_parser(action, help=summary, description=_sentence(summary))
-                if action in chosen[1:2]:
+                if action in names[1:2]:
                     _add_command(subparser, f"{name} {action}", member, words)
         else:
-            described = subparsers.add_parser(name, description=_sentence(command.summary))
-            _add_command(described, name, command, words)
+            subparser = subparsers.add_parser(name, description=_sentence(command.summary))
+            _add_command(subparser, name, command, words)
     return parser
 
 

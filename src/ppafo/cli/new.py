@@ -141,10 +141,10 @@ def list_kinds() -> list[dict[str, str]]:
     from importlib import resources
 
     rows = []
-    for kind, one in KINDS.items():
-        files = resources.files("ppafo").joinpath(*one.shipped.split("/")).iterdir()
+    for kind, new_file in KINDS.items():
+        files = resources.files("ppafo").joinpath(*new_file.shipped.split("/")).iterdir()
         names = sorted(Path(file.name).stem for file in files if file.name.endswith(_SUFFIX))
-        rows.append({"name": kind, "noun": one.noun, "shipped": ", ".join(names)})
+        rows.append({"name": kind, "noun": new_file.noun, "shipped": ", ".join(names)})
     return [*rows, {"name": EXAMPLE, "noun": "files of a how-to page", "shipped": "see 'ppafo new example'"}]
 
 

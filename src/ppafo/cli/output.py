@@ -42,8 +42,8 @@ def check_output(out: Path | None, command: str) -> None:
 
 
 def check_new_file(path: Path) -> None:
-    """Refuse an ``--out`` file that exists, since no mark tells if ppafo wrote it."""
-    # A link that leads nowhere is there as well: it would be written through.
+    """Raise DataError for an ``--out`` file that exists: it has no mark of the command that wrote it."""
+    # A link to nowhere exists too, and writing would create the file that it points to.
     if os.path.lexists(path):
         raise DataError(f"--out {path}: already exists; remove it or choose another name")
 
@@ -75,31 +75,19 @@ class CommandOutput:
     finish: Callable[[], str] | None = None
 
 
-def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_written: bool = False) -> int:
+def deliver(answer: Any, as_json: bool, out: Path | None, command: str, *, has_written: bool = False) -> int:
     """Write the result of a command into a folder if requested, print it as text or JSON, and return the exit code.
 
     ``has_written`` is True for a command that writes its files itself and returns the folder.
     """
-    if isinstance(found, CommandOutput):
-        if out is not None:
-            write_files(out, said_files(found), command)
-        if found.finish is None:
-            print_result(found.text, found.document, as_json)
-        elif as_json:
-            found.finish()
-            print_result("", found.document, as_json)
-        else:
-            print_result(found.text, {}, as_json)
-            _tell_drawing()
-            print_result(found.finish(), {}, as_json)
-        if found.aside:
-            print(f"ppafo: {found.aside}", file=sys.stderr)
-        return found.exit_code
+    if isinstance(answer, CommandOutput):
+        _deliver_output(answer, as_json, out, command)
+        return answer.exit_code
     from ppafo.report.finding import REPORT, text_of
 
-    text, document = text_of(found), found.to_dict()
+    text, document = text_of(answer), answer.to_dict()
     folder = str(document["folder"]) if has_written else None
-    made: list[str] = []
+    usable_files: list[str] = []
     if not as_json:
         # Numbers at once: drawing takes longer than most runs.
         print_result(text, {}, as_json)
@@ -111,31 +99,46 @@ def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_wr
         load_drawing()
         from ppafo.report.finding import files_of
 
-        write_files(out, files_of(found), command)
+        write_files(out, files_of(answer), command)
         folder = str(out)
         # What other commands take, such as the gait of 'ppafo walk --gait'.
-        made = [f"file to use: {out / name}" for name in found.files if name.endswith(".toml")]
+        usable_files = [f"file to use: {out / name}" for name in answer.files if name.endswith(".toml")]
     if as_json:
         print_result("", document if folder is None else {**document, "folder": folder}, as_json)
     elif folder is not None:
-        print_result("\n".join(["", f"report: {folder}/{REPORT}", *made]), {}, as_json)
-    return EXIT_GOOD if found.passed else EXIT_CHECK_FAILED
+        print_result("\n".join(["", f"report: {folder}/{REPORT}", *usable_files]), {}, as_json)
+    return EXIT_GOOD if answer.passed else EXIT_CHECK_FAILED
 
 
-def said_files(said: CommandOutput) -> dict[str, bytes]:
+def _deliver_output(output: CommandOutput, as_json: bool, out: Path | None, command: str) -> None:
+    if out is not None:
+        write_files(out, files_of_output(output), command)
+    if output.finish is None:
+        print_result(output.text, output.document, as_json)
+    elif as_json:
+        output.finish()
+        print_result("", output.document, as_json)
+    else:
+        print_result(output.text, {}, as_json)
+        _tell_drawing()
+        print_result(output.finish(), {}, as_json)
+    if output.aside:
+        print(f"ppafo: {output.aside}", file=sys.stderr)
+
+
+def files_of_output(output: CommandOutput) -> dict[str, bytes]:
     """Return text, JSON document and figure as the files of a result folder."""
-    contents = {f"{said.name}.txt": said.text, f"{said.name}.json": json_text(said.document)}
+    contents = {f"{output.name}.txt": output.text, f"{output.name}.json": json_text(output.document)}
     files = {file: f"{content}\n".encode() for file, content in contents.items()}
-    if said.draw is None:
+    if output.draw is None:
         return files
     from ppafo.report.drawing import load_drawing
 
     load_drawing()
     from ppafo.report.style import render_figure
 
-    return files | {
-        f"{said.name}.{form}": content for form, content in render_figure(said.draw(), ("png", "svg")).items()
-    }
+    figures = render_figure(output.draw(), ("png", "svg"))
+    return files | {f"{output.name}.{file_format}": content for file_format, content in figures.items()}
 
 
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
@@ -146,9 +149,9 @@ def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
     """Print the text, or the document as JSON; ends quietly if the pipe is closed, as by ``... | head``."""
     with printing():
         # A terminal without a character shows its number, where Python would end with an error.
-        shown = json_text(document) if as_json else _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text)
+        printed = json_text(document) if as_json else _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text)
         encoding = sys.stdout.encoding or "utf-8"
-        print(shown.encode(encoding, "backslashreplace").decode(encoding), flush=True)
+        print(printed.encode(encoding, "backslashreplace").decode(encoding), flush=True)
 
 
 @contextlib.contextmanager
@@ -182,18 +185,18 @@ def export(
     out: Path,
     command: str,
     make: Callable[[], Mapping[str, bytes]],
-    following: Callable[[Sequence[str]], str],
-    **more: Any,
+    next_step: Callable[[Sequence[str]], str],
+    **entries: Any,
 ) -> CommandOutput:
-    """Write the files of an export, and return their names and the next command."""
+    """Write the files of an export, and return their names, the next command, and ``entries`` of the document."""
     # Before the files are made: a folder that is refused must not cost their making.
     check_output(out, command)
     contents = make()
     write_files(out, contents, command)
     files = list(contents)
-    said = following(files)
-    document = {"folder": str(out), **more, "files": files, "next": said}
-    return CommandOutput(f"written: {out} ({', '.join(files)}); next: {said}", document)
+    following = next_step(files)
+    document = {"folder": str(out), **entries, "files": files, "next": following}
+    return CommandOutput(f"written: {out} ({', '.join(files)}); next: {following}", document)
 
 
 def export_file(out: Path, make: Callable[[], bytes], following: str) -> CommandOutput:
@@ -211,11 +214,10 @@ def listing(noun: str, rows: Sequence[Mapping[str, Any]], columns: Sequence[str]
     """Return a list with one row per entry and the given columns (default: all), and all entries as data."""
     from ppafo.report.writing import align_columns
 
-    shown = [[row[name] for name in columns or row] for row in rows]
     # A count is shown with what it counts, the name of its column.
     cells = [
-        [f"{cell:,} {name}" if isinstance(cell, int) else cell for cell, name in zip(row, rows[0], strict=False)]
-        for row in shown
+        [f"{row[name]:,} {name}" if isinstance(row[name], int) else row[name] for name in columns or row]
+        for row in rows
     ]
     plural = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
     return CommandOutput("\n".join(align_columns(cells, len(cells[0]))), {plural: list(rows)}, plural)

@@ -27,9 +27,8 @@ from ppafo.engine.composer import COMPILED_BUILTINS
 from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
-from ppafo.engine.replacements import Replacements
 from ppafo.engine.rows import leaves, rebuilt
-from ppafo.engine.source_text import MadeFrom, NameRead
+from ppafo.engine.source_text import MadeFrom, NameRead, Replacements
 from ppafo.errors import ProgramError
 from ppafo.model.binding import is_made_of
 from ppafo.model.declaration import PlainFunction
@@ -59,25 +58,25 @@ class PythonFunctions:
     ) -> None:
         self._replacements, self._rows, self._operations = replacements, rows, operations
         self._is_plain = operations is None and replacements == Replacements()
-        self._made: dict[Any, Any] = {}
+        self._copies: dict[Any, Any] = {}
         self.made_from = MadeFrom()
 
     def parts(self, program: Program) -> Any:
         """All public attributes of a program, computed once, with functions replaced."""
         names = [name for name in dir(program) if not name.startswith("_")]
         values = {name: getattr(program, name) for name in names}
-        return SimpleNamespace(**{name: self.part(value) for name, value in values.items()})
+        return SimpleNamespace(**{name: self.replaced(value) for name, value in values.items()})
 
-    def part(self, value: Any) -> Any:
+    def replaced(self, value: Any) -> Any:
         """Component of a program or an argument, with its functions replaced."""
         if isinstance(value, FunctionType | ModuleType):
             return self.of(value)
         if isinstance(value, Mapping):
-            return {key: self.part(part) for key, part in value.items()}
+            return {key: self.replaced(item) for key, item in value.items()}
         if is_made_of(value):
-            return type(value)(*map(self.part, value))
+            return type(value)(*map(self.replaced, value))
         if is_dataclass(value) and not isinstance(value, type):
-            changed = {part.name: self.part(getattr(value, part.name)) for part in fields(value) if part.init}
+            changed = {item.name: self.replaced(getattr(value, item.name)) for item in fields(value) if item.init}
             return replace(value, **changed)
         return value
 
@@ -90,37 +89,37 @@ class PythonFunctions:
             return self._function(self._replacements.called(value, inside))
         if isinstance(value, ModuleType) and value.__name__.startswith(OWN):
             return self._module(value)
-        return MATH if value is math and self._operations is GOING_ON else value
+        return MATH if value is math and self._operations is WITHOUT_EXCEPTIONS else value
 
     def _module(self, module: ModuleType) -> Any:
-        if module not in self._made:
-            self._made[module] = space = SimpleNamespace()
+        if module not in self._copies:
+            self._copies[module] = space = SimpleNamespace()
             own = {name: value for name, value in vars(module).items() if not name.startswith("__")}
             vars(space).update({name: self.of(value) for name, value in own.items()})
-        return self._made[module]
+        return self._copies[module]
 
     def _function(self, function: Any) -> Any:
         """Copy of a function with replaced global names; the function itself if no name differs."""
         # A valve or law of somebody's own module calls the model too; the standard library does not.
         if function.__module__.partition(".")[0] in sys.stdlib_module_names:
             return function
-        if function not in self._made:
+        if function not in self._copies:
             code = function.__code__ if self._operations is None else rewritten(function, self._operations.writer)
-            given = function.__globals__
+            names = function.__globals__
             # A module has many more names than a function asks for.
-            read = {name: given[name] for name in _names_of(function.__code__) if name in given}
-            self.made_from.reads += [NameRead(given, name, value) for name, value in read.items()]
-            scope: dict[str, Any] = {"__builtins__": given["__builtins__"], "__name__": function.__module__}
+            read = {name: names[name] for name in _names_of(function.__code__) if name in names}
+            self.made_from.reads += [NameRead(names, name, value) for name, value in read.items()]
+            scope: dict[str, Any] = {"__builtins__": names["__builtins__"], "__name__": function.__module__}
             copied = FunctionType(code, scope, function.__name__, function.__defaults__, function.__closure__)
             rows = self._replacements.rows.get(function, ())
-            self._made[function] = self._law(copied, rows) if rows else copied
+            self._copies[function] = self._law(copied, rows) if rows else copied
             scope |= {name: self.of(value, function) for name, value in read.items()}
-            copied.__kwdefaults__ = self.part(function.__kwdefaults__ or {})
+            copied.__kwdefaults__ = self.replaced(function.__kwdefaults__ or {})
             if self._operations is not None:
                 scope |= self._operations.names
             elif not rows and not copied.__kwdefaults__ and all(scope[name] is read[name] for name in read):
-                self._made[function] = function
-        return self._made[function]
+                self._copies[function] = function
+        return self._copies[function]
 
     def _law(self, function: FunctionType, rows: tuple[str, ...]) -> PlainFunction:
         """Return the law of an effect with the signature of its port, bound to the present rows of the effect."""
@@ -128,8 +127,8 @@ class PythonFunctions:
         own = [name for name in names if name not in rows]
 
         def called(*arguments: Any, **named: Any) -> Any:
-            given = dict(zip(own, arguments, strict=False))
-            return function(**given, **named, **{row: self._rows[row] for row in rows})
+            by_name = dict(zip(own, arguments, strict=False))
+            return function(**by_name, **named, **{row: self._rows[row] for row in rows})
 
         return called
 
@@ -184,9 +183,9 @@ def rewritten(function: FunctionType, writer: Callable[[FunctionType], ast.NodeT
     code = function.__code__
     text = textwrap.dedent(inspect.getsource(function))
     tree = writer(function).visit(parse_module("\n" * (code.co_firstlineno - 1) + text))
-    whole = compile(ast.fix_missing_locations(tree), code.co_filename, "exec", dont_inherit=True)
+    module = compile(ast.fix_missing_locations(tree), code.co_filename, "exec", dont_inherit=True)
     return next(
-        constant for constant in whole.co_consts if isinstance(constant, CodeType) and constant.co_name == code.co_name
+        constant for constant in module.co_consts if isinstance(constant, CodeType) and constant.co_name == code.co_name
     )
 
 
@@ -247,10 +246,10 @@ def _over_samples(make: Callable[[Operations | None], PlainFunction], arguments:
         # A choice works out what no sample takes, too.
         return make(COLUMNS)(*arguments)
     try:
-        return _gathered(list(map(make(None), *(_samples_of(argument, size) for argument in arguments))))
+        return _stacked(list(map(make(None), *(_samples_of(argument, size) for argument in arguments))))
     except (ArithmeticError, ValueError):
         # A run that diverged has numbers of which Python would make none.
-        return _gathered(list(map(make(GOING_ON), *(_samples_of(argument, size) for argument in arguments))))
+        return _stacked(list(map(make(WITHOUT_EXCEPTIONS), *(_samples_of(argument, size) for argument in arguments))))
 
 
 def _columns_of(argument: Any) -> list[Any]:
@@ -275,13 +274,13 @@ def _samples_of(argument: Any, size: int) -> Iterable[Any]:
     return (rebuilt(type(argument), values) for values in numbers)
 
 
-def _gathered(results: list[Any]) -> Any:
+def _stacked(results: list[Any]) -> Any:
     """Return columns of the numbers of results of one shape."""
     first = results[0]
     if not isinstance(first, tuple):
         return np.array(results, dtype=np.float64)
-    parts = [_gathered(list(part)) for part in zip(*results, strict=True)]
-    return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)
+    columns = [_stacked(list(items)) for items in zip(*results, strict=True)]
+    return type(first)(*columns) if hasattr(first, "_fields") else tuple(columns)
 
 
 def _chosen(test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
@@ -294,8 +293,8 @@ def _where(test: Any, yes: Any, no: Any) -> Any:
     if not isinstance(test, np.ndarray):
         return yes if test else no
     if isinstance(yes, tuple):
-        parts = [_where(test, one, other) for one, other in zip(yes, no, strict=True)]
-        return type(yes)(*parts) if hasattr(yes, "_fields") else tuple(parts)
+        items = [_where(test, *pair) for pair in zip(yes, no, strict=True)]
+        return type(yes)(*items) if hasattr(yes, "_fields") else tuple(items)
     return np.where(test, yes, no)
 
 
@@ -327,7 +326,7 @@ def _call(name: str, *arguments: ast.expr) -> ast.expr:
     return ast.Call(ast.Name(name, ast.Load()), list(arguments), [])
 
 
-def _later(value: ast.expr) -> ast.Lambda:
+def _deferred(value: ast.expr) -> ast.Lambda:
     return ast.Lambda(ast.arguments([], [], None, [], [], None, []), value)
 
 
@@ -365,7 +364,7 @@ class _ForColumns(ast.NodeTransformer):
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
         test, yes, no = (self.visit(part) for part in (node.test, node.body, node.orelse))
-        return _call("_chosen", test, _later(yes), _later(no))
+        return _call("_chosen", test, _deferred(yes), _deferred(no))
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
         # Both sides are computed: columns have no short circuit.
@@ -440,7 +439,7 @@ MATH = SimpleNamespace(
 """Variant of ``math`` whose functions return infinity on overflow or at a pole, and NaN outside their domain."""
 
 
-class _GoingOn(ast.NodeTransformer):
+class _WithoutExceptions(ast.NodeTransformer):
     def __init__(self, _function: FunctionType) -> None:
         """Accept any function, because every function can be rewritten in this way."""
 
@@ -451,5 +450,5 @@ class _GoingOn(ast.NodeTransformer):
         return ast.copy_location(_call("_quotient", node.left, node.right), node)
 
 
-GOING_ON = Operations(_GoingOn, {"_quotient": quotient, "int": whole_part})
+WITHOUT_EXCEPTIONS = Operations(_WithoutExceptions, {"_quotient": quotient, "int": whole_part})
 """Operations that continue where Python would raise an exception."""

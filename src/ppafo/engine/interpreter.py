@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.in_python import GOING_ON, Operations, functions_of
+from ppafo.engine.in_python import WITHOUT_EXCEPTIONS, Operations, functions_of
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.step import loop
@@ -49,7 +49,7 @@ def run_lanes(
         lanes = PythonLanes(tables, *histories)
         linked = functions_of(program, lanes, operations)
         parts: Any = linked.parts(program)
-        linked.of(function)(parts, lanes, *map(linked.part, arguments))
+        linked.of(function)(parts, lanes, *map(linked.replaced, arguments))
         for groups, table in tables:
             for number, lane in enumerate(lanes.lanes):
                 table[:, number] = _numbers_of(lane, groups)
@@ -62,7 +62,7 @@ def run_lanes(
         for array, kept in zip(histories, before, strict=False):
             array[:] = kept
         # Operations that Python refuses give what compiled code gets.
-        run(GOING_ON)
+        run(WITHOUT_EXCEPTIONS)
 
 
 def _numbers_of(lane: Lane, groups: Iterable[str]) -> list[float]:

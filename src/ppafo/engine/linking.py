@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from ppafo.engine.definitions import place_of
 from ppafo.engine.program import Program
-from ppafo.engine.replacements import Replacements
+from ppafo.engine.source_text import Replacements
 from ppafo.errors import ProgramError
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
 from ppafo.model.plant import PlantParameters, net_torque

@@ -5,11 +5,10 @@ from functools import cache
 from typing import Any, get_type_hints
 
 from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text
-from ppafo.engine.in_python import GOING_ON, PythonFunctions
+from ppafo.engine.in_python import WITHOUT_EXCEPTIONS, PythonFunctions
 from ppafo.engine.loading import compiled
-from ppafo.engine.replacements import Replacements
 from ppafo.engine.rows import is_row, leaf_paths, leaves, rebuilt, row_expression
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.source_text import Replacements, SourceCollector
 from ppafo.model.declaration import PlainFunction
 
 
@@ -52,7 +51,7 @@ def row_source(functions: Sequence[PlainFunction]) -> str:
 def _by_python(function: PlainFunction) -> Callable[..., None]:
     """Return an array function run by Python, with the results of compiled code where Python would raise."""
     kinds = [kind for name, kind in get_type_hints(function).items() if name != "return"]
-    own, rows = PythonFunctions(Replacements(), {}, GOING_ON).of(function), sum(map(is_row, kinds))
+    own, rows = PythonFunctions(Replacements(), {}, WITHOUT_EXCEPTIONS).of(function), sum(map(is_row, kinds))
 
     def called(*given: Any) -> None:
         arrays, result, rest = iter(given[:rows]), given[rows], iter(given[rows + 1 :])

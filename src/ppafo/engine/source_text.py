@@ -16,7 +16,6 @@ from ppafo.engine.composer import Composer, names_of
 from ppafo.engine.definitions import Adaptation, check_is_plain, emitted_name, parse_definition, place_of, source_lines
 from ppafo.engine.entries import ORIGIN, without_origins
 from ppafo.engine.plain_python import refusal
-from ppafo.engine.replacements import Replacements
 from ppafo.engine.rows import is_row
 from ppafo.errors import ProgramError
 from ppafo.model.declaration import PlainFunction
@@ -63,6 +62,32 @@ class MadeFrom:
             and (made.function.__kwdefaults__ or {}) == made.named_defaults
             for made in self.functions
         )
+
+
+@dataclass(slots=True)
+class Replacements:
+    """Replacements of functions and of NamedTuple classes in one program.
+
+    Attributes:
+        everywhere: replacement of a function, whichever function calls it
+        inside: replacement of a called function in one caller, by caller and called function: a law that calls its own
+            port calls what acted there before
+        constructed: class that ``_replace`` constructs, by the declared class of a row
+        rows: names of the rows that a replacement takes before the arguments of the function that it replaces
+    """
+
+    everywhere: dict[PlainFunction, PlainFunction] = field(default_factory=dict)
+    inside: dict[tuple[PlainFunction, PlainFunction], PlainFunction] = field(default_factory=dict)
+    constructed: dict[type, type] = field(default_factory=dict)
+    rows: dict[PlainFunction, tuple[str, ...]] = field(default_factory=dict)
+
+    def called(self, function: Any, caller: Any = None) -> Any:
+        """Return the function that is called instead of a function, inside a caller if one is given.
+
+        A NamedTuple class is returned as it is.
+        """
+        replacement = self.everywhere.get(function, function)
+        return replacement if caller is None else self.inside.get((caller, function), replacement)
 
 
 @dataclass(slots=True)

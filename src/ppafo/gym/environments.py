@@ -46,7 +46,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         self._drawn: Floats | None = None
         self._lanes = self.world.lanes(1)
         self._period = 0.0
-        self._moments: list[EpisodeFrame] = []
+        self._frames: list[EpisodeFrame] = []
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the content of a pickle: the constant ``world`` and the state of the environment."""
@@ -56,8 +56,8 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         """Continue from a state: of a copy, or of a pickle."""
         self.__dict__.update(state)
         if isinstance(self._lanes, Mapping):
-            held, self._lanes = self._lanes, self.world.lanes(1)
-            self._lanes.resume(held)
+            lane_state, self._lanes = self._lanes, self.world.lanes(1)
+            self._lanes.resume(lane_state)
 
     def reset(
         self,
@@ -67,28 +67,28 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
     ) -> tuple[Observations, dict[str, Any]]:
         """Start an episode; return its initial observation and empty info. There are no ``options``."""
         super().reset(seed=seed)
-        seen, drawn = self.world.begin(self._lanes, np.zeros(1, dtype=np.intp), [self.np_random])
+        start, drawn = self.world.begin(self._lanes, np.zeros(1, dtype=np.intp), [self.np_random])
         self._drawn = drawn[:, 0]
-        self._moments = []
+        self._frames = []
         if self.render_mode is not None:
             self._period = self.episode().controller.period * self.world.settings.frame_skip
-            self._remember(float(seen.errors[0]))
-        return seen.observations[0], {}
+            self._remember(float(start.errors[0]))
+        return start.observations[0], {}
 
     def step(self, action: Any) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Apply an action; return observation, reward, terminated (failed), truncated (ended), error and gas [kg].
 
         Raises SimulationError for an action that is not finite.
         """
-        seen = self.world.take(self._lanes, action)
-        info = {"error": float(seen.errors[0]), "supplied_mass": float(seen.supplied[0])}
+        result = self.world.act(self._lanes, action)
+        info = {"error": float(result.errors[0]), "supplied_mass": float(result.supplied[0])}
         if self.render_mode is not None:
             self._remember(info["error"])
         return (
-            seen.observations[0],
-            float(seen.rewards[0]),
-            bool(seen.terminated[0]),
-            bool(seen.truncated[0]),
+            result.observations[0],
+            float(result.rewards[0]),
+            bool(result.terminated[0]),
+            bool(result.truncated[0]),
             info,
         )
 
@@ -96,13 +96,13 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         """Return the episode so far as a picture (height, width, 3) of bytes; None without a render mode."""
         if self.render_mode is None:
             return None
-        if not self._moments:
+        if not self._frames:
             raise SimulationError("there is no episode yet: call reset")
-        return picture(self._moments, self.world.task.unit, self._period)
+        return picture(self._frames, self.world.task.unit, self._period)
 
     def _remember(self, error: float) -> None:
         """Store the current frame for the picture."""
-        self._moments.append(EpisodeFrame(len(self._moments) * self._period, self.numbers()["state.angle"], error))
+        self._frames.append(EpisodeFrame(len(self._frames) * self._period, self.numbers()["state.angle"], error))
 
     def episode(self) -> Any:
         """Return the scenario of this episode with the drawn numbers; for a walk the walk before any draw.
@@ -154,8 +154,8 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         """Continue from a state, in environments of its own."""
         self.__dict__.update(state)
         if isinstance(self._lanes, Mapping):
-            held, self._lanes = self._lanes, self.world.lanes(self.num_envs)
-            self._lanes.resume(held)
+            lane_state, self._lanes = self._lanes, self.world.lanes(self.num_envs)
+            self._lanes.resume(lane_state)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -172,9 +172,9 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
             raise ScenarioError(f"{len(seeds)} seeds for {self.num_envs} environments; give one for each, or a number")
         places = np.flatnonzero(mask)
         for number in places.tolist():
-            own = None if seeds is None else seeds[number]
-            if own is not None or self._generators[number] is None:
-                self._generators[number] = seeding.np_random(own)[0]
+            seed_of_environment = None if seeds is None else seeds[number]
+            if seed_of_environment is not None or self._generators[number] is None:
+                self._generators[number] = seeding.np_random(seed_of_environment)[0]
         observations = self._begin(places).observations
         if places.size < self.num_envs:
             observations = np.where(mask[:, None], observations, self._last)
@@ -191,44 +191,45 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         before = self._ended
         if self.autoreset_mode is AutoresetMode.DISABLED and before.any():
             raise SimulationError(f"environment {int(np.flatnonzero(before)[0])} has ended: reset it by its mask")
-        seen = self.world.take(self._lanes, actions)
-        self._ended = seen.terminated | seen.truncated
+        result = self.world.act(self._lanes, actions)
+        self._ended = result.terminated | result.truncated
         infos: dict[str, Any] = {}
         reset = np.zeros(self.num_envs, dtype=np.bool_)
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and before.any():
             reset = before
             # A step that resets ignores its action in Gymnasium's mode: it has no reward and ends nothing.
-            for values in (seen.rewards, seen.terminated, seen.truncated):
+            for values in (result.rewards, result.terminated, result.truncated):
                 values[reset] = 0
             self._ended = self._ended & ~reset
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
             reset = self._ended
             # What environments that begin again at once showed at their end.
-            last = np.full(self.num_envs, None, dtype=object)
+            final_observations = np.full(self.num_envs, None, dtype=object)
             for number in np.flatnonzero(reset):
                 # A copy, because the observations of the new episode overwrite this row below.
-                last[number] = seen.observations[number].copy()
-            info = _masked({"error": seen.errors, "supplied_mass": seen.supplied}, reset)
-            infos |= {"final_obs": last, "_final_obs": reset.copy(), "final_info": info, "_final_info": reset.copy()}
+                final_observations[number] = result.observations[number].copy()
+            info = _masked({"error": result.errors, "supplied_mass": result.supplied}, reset)
+            infos |= {"final_obs": final_observations, "_final_obs": reset.copy()}
+            infos |= {"final_info": info, "_final_info": reset.copy()}
         if reset.any():
-            begun = self._begin(np.flatnonzero(reset))
-            seen.observations[reset] = begun.observations[reset]
-        infos |= _masked({"error": seen.errors, "supplied_mass": seen.supplied}, ~reset)
-        self._last = seen.observations
-        return seen.observations.copy(), seen.rewards, seen.terminated, seen.truncated, infos
+            start = self._begin(np.flatnonzero(reset))
+            result.observations[reset] = start.observations[reset]
+        infos |= _masked({"error": result.errors, "supplied_mass": result.supplied}, ~reset)
+        self._last = result.observations
+        return result.observations.copy(), result.rewards, result.terminated, result.truncated, infos
 
     def numbers(self, place: int) -> dict[str, float]:
         """Return the true state of one environment in SI units, by path such as ``state.angle`` [rad]."""
         return self._lanes.numbers(place)
 
     def _begin(self, places: Places) -> BatchStep:
-        drawn = [self._generators[number] for number in places]
-        return self.world.begin(self._lanes, places, [generator for generator in drawn if generator is not None])[0]
+        generators = [self._generators[number] for number in places]
+        return self.world.begin(self._lanes, places, [each for each in generators if each is not None])[0]
 
 
-def _masked(values: Mapping[str, Floats], there: Flags) -> dict[str, Any]:
+def _masked(values: Mapping[str, Floats], is_present: Flags) -> dict[str, Any]:
     """Return numbers (environments,) with the mask of environments that have them, in the form of Gymnasium infos."""
-    if not there.any():
+    if not is_present.any():
         return {}
-    kept = {name: np.where(there, column, 0.0) for name, column in values.items()}
-    return kept | {f"_{name}": there.copy() for name in values}
+    columns = {name: np.where(is_present, column, 0.0) for name, column in values.items()}
+    return columns | {f"_{name}": is_present.copy() for name in values}

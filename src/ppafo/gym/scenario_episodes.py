@@ -62,9 +62,9 @@ class ScenarioEpisodes:
         columns, values = self.plain.repeated(count), np.zeros((len(self.ranges), count))
         if not self.ranges:
             return columns, values
-        left, reason = np.arange(count), ""
+        undrawn, reason = np.arange(count), ""
         for _ in range(MOST_DRAWS):
-            for number in left.tolist():
+            for number in undrawn.tolist():
                 generator = generators[number]
                 drawn = (generator.uniform(*ends) for ends in self.ranges.values())
                 # A seed is drawn as all numbers are, and has to be whole.
@@ -73,8 +73,8 @@ class ScenarioEpisodes:
                     for path, value in zip(self.ranges, drawn, strict=True)
                 ]
                 columns.goals[0, number] = generator.uniform(*self.targets)
-            left, reason = self._plan(columns, values, left)
-            if not left.size:
+            undrawn, reason = self._plan(columns, values, undrawn)
+            if not undrawn.size:
                 return columns, values
         raise ScenarioError(
             f"{self.base.name}: {MOST_DRAWS} random episodes in a row are invalid: {reason}; narrow the ranges in vary"
@@ -85,18 +85,19 @@ class ScenarioEpisodes:
         numbers = dict(zip(self.ranges, drawn.tolist(), strict=True))
         return with_numbers(self.base, absolute(self.base, numbers, self.gauge))
 
-    def _plan(self, columns: EpisodeStarts, values: Floats, left: Places) -> tuple[Places, str]:
+    def _plan(self, columns: EpisodeStarts, values: Floats, places: Places) -> tuple[Places, str]:
         """Fill the columns of some episodes; return the indices of the invalid ones, and a reason."""
-        given = dict(zip(self.ranges, values[:, left], strict=True))
-        plan = plan_ensemble(check_columns(self.base, given, self.gauge))
+        drawn = dict(zip(self.ranges, values[:, places], strict=True))
+        plan = plan_ensemble(check_columns(self.base, drawn, self.gauge))
+        is_valid = np.zeros(places.size, dtype=np.bool_)
         reason = next(iter(plan.reasons.values()), "another program, step or delay")
         for members, batch in plan.batches:
             if episode_program(batch) == (self.program, self.clock):
-                columns.parameters[:, left[members]] = batch.parameters
-                columns.states[:, left[members]] = batch.states
-                # What is left has another program or clock, cannot go with the others, and is drawn again.
-                left = np.where(np.isin(np.arange(left.size), members), -1, left) if members.size else left
-        return left[left >= 0], reason
+                columns.parameters[:, places[members]] = batch.parameters
+                columns.states[:, places[members]] = batch.states
+                is_valid[members] = True
+        # Episodes with another program or clock cannot go with the others, and are drawn again.
+        return places[~is_valid], reason
 
 
 def scenario_episodes(base: Scenario, randomise: bool, vary: Ranges, targets: tuple[str, str]) -> ScenarioEpisodes:

@@ -181,8 +181,8 @@ def episodes_of(
         walk = load_walk(file, overrides)
         seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).run.duration
         return walk_episodes(walk, settings.randomise, seconds)
-    own = () if duration is None else (f"run.duration={float(duration)!r} s",)
-    scenario = load_scenario(file, over(overrides, own, ScenarioError))
+    length = () if duration is None else (f"run.duration={float(duration)!r} s",)
+    scenario = load_scenario(file, over(overrides, length, ScenarioError))
     if task == "torque" and scenario.controlled != TORQUE:
         raise ScenarioError(
             f"{scenario.name}: reference.of = '{scenario.controlled}': the task 'torque' follows a torque; take "
@@ -197,12 +197,12 @@ class World:
     def __init__(self, task: str, settings: EnvironmentSettings) -> None:
         self.settings = settings
         self.task = TASKS[task]
-        usual, flaws = DEFAULTS[task]
-        is_usual = settings.scenario is None
-        file = usual if settings.scenario is None else settings.scenario
-        words = over(flaws if is_usual else (), settings.overrides, ScenarioError)
-        varied = VARIED.get(task, {}) if settings.vary is None and is_usual else settings.vary or {}
-        self.episodes = episodes_of(task, file, words, varied, settings)
+        default_file, flaws = DEFAULTS[task]
+        is_default = settings.scenario is None
+        file = default_file if settings.scenario is None else settings.scenario
+        overrides = over(flaws if is_default else (), settings.overrides, ScenarioError)
+        varied = VARIED.get(task, {}) if settings.vary is None and is_default else settings.vary or {}
+        self.episodes = episodes_of(task, file, overrides, varied, settings)
         bounds = observed_bounds(self.task, self.episodes.base.device)
         self.judging = RewardWeights(
             error_weight=self.task.error_weight if settings.error_weight is None else settings.error_weight,
@@ -240,32 +240,34 @@ class World:
     ) -> tuple[BatchStep, Floats]:
         """Draw and start episodes of some environments; return the observations of all, and the drawn numbers."""
         columns, drawn = self.episodes.draw(generators)
-        return self._shown(lanes.begin(places, columns)), drawn
+        return self._scaled(lanes.begin(places, columns)), drawn
 
-    def take(self, lanes: Environments, actions: Any) -> BatchStep:
+    def act(self, lanes: Environments, actions: Any) -> BatchStep:
         """Return the result of actions that apply to ``frame_skip`` samples, or up to the end of an episode.
 
         Rewards are added up. Raises SimulationError for an action that is not finite.
         """
-        taken = lanes.actions
+        numbers_of_actions = lanes.actions
         if self.is_continuous:
-            taken[:] = np.reshape(actions, taken.shape)
+            numbers_of_actions[:] = np.reshape(actions, numbers_of_actions.shape)
         else:
             # Vent valve first: where there is none, the last column is the command, which the next line sets.
-            taken[:, -1] = 0.0
-            taken[:, 0] = np.subtract(actions, 1)
-        if not np.isfinite(taken).all():
-            bad = int(np.flatnonzero(~np.isfinite(taken).all(axis=1))[0])
-            raise SimulationError(f"the action of environment {bad} is {taken[bad]}; it must be finite")
-        seen = lanes.step()
+            numbers_of_actions[:, -1] = 0.0
+            numbers_of_actions[:, 0] = np.subtract(actions, 1)
+        is_finite = np.isfinite(numbers_of_actions).all(axis=1)
+        if not is_finite.all():
+            bad = int(np.flatnonzero(~is_finite)[0])
+            raise SimulationError(f"the action of environment {bad} is {numbers_of_actions[bad]}; it must be finite")
+        result = lanes.step()
         for _ in range(self.settings.frame_skip - 1):
-            seen = seen.then(lanes.step())
-        return self._shown(seen)
+            result = result.then(lanes.step())
+        return self._scaled(result)
 
-    def _shown(self, seen: BatchStep) -> BatchStep:
+    def _scaled(self, result: BatchStep) -> BatchStep:
+        """Return a result with its observations scaled to -1 to 1, if requested."""
         if self.is_scaled:
-            seen.observations[:] = np.clip((seen.observations - self._middle) / self._half, -1.0, 1.0)
-        return seen
+            result.observations[:] = np.clip((result.observations - self._middle) / self._half, -1.0, 1.0)
+        return result
 
 
 def observed_bounds(task: Task, device: Device) -> Floats:

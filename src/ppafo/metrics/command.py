@@ -30,21 +30,21 @@ class Reversals(NamedTuple):
     turns: float
 
 
-def way_of(command: float) -> float:
+def direction_of(command: float) -> float:
     """Direction [-] in which a command opens the valve: 1 or -1; 0 if the valve is at most half open, or vents."""
     return (1.0 if HALF_OPEN < command <= VENTS_ABOVE else 0.0) - (1.0 if command < -HALF_OPEN else 0.0)
 
 
 def start_reversals(_course: ReferenceSummary, sample: Sample) -> Reversals:
     """State without reversals at the first sample."""
-    return Reversals(way_of(sample.command), sample.stride.phase, 0.0)
+    return Reversals(direction_of(sample.command), sample.stride.phase, 0.0)
 
 
 def update_reversals(state: Reversals, _course: ReferenceSummary, sample: Sample) -> Reversals:
     """Count a reversal if the command changes direction within the task."""
     command, task = sample.command, sample.stride.phase
     begins = task != state.task or command > VENTS_ABOVE
-    before, now = 0.0 if begins else state.way, way_of(command)
+    before, now = 0.0 if begins else state.way, direction_of(command)
     return Reversals(now if now != 0.0 else before, task, state.turns + (1.0 if before * now < 0.0 else 0.0))
 
 
@@ -53,9 +53,9 @@ REVERSALS = MeterKind("reversals", Reversals, start_reversals, update_reversals)
 
 def command_reversals(recording: Recording, samples: slice | None = None) -> float:
     """Number of reversals of the command in a recording, or in some samples of it."""
-    part = samples or slice(None)
-    command = recording["command"][part]
-    task = recording["controller_phase"][part] if "controller_phase" in recording else np.zeros(command.size)
+    window = samples or slice(None)
+    command = recording["command"][window]
+    task = recording["controller_phase"][window] if "controller_phase" in recording else np.zeros(command.size)
     ways = np.where((command > HALF_OPEN) & (command <= VENTS_ABOVE), 1, 0) - np.where(command < -HALF_OPEN, 1, 0)
     # What begins anew has a number of its own: reversals count between two ways of one number.
     begins = (np.diff(task, prepend=task[:1]) != 0.0) | (command > VENTS_ABOVE)
@@ -81,19 +81,21 @@ class RequestedTorqueSums(NamedTuple):
     samples: float
 
 
-def is_asked(command: float, task: float) -> bool:
+def is_torque_requested(command: float, task: float) -> bool:
     """Tell whether a walking controller requests a torque: not in mid-stance, and not while it vents."""
     return command <= VENTS_ABOVE and task != MID_STANCE
 
 
-def start_asked(_course: ReferenceSummary, _sample: Sample) -> RequestedTorqueSums:
+def start_requested_torque(_course: ReferenceSummary, _sample: Sample) -> RequestedTorqueSums:
     """Zero sums at the start of a walk."""
     return RequestedTorqueSums(0.0, 0.0, 0.0)
 
 
-def update_asked(state: RequestedTorqueSums, _course: ReferenceSummary, sample: Sample) -> RequestedTorqueSums:
+def update_requested_torque(
+    state: RequestedTorqueSums, _course: ReferenceSummary, sample: Sample
+) -> RequestedTorqueSums:
     """Add a sample to the sums if a torque is requested."""
-    error, counts = sample.reference - sample.torque, is_asked(sample.command, sample.stride.phase)
+    error, counts = sample.reference - sample.torque, is_torque_requested(sample.command, sample.stride.phase)
     return RequestedTorqueSums(
         state.squares + (error * error if counts else 0.0),
         state.requested + (sample.reference * sample.reference if counts else 0.0),
@@ -101,10 +103,10 @@ def update_asked(state: RequestedTorqueSums, _course: ReferenceSummary, sample: 
     )
 
 
-ASKED = MeterKind("asked", RequestedTorqueSums, start_asked, update_asked)
+ASKED = MeterKind("asked", RequestedTorqueSums, start_requested_torque, update_requested_torque)
 
 
-def asked_samples(recording: Recording) -> Masks:
+def requested_samples(recording: Recording) -> Masks:
     """Mark the samples with a requested torque (samples,): all samples of a task; in a walk by phase and command."""
     if "controller_phase" not in recording:
         return np.ones(len(recording), dtype=np.bool_)
@@ -113,16 +115,16 @@ def asked_samples(recording: Recording) -> Masks:
 
 def torque_error(recording: Recording) -> float | None:
     """RMS torque error [N m] over the samples of a walk with a requested torque; None if there are none."""
-    asked = asked_samples(recording)
-    if not asked.any():
+    requested = requested_samples(recording)
+    if not requested.any():
         return None
-    return float(np.sqrt(np.mean((recording["reference"] - recording["torque"])[asked] ** 2)))
+    return float(np.sqrt(np.mean((recording["reference"] - recording["torque"])[requested] ** 2)))
 
 
 def requested_torque(recording: Recording) -> float | None:
     """RMS of the torque requested by a walking controller [N m]; None if none is requested."""
-    asked = asked_samples(recording)
-    return float(np.sqrt(np.mean(recording["reference"][asked] ** 2))) if asked.any() else None
+    requested = requested_samples(recording)
+    return float(np.sqrt(np.mean(recording["reference"][requested] ** 2))) if requested.any() else None
 
 
 METRICS = (

@@ -19,7 +19,7 @@ class Frame(NamedTuple):
     parts: Any
 
 
-class Recipe(NamedTuple):
+class _Recipe(NamedTuple):
     """Picklable form of a function that no module defines: frame, name and parts from which it is rebuilt."""
 
     frame: Any
@@ -67,12 +67,12 @@ def recipe_of(value: Any) -> Any:
     frame = frame_of(value) if isinstance(value, types.FunctionType) else None
     if frame is None:
         return _item_by_item(recipe_of, value)
-    return Recipe(recipe_of(frame.function), value.__name__, recipe_of(frame.parts))
+    return _Recipe(recipe_of(frame.function), value.__name__, recipe_of(frame.parts))
 
 
 def by_recipe(value: Any) -> Any:
     """Value rebuilt from its picklable form; within one process, with the same function objects."""
-    if isinstance(value, Recipe):
+    if isinstance(value, _Recipe):
         return made_of(by_recipe(value.frame), value.name, by_recipe(value.parts))
     return _item_by_item(by_recipe, value)
 

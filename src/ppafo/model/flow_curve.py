@@ -27,7 +27,7 @@ def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCur
         critical_ratio=critical_pressure_ratio(heat_capacity_ratio),
         linear_ratio=linear_ratio,
         linear_slope=1.0 / (1.0 - linear_ratio),
-        coefficients=over_runs(_remembered_coefficients, heat_capacity_ratio),
+        coefficients=over_runs(_cached_isentropic_coefficients, heat_capacity_ratio),
     )
 
 
@@ -39,10 +39,10 @@ def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
     # A factor on 1 - r scales the n-th coefficient by its n-th power, and the root in front by its own root.
     scale = 1.0 / (1.0 - critical_ratio)
     factor = root(scale)
-    unscaled = _remembered_iso6358_coefficients()
+    unscaled = _cached_iso6358_coefficients()
     coefficients = unscaled
-    for place in range(TERMS):
-        coefficients = _with_item(coefficients, place, unscaled[place] * factor)
+    for index in range(TERMS):
+        coefficients = _with_item(coefficients, index, unscaled[index] * factor)
         factor = factor * scale
     return FlowCurve(
         critical_ratio=critical_ratio,
@@ -59,31 +59,30 @@ def _isentropic_coefficients(heat_capacity_ratio: float) -> Terms:
     # Choked flow over the factor in front of the subsonic form: the curve is 1 where the flow is choked.
     choked = math.sqrt(0.5 * (k - 1.0) * power(2.0 / (k + 1.0), (k + 1.0) / (k - 1.0)))
     gaps, values = NODES, NODES
-    for place in range(TERMS):
-        gap = critical_gap * NODES[place]
+    for index in range(TERMS):
+        gap = critical_gap * NODES[index]
         # Divided by the root of the gap, which the curve has as a factor: what is left to fit is smooth at equal
         # pressures.
         value = power(1.0 - gap, 1.0 / k) * math.sqrt((1.0 - power(1.0 - gap, (k - 1.0) / k)) / gap)
-        gaps, values = _with_item(gaps, place, gap), _with_item(values, place, value / choked)
+        gaps, values = _with_item(gaps, index, gap), _with_item(values, index, value / choked)
     return _polynomial_through(gaps, values)
-
-
-# A study asks for the few gases of its runs again and again.
-_remembered_coefficients = lru_cache(maxsize=4096)(_isentropic_coefficients)
 
 
 def _iso6358_coefficients() -> Terms:
     """Coefficients for a critical ratio of 0, where the exact function is the square root of (1 - r)(1 + r)."""
     values = NODES
-    for place in range(TERMS):
-        values = _with_item(values, place, math.sqrt(2.0 - NODES[place]))
+    for index in range(TERMS):
+        values = _with_item(values, index, math.sqrt(2.0 - NODES[index]))
     return _polynomial_through(NODES, values)
 
 
-_remembered_iso6358_coefficients = lru_cache(maxsize=1)(_iso6358_coefficients)
+# A study asks for the few gases of its runs again and again. No decorators: an exported library is made of plain
+# definitions alone.
+_cached_isentropic_coefficients = lru_cache(maxsize=4096)(_isentropic_coefficients)
+_cached_iso6358_coefficients = lru_cache(maxsize=1)(_iso6358_coefficients)
 
 
-def _polynomial_through(places: Terms, values: Terms) -> Terms:
+def _polynomial_through(nodes: Terms, values: Terms) -> Terms:
     """Coefficients, constant term first, of the polynomial through values at some points (Newton interpolation)."""
     differences = values
     for order in range(1, TERMS):
@@ -91,28 +90,28 @@ def _polynomial_through(places: Terms, values: Terms) -> Terms:
             index = TERMS - 1 + order - number
             # Divided differences in place, from the end, so that each still finds its neighbour of the order before.
             rise = differences[index] - differences[index - 1]
-            differences = _with_item(differences, index, rise / (places[index] - places[index - order]))
+            differences = _with_item(differences, index, rise / (nodes[index] - nodes[index - order]))
     # Tuples of fixed length, no lists: an exported library fits its curves itself, from this text in C.
     coefficients = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for number in range(TERMS):
-        place = places[TERMS - 1 - number]
-        # The polynomial so far times (x - place), and the next difference.
+        node = nodes[TERMS - 1 - number]
+        # The polynomial so far times (x - node), and the next difference.
         lower = coefficients
         for index in range(TERMS):
             raised = lower[index - 1] if index > 0 else 0.0
-            coefficients = _with_item(coefficients, index, raised - place * lower[index])
+            coefficients = _with_item(coefficients, index, raised - node * lower[index])
         coefficients = _with_item(coefficients, 0, coefficients[0] + differences[TERMS - 1 - number])
     return coefficients
 
 
-def _with_item(items: Terms, place: int, value: float) -> Terms:
-    """Return numbers with the one at an index replaced."""
+def _with_item(items: Terms, index: int, value: float) -> Terms:
+    """Return numbers with the one at an index reindexd."""
     return (
-        value if place == 0 else items[0],
-        value if place == 1 else items[1],
-        value if place == 2 else items[2],
-        value if place == 3 else items[3],
-        value if place == 4 else items[4],
-        value if place == 5 else items[5],
-        value if place == 6 else items[6],
+        value if index == 0 else items[0],
+        value if index == 1 else items[1],
+        value if index == 2 else items[2],
+        value if index == 3 else items[3],
+        value if index == 4 else items[4],
+        value if index == 5 else items[5],
+        value if index == 6 else items[6],
     )

@@ -26,7 +26,7 @@ LEAST_CHANGE = 1e-3
 """Relative change below which the effect of a setting is invisible."""
 _STEP = 0.2
 """Change of a setting up and down, as a fraction of its value (of the gauge value for a pressure)."""
-_PLACES = 300
+_MOST_POINTS = 300
 _NATURE = ("gas.", "gas_model.", "flow.", "run.", "sensors.seed", "supply.atmospheric_pressure")
 """Settings excluded from the first sliders: constants of nature, and step and duration of a run."""
 _RANKED = ("published", "task", "changed", "identified", "fitted", "datasheet", "derived", "assumed", "default")
@@ -41,24 +41,24 @@ def opening_of(
     A change is a list of fractions: relative change of each claim, and change divided by the span of the first panel.
     """
     key = _key(module, changes, claims)
-    known = _known().get(scenario.name, {})
-    if known.get("key") == key:
-        return dict(known)
+    stored = _stored().get(scenario.name, {})
+    if stored.get("key") == key:
+        return dict(stored)
     numbers = [[entry["key"], entry["value"]] for entry in module.description["settings"]]
-    made_from = json.dumps([key, hashlib.sha256(module.wasm).hexdigest(), numbers])
-    made = kept_bytes(
-        "opening", made_from, lambda: json.dumps(computed_opening(scenario, module, changes, claims)).encode()
+    ingredients = json.dumps([key, hashlib.sha256(module.wasm).hexdigest(), numbers])
+    content = kept_bytes(
+        "opening", ingredients, lambda: json.dumps(computed_opening(scenario, module, changes, claims)).encode()
     )
-    opening: dict[str, Any] = json.loads(made)
+    opening: dict[str, Any] = json.loads(content)
     return opening
 
 
 def opening_like(module: WasmModule) -> dict[str, Any]:
     """Return the stored initial state of the bundled scenario with most settings in common, without any run."""
     keys = {entry["key"] for entry in module.description["settings"]}
-    known = _known()
-    named = known.get(module.description["name"])
-    return dict(named or max(known.values(), key=lambda opening: len(keys & set(opening["changes"]))))
+    stored = _stored()
+    of_same_name = stored.get(module.description["name"])
+    return dict(of_same_name or max(stored.values(), key=lambda opening: len(keys & set(opening["changes"]))))
 
 
 def _key(module: WasmModule, changes: Mapping[str, float], claims: Sequence[str]) -> str:
@@ -68,19 +68,19 @@ def _key(module: WasmModule, changes: Mapping[str, float], claims: Sequence[str]
 
 
 @cache
-def _known() -> dict[str, Any]:
+def _stored() -> dict[str, Any]:
     openings: dict[str, Any] = json.loads(files("ppafo.page").joinpath("opening.json").read_text(encoding="utf-8"))
     return openings
 
 
 def computed_opening(
-    scenario: Scenario, module: WasmModule, given: Mapping[str, float], claims: Sequence[str]
+    scenario: Scenario, module: WasmModule, initial: Mapping[str, float], claims: Sequence[str]
 ) -> dict[str, Any]:
     """Compute the initial state of a page on a scenario, by runs of the reference and of changed settings."""
     from ppafo.simulation.ensemble import run_ensemble  # a report computes nothing
 
     known = [metric["name"] for metric in module.description["metrics"]]
-    named, claims = claims, [name for name in claims if name in known]
+    all_claims, claims = claims, [name for name in claims if name in known]
     channels = [channel["name"] for channel in module.description["channels"]]
     # The first panel shows what is controlled, else the motion of the vane.
     followed = next((kind for kind in CONTROLLED.values() if kind.reference in channels), None)
@@ -88,20 +88,20 @@ def computed_opening(
 
     def runs(columns: Mapping[str, Floats], bands: Sequence[str]) -> Any:
         count = max((len(column) for column in columns.values()), default=1)
-        usual = {path: np.full(count, value) for path, value in given.items()}
-        some = {**usual, **columns} or {"run.duration": np.full(count, scenario.run.duration)}
-        return run_ensemble(scenario, some, claims, bands)
+        usual = {path: np.full(count, value) for path, value in initial.items()}
+        varied_columns = {**usual, **columns} or {"run.duration": np.full(count, scenario.run.duration)}
+        return run_ensemble(scenario, varied_columns, claims, bands)
 
     # A difference of pressures is no channel: its reference would be no level beside the one that is shown.
-    wanted = () if followed is None or lead != followed.channel else (followed.reference,)
-    shown = [lead, *wanted]
-    base = runs({}, shown)
+    references = () if followed is None or lead != followed.channel else (followed.reference,)
+    channels_of_panel = [lead, *references]
+    base = runs({}, channels_of_panel)
     usual = [float(base.metrics[name][0]) for name in claims]
     course = base.traces[lead][:, 0]
     span = float(np.ptp(course)) if np.isfinite(course).all() else 0.0
     changes, atmosphere = {}, scenario.device.supply.atmospheric_pressure
     for entry in module.description["settings"]:
-        value = given.get(entry["key"], entry["value"])
+        value = initial.get(entry["key"], entry["value"])
         size = _STEP * abs(value - (atmosphere if entry["unit"] == "Pa_a" else 0.0))
         low = value - size if entry["minimum"] is None else max(entry["minimum"], value - size)
         high = value + size if entry["maximum"] is None else min(entry["maximum"], value + size)
@@ -118,12 +118,12 @@ def computed_opening(
         if max(all_changes := [*moved, _share(apart, span)]) > LEAST_CHANGE:
             changes[entry["key"]] = all_changes
     # As many points as a picture of some hundred pixels shows.
-    thin = slice(None, None, max(1, len(base.times) // _PLACES))
+    thin = slice(None, None, max(1, len(base.times) // _MOST_POINTS))
     return {
-        "key": _key(module, given, named),
+        "key": _key(module, initial, all_claims),
         "changes": changes,
         "times": _short(base.times[thin]),
-        "courses": {name: _short(base.traces[name][thin, 0]) for name in shown},
+        "courses": {name: _short(base.traces[name][thin, 0]) for name in channels_of_panel},
     }
 
 
@@ -140,18 +140,18 @@ def _share(change: Floats, of: float) -> float:
 def first_settings(openings: Sequence[Mapping[str, Any]], programs: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the keys of at most twelve settings with the largest changes over all configurations, largest first."""
     origins = {setting["key"]: setting["origin"] for program in programs for setting in program["settings"]}
-    rank = {origin: place for place, origin in enumerate(_RANKED)}
+    rank = {origin: index for index, origin in enumerate(_RANKED)}
     largest: dict[str, float] = {}
     for opening in openings:
         # Two settings with one effect to the last digit are one slider: the better known comes first.
-        same: dict[tuple[float, ...], str] = {}
+        key_of_effect: dict[tuple[float, ...], str] = {}
         for key, change in sorted(
             opening["changes"].items(), key=lambda change_of_key: rank.get(origins.get(change_of_key[0], ""), 99)
         ):
-            if key in origins and same.setdefault(tuple(change), key) == key:
+            if key in origins and key_of_effect.setdefault(tuple(change), key) == key:
                 largest[key] = max(largest.get(key, 0.0), *change)
     # Where nothing is known, as of a run that fails, the settings come in the order of the program.
-    named = sorted(largest, key=lambda key: (-largest[key], key)) or [
+    ranked = sorted(largest, key=lambda key: (-largest[key], key)) or [
         key for key in origins if not key.startswith(_NATURE)
     ]
-    return named[:MOST_FIRST]
+    return ranked[:MOST_FIRST]

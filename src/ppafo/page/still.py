@@ -26,7 +26,7 @@ _UNITS = {name: CONTROLLED[name].level.unit for name in _NAMES}
 _STEPS = (1.0, 2.0, 5.0, 10.0)
 
 
-class Axes(NamedTuple):
+class _Axes(NamedTuple):
     """Axes by their ticks of time [s] and value; the picture extends from the first to the last tick."""
 
     times: list[float]
@@ -60,12 +60,12 @@ def still_of(
     points = [point for curve in (required, *curves) for point in curve]
     if not points:
         return ""
-    axes = Axes(_ticks([time for time, _ in points]), _ticks([value for _, value in points]))
+    axes = _Axes(_ticks([time for time, _ in points]), _ticks([value for _, value in points]))
     # The colours that the page gives to configurations: to a valve its own, once, to others what is left.
     looks = [program["look"] for program in programs]
-    free = [number for number in range(1, len(PAGE_COLOURS) + 1) if number not in looks]
-    own = [look and looks.index(look) == place for place, look in enumerate(looks)]
-    colours = [PAGE_COLOURS[(look if is_own else free.pop(0)) - 1] for look, is_own in zip(looks, own, strict=True)]
+    unused = [number for number in range(1, len(PAGE_COLOURS) + 1) if number not in looks]
+    numbers = [look if look and looks.index(look) == index else unused.pop(0) for index, look in enumerate(looks)]
+    colours = [PAGE_COLOURS[number - 1] for number in numbers]
     label = f"{_NAMES[channel]} ({axis_unit(quantity)})"
     parts = _frame(axes, label)
     parts += [
@@ -77,15 +77,15 @@ def still_of(
         parts.append(_line(axes, required, f'stroke="{BLACK}" stroke-width="1.5" stroke-dasharray="6 4"'))
         legend.append(("required", BLACK))
     # A short line and a name for each curve, side by side above the axes.
-    left = _LEFT
+    x = _LEFT
     for name, colour in legend:
-        parts.append(f'<path stroke="{colour}" stroke-width="3" d="M{left} 14h18"/>')
-        parts.append(_text(name, f'x="{left + 24}" y="18"'))
-        left += 50.0 + 7.0 * len(name)
-    described = escape(f"{tab['title']}: {label} over time, as the page opens", quote=True)
-    look = f'font-family="sans-serif" font-size="12" fill="{GREY}" role="img" aria-label="{described}"'
+        parts.append(f'<path stroke="{colour}" stroke-width="3" d="M{x} 14h18"/>')
+        parts.append(_text(name, f'x="{x + 24}" y="18"'))
+        x += 50.0 + 7.0 * len(name)
+    description = escape(f"{tab['title']}: {label} over time, as the page opens", quote=True)
+    attributes = f'font-family="sans-serif" font-size="12" fill="{GREY}" role="img" aria-label="{description}"'
     box = f'xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" width="{_WIDTH:g}"'
-    return f"<svg {box} {look}>{''.join(parts)}</svg>"
+    return f"<svg {box} {attributes}>{''.join(parts)}</svg>"
 
 
 def _points(opening: Mapping[str, Any], channel: str, quantity: str) -> Points:
@@ -94,7 +94,7 @@ def _points(opening: Mapping[str, Any], channel: str, quantity: str) -> Points:
     return [(time, display_value(value, quantity)) for time, value in samples if value is not None]
 
 
-def _frame(axes: Axes, label: str) -> list[str]:
+def _frame(axes: _Axes, label: str) -> list[str]:
     """Return SVG lines and labels of the ticks, and the titles of both axes."""
     below, middle = _HEIGHT - _BOTTOM + 16, _LEFT + (_WIDTH - _LEFT - _RIGHT) / 2
     lines = "".join(f"M{_LEFT} {axes.y(tick)}h{_WIDTH - _LEFT - _RIGHT}" for tick in axes.values)
@@ -111,14 +111,17 @@ def _frame(axes: Axes, label: str) -> list[str]:
     ]
 
 
-def _line(axes: Axes, curve: Points, look: str) -> str:
+def _line(axes: _Axes, curve: Points, look: str) -> str:
     """Return the SVG of a curve; intervals of constant value are reduced to their end points."""
-    places = [(axes.x(time), axes.y(value)) for time, value in curve]
-    heights = [height for _, height in places]
-    level = (before == here == after for before, here, after in zip(heights, heights[1:], heights[2:], strict=False))
-    kept = [True, *(not is_level for is_level in level), True]
-    shown = " ".join(f"{x},{y}" for (x, y), is_kept in zip(places, kept, strict=False) if is_kept)
-    return f'<polyline fill="none" {look} points="{shown}"/>'
+    points = [(axes.x(time), axes.y(value)) for time, value in curve]
+    heights = [height for _, height in points]
+    ends = (0, len(points) - 1)
+    kept = [
+        f"{x},{y}"
+        for index, (x, y) in enumerate(points)
+        if index in ends or not heights[index - 1] == y == heights[index + 1]
+    ]
+    return f'<polyline fill="none" {look} points="{" ".join(kept)}"/>'
 
 
 def _text(words: str, attributes: str) -> str:

@@ -15,9 +15,9 @@ from ppafo.wording import nearest_name
 
 _CYCLES = re.compile(rb"MCLK:\s+(\d+)")
 """Form of mspdebug's cycle counter."""
-_ASKED = "asked.txt"
+_QUERIES = "asked.txt"
 """File of the queries for some samples."""
-_SAID_OUTPUTS = "simio info counter\nmd simulated_outputs 4"
+_SHOW_OUTPUTS = "simio info counter\nmd simulated_outputs 4"
 """Query to mspdebug after each sample: cycle count, and the four output bytes."""
 
 
@@ -33,23 +33,23 @@ class _MspdebugSimulator:
         self._start = target.ram.start + image.sizes.data
         self._free = len(target.ram) - image.sizes.data
         self._say(f"prog {image.file.name}\nfill {self._start} {self._free} {UNTOUCHED:x}")
-        self._say(f"simio add tracer counter\nsetbreak board_wait\nrun\n{_SAID_OUTPUTS}")
+        self._say(f"simio add tracer counter\nsetbreak board_wait\nrun\n{_SHOW_OUTPUTS}")
         self._answer()
 
     def begin(self) -> None:
         """Reset the processor and run it until it waits for a sample."""
-        self._say(f"reset\nrun\n{_SAID_OUTPUTS}")
+        self._say(f"reset\nrun\n{_SHOW_OUTPUTS}")
         self._answer()
 
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
         """Controller decisions for up to 50 consecutive samples, requested in one batch to avoid a round trip each."""
-        asked = []
+        queries = []
         for readings in every:
-            sent = " ".join(f"0x{byte:02x}" for number in readings for byte in number.to_bytes(2, "little"))
-            asked.append(f"mw simulated_readings {sent}\nrun\n{_SAID_OUTPUTS}\n")
+            content = " ".join(f"0x{byte:02x}" for number in readings for byte in number.to_bytes(2, "little"))
+            queries.append(f"mw simulated_readings {content}\nrun\n{_SHOW_OUTPUTS}\n")
         # mspdebug asks the system for every byte of its console, and for a file at once.
-        write_file(self._folder / _ASKED, "".join(asked).encode("ascii"))
-        self._say(f"read {_ASKED}")
+        write_file(self._folder / _QUERIES, "".join(queries).encode("ascii"))
+        self._say(f"read {_QUERIES}")
         decisions = []
         for _ in every:
             before = self._cycles
@@ -60,10 +60,10 @@ class _MspdebugSimulator:
 
     def stack(self) -> int:
         """Deepest use of the stack [bytes]: the overwritten part of RAM that was filled before."""
-        self._say(f"md {self._start} {self._free}\n{_SAID_OUTPUTS}")
-        shown = self._console.until(b"simulated_outputs 4\n")
+        self._say(f"md {self._start} {self._free}\n{_SHOW_OUTPUTS}")
+        response = self._console.until(b"simulated_outputs 4\n")
         self._console.until(b"\n")
-        lines = re.findall(rb"^    [0-9a-f]{5}: ((?:[0-9a-f]{2} )+)", shown, re.MULTILINE)
+        lines = re.findall(rb"^    [0-9a-f]{5}: ((?:[0-9a-f]{2} )+)", response, re.MULTILINE)
         return depth_of_stack(bytes.fromhex(b"".join(lines).decode()))
 
     def _say(self, text: str) -> None:
@@ -71,8 +71,8 @@ class _MspdebugSimulator:
 
     def _answer(self) -> bytes:
         """Return the four output bytes at the end of the response, and record the cycle count."""
-        said = self._console.until(b"simulated_outputs 4\n")
-        self._cycles = int(_CYCLES.findall(said)[-1])
+        response = self._console.until(b"simulated_outputs 4\n")
+        self._cycles = int(_CYCLES.findall(response)[-1])
         return bytes.fromhex(self._console.until(b"\n").split(b":")[1].split(b"|")[0].decode())
 
 
@@ -131,7 +131,7 @@ MSP430F2013 = Target(
 def _cortex(name: str, part: str, pins: Mapping[str, str], flash: int, ram: int, **more: Any) -> Target:
     """Cortex-M on a micro:bit with given flash and RAM [bytes]; the compiler may be gcc, clang or zig."""
     for_zig = f"zig cc -target thumb-freestanding-eabi -mcpu={name.replace('-', '_')}"
-    copied = _FLASH.format(
+    copy_rule = _FLASH.format(
         said="Onto the drive that the board is", needs="firmware.hex", command='cp firmware.hex "$(MICROBIT)"'
     )
     words = {
@@ -145,7 +145,7 @@ def _cortex(name: str, part: str, pins: Mapping[str, str], flash: int, ram: int,
         "board_files": f"`board_microbit.c` and `converter_{part}.c`",
         "not_run": "timer and outputs run in QEMU's micro:bit V1, converter and watchdog have no simulator",
         "script": f"{part}.ld",
-        "flash": copied + _HEX,
+        "flash": copy_rule + _HEX,
         "flash_said": "onto the drive that the board is, as in make flash MICROBIT=/media/MICROBIT",
         **{f"pin_{pin}": place for pin, place in pins.items()},
     }

@@ -73,14 +73,14 @@ def export_firmware(
     from ppafo.processor import words
 
     if table:
-        said = words.verify_table(TARGETS if target is None else (chosen,), samples)
+        answer = words.verify_table(TARGETS if target is None else (chosen,), samples)
     elif samples is not None:
-        said = words.verify_samples(scenarios[0], chosen, samples, tuple(overrides))
+        answer = words.verify_samples(scenarios[0], chosen, samples, tuple(overrides))
     else:
-        said = words.verify_runs(scenarios, chosen, tuple(overrides))
+        answer = words.verify_runs(scenarios, chosen, tuple(overrides))
     if out is not None:
-        output.write_files(out, output.said_files(said), COMMAND)
-    return said
+        output.write_files(out, output.files_of_output(answer), COMMAND)
+    return answer
 
 
 def export_controller(scenario: Scenario, *, overrides: Overrides = (), out: Folder) -> CommandOutput:

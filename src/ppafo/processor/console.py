@@ -23,7 +23,7 @@ class Console:
 
     def __init__(self, command: Sequence[str], folder: Path) -> None:
         self._name = command[0]
-        self._seen = b""
+        self._unread = b""
         try:
             self._process = subprocess.Popen(
                 command,
@@ -49,18 +49,18 @@ class Console:
     def until(self, mark: bytes) -> bytes:
         """Return the output of the program up to a mark. Raises SimulationError if no output comes."""
         assert self._process.stdout is not None
-        while mark not in self._seen:
+        while mark not in self._unread:
             ready, _, _ = select.select([self._process.stdout], [], [], _PATIENCE)
-            said = os.read(self._process.stdout.fileno(), 65536) if ready else b""
-            if not said:
+            output = os.read(self._process.stdout.fileno(), 65536) if ready else b""
+            if not output:
                 raise SimulationError(f"{self._name} does not answer; {self._last()}")
             # What comes behind the mark is kept for the next question.
-            self._seen += said
-        output, _, self._seen = self._seen.partition(mark)
-        return output
+            self._unread += output
+        before_mark, _, self._unread = self._unread.partition(mark)
+        return before_mark
 
     def _last(self) -> str:
-        last = self._seen.decode(errors="replace").strip().splitlines()[-1:]
+        last = self._unread.decode(errors="replace").strip().splitlines()[-1:]
         return f"the last it said: {one_line(' '.join(last))}"
 
 

@@ -110,8 +110,8 @@ def make_firmware(folder: Path, goals: Sequence[str] = ("all",)) -> None:
     done = asked(["make", "-C", str(folder), *goals], scratch=folder.absolute())
     if done.returncode != 0:
         # Make says which goal failed; the line of the compiler says why.
-        said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr)
-        raise SimulationError(f"the firmware cannot be built: {one_line(said)}")
+        cause = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr)
+        raise SimulationError(f"the firmware cannot be built: {one_line(cause)}")
 
 
 @contextmanager
@@ -120,10 +120,10 @@ def processor_simulator(contents: Mapping[str, bytes], target: Target) -> Iterat
 
     Raises SimulationError if a tool is missing, the files cannot be built, or the simulator does not respond.
     """
-    absent = missing_tools(target)
-    if absent:
+    missing = missing_tools(target)
+    if missing:
         raise SimulationError(
-            f"the simulator of {target.name} needs {', '.join(absent)}; {target.packages} are packages of Debian"
+            f"the simulator of {target.name} needs {', '.join(missing)}; {target.packages} are packages of Debian"
         )
     with temporary_folder("ppafo-processor", contents) as folder:
         make_firmware(Path(folder))
@@ -176,9 +176,10 @@ def read_image(folder: Path, target: Target) -> Image:
     for section in sections:
         if section.kind == _SYMBOL_TABLE:
             names = sections[section.link].offset
-            for at in range(section.offset, section.offset + section.size, _SYMBOL.size):
-                name, address, *_ = _SYMBOL.unpack_from(content, at)
+            for offset in range(section.offset, section.offset + section.size, _SYMBOL.size):
+                name, address, *_ = _SYMBOL.unpack_from(content, offset)
                 begin = names + name
                 symbols[content[begin : content.index(b"\0", begin)].decode()] = address
-    own = sizes(file, target)
-    return Image(file, own, sizes(shipped, target) if shipped.is_file() else own, symbols)
+    simulated_sizes = sizes(file, target)
+    shipped_sizes = sizes(shipped, target) if shipped.is_file() else simulated_sizes
+    return Image(file, simulated_sizes, shipped_sizes, symbols)

@@ -110,10 +110,10 @@ def run_on_processor(scenario: Scenario, target: str = TARGETS[0]) -> ProcessorR
         on_processor = simulate(fixed.scenario.controlled_by(law))
         cost = cost_of(chosen, image, simulator.stack(), law.decisions)
     in_lanes = simulate(fixed.scenario)
-    mine, theirs = on_processor.recording.channels, in_lanes.recording.channels
-    same = all(np.array_equal(mine[name].values, theirs[name].values) for name in theirs)
-    differ = int(np.count_nonzero(mine["command"].values != theirs["command"].values))
-    return ProcessorRun(fixed.scenario, on_processor, in_lanes, cost, len(law.decisions), differ, same)
+    channels, expected = on_processor.recording.channels, in_lanes.recording.channels
+    same_bits = all(np.array_equal(channels[name].values, expected[name].values) for name in expected)
+    differences = int(np.count_nonzero(channels["command"].values != expected["command"].values))
+    return ProcessorRun(fixed.scenario, on_processor, in_lanes, cost, len(law.decisions), differences, same_bits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,27 +130,28 @@ def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str =
     """Compare decisions for drawn readings on the simulator and in Python, with a reset every ``EPISODE`` samples."""
     fixed, chosen = fixed_point_controller(scenario), target_of(target)
     reference = PythonProcessor(fixed)
-    wanted: list[tuple[int, int]] = []
-    asked: list[ConverterCounts] = []
+    expected: list[tuple[int, int]] = []
+    pending: list[ConverterCounts] = []
     decisions: list[Decision] = []
     with processor_simulator(firmware(scenario, target), chosen) as (simulator, image):
         for number, readings in enumerate(drawn_readings(int(fixed.limits.top), samples, seed)):
             begins = number % EPISODE == 0
-            if begins or len(asked) == TURN:
-                decisions += simulator.samples(asked)
-                asked = []
+            if begins or len(pending) == TURN:
+                decisions += simulator.samples(pending)
+                pending = []
             if begins:
                 reference.begin()
                 simulator.begin()
-            asked.append(readings)
-            wanted.append(reference.sample(readings))
-        decisions += simulator.samples(asked)
+            pending.append(readings)
+            expected.append(reference.sample(readings))
+        decisions += simulator.samples(pending)
         cost = cost_of(chosen, image, simulator.stack(), decisions)
-    differ = [sample for sample, decision in enumerate(decisions) if decision[:2] != wanted[sample]]
+    differing = [sample for sample, decision in enumerate(decisions) if decision[:2] != expected[sample]]
     first = ""
-    if differ:
-        first = f"sample {differ[0]}: {decisions[differ[0]][:2]} on the processor, {wanted[differ[0]]} in Python"
-    return DecisionComparison(samples, len(differ), first, cost)
+    if differing:
+        sample = differing[0]
+        first = f"sample {sample}: {decisions[sample][:2]} on the processor, {expected[sample]} in Python"
+    return DecisionComparison(samples, len(differing), first, cost)
 
 
 def drawn_readings(top: int, samples: int, seed: int) -> Iterator[ConverterCounts]:
@@ -162,17 +163,17 @@ def drawn_readings(top: int, samples: int, seed: int) -> Iterator[ConverterCount
     edges = (1, 2, top // 2, top // 2 + 1, top - 2, top - 1)
     for start in range(0, samples, EPISODE):
         step = draw.choice((1, 3, 30, 300, top))
-        at = [draw.choice((*edges, draw.randint(1, top - 1))) for _ in ConverterCounts._fields]
+        readings = [draw.choice((*edges, draw.randint(1, top - 1))) for _ in ConverterCounts._fields]
         breaks = draw.randrange(EPISODE) if draw.random() < 0.4 else EPISODE
         for sample in range(min(EPISODE, samples - start)):
             if draw.random() < 0.02:
-                at[draw.randrange(3)] = draw.choice(edges)
+                readings[draw.randrange(3)] = draw.choice(edges)
             if draw.random() < 0.7:
-                at = [min(top - 1, max(1, value + draw.randint(-step, step))) for value in at]
-            shown = list(at)
+                readings = [min(top - 1, max(1, value + draw.randint(-step, step))) for value in readings]
+            sensed = list(readings)
             if sample == breaks:
-                shown[draw.randrange(3)] = draw.choice((0, top))
-            yield ConverterCounts(*shown)
+                sensed[draw.randrange(3)] = draw.choice((0, top))
+            yield ConverterCounts(*sensed)
 
 
 def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision]) -> Cost:

@@ -57,19 +57,19 @@ class Debugger:
     def read(self, address: int, size: int) -> bytes:
         """Content of memory."""
         content = b""
-        for at in range(address, address + size, _PIECE):
-            count = min(_PIECE, address + size - at)
-            answer = self.packet(f"m{at:x},{count:x}")
+        for start in range(address, address + size, _PIECE):
+            count = min(_PIECE, address + size - start)
+            answer = self.packet(f"m{start:x},{count:x}")
             if len(answer) != 2 * count:
-                raise SimulationError(f"QEMU cannot read {count} bytes at 0x{at:x}: {answer}")
+                raise SimulationError(f"QEMU cannot read {count} bytes at 0x{start:x}: {answer}")
             content += bytes.fromhex(answer)
         return content
 
     def write(self, address: int, content: bytes) -> None:
         """Write bytes to memory."""
-        for at in range(0, len(content), _PIECE):
-            piece = content[at : at + _PIECE]
-            self._expect(self.packet(f"M{address + at:x},{len(piece):x}:{piece.hex()}"), "OK")
+        for start in range(0, len(content), _PIECE):
+            piece = content[start : start + _PIECE]
+            self._expect(self.packet(f"M{address + start:x},{len(piece):x}:{piece.hex()}"), "OK")
 
     def packet(self, text: str) -> str:
         """Send a packet of the protocol and return the reply."""
@@ -80,9 +80,9 @@ class Debugger:
         self._console.until(b"$")
         return self._console.until(b"#").decode()
 
-    def _expect(self, answer: str, wanted: str) -> None:
-        if answer != wanted:
-            raise SimulationError(f"QEMU answers '{answer}' where '{wanted}' was expected")
+    def _expect(self, answer: str, expected: str) -> None:
+        if answer != expected:
+            raise SimulationError(f"QEMU answers '{answer}' where '{expected}' was expected")
 
 
 @final
@@ -116,9 +116,9 @@ class QemuSimulator:
             # Behind the breakpoint, or the machine would stop at once.
             self.debugger.go_on(self._stop + _LENGTH_OF_NOP)
             outputs = self.debugger.read(self._outputs, _FORM_OF_OUTPUTS.size)
-            command, is_sound, begun, ended = _FORM_OF_OUTPUTS.unpack(outputs)
+            command, is_sound, before, after = _FORM_OF_OUTPUTS.unpack(outputs)
             # The counter counts down, and begins anew at 2^24.
-            ticks = (begun - ended) % 2**_COUNTER_BITS
+            ticks = (before - after) % 2**_COUNTER_BITS
             decisions.append(Decision(command, is_sound, round(ticks / self._ticks)))
         return decisions
 

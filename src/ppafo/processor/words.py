@@ -64,8 +64,8 @@ def verify_runs(names: Sequence[str], target: str, overrides: Sequence[str]) -> 
             *(f"{name:<12} {value * _SHOWN[name][1]:.4f} {_SHOWN[name][0]}" for name, value in metrics.items()),
         ]
         texts.append("\n".join(lines))
-        about = {"scenario": run.scenario.name, "target": run.cost.target.name}
-        documents.append({**about, **_document(run), "same_bits": run.same_bits, "metrics": metrics})
+        case = {"scenario": run.scenario.name, "target": run.cost.target.name}
+        documents.append({**case, **_document(run), "same_bits": run.same_bits, "metrics": metrics})
     return _output(
         "\n\n".join(texts),
         documents[0] if len(documents) == 1 else {"runs": documents},
@@ -81,11 +81,12 @@ def verify_table(targets: Sequence[str], samples: int | None) -> CommandOutput:
     documents: list[dict[str, Any]] = []
     for target, (controller, name, overrides) in itertools.product(map(target_of, targets), TABLE):
         kind, comma, options = controller.partition(",")
-        row, own = f"| {target.name} | `{kind}`{comma}{options} |", {"target": target.name, "controller": controller}
+        row = f"| {target.name} | `{kind}`{comma}{options} |"
+        case = {"target": target.name, "controller": controller}
         missing = missing_tools(target)
         if missing:
             lines.append(f"{row} not run: {', '.join(missing)} is missing | | | | |")
-            documents.append({**own, "missing": list(missing)})
+            documents.append({**case, "missing": list(missing)})
             continue
         comparison = compare_drawn(load_scenario(name, overrides), samples or SAMPLES_OF_TABLE, target=target.name)
         cost = comparison.cost
@@ -93,7 +94,7 @@ def verify_table(targets: Sequence[str], samples: int | None) -> CommandOutput:
             f"{row} {cost.sizes.flash:,} | {cost.sizes.data} + {cost.stack} "
             f"| {cost.worst:,}, {cost.mean:,.0f} {target.counted} | {comparison.samples:,} | {comparison.differences} |"
         )
-        documents.append({**own, **_document(comparison)})
+        documents.append({**case, **_document(comparison)})
     return _output("\n".join(lines), {"rows": documents}, not any(item.get("differences") for item in documents))
 
 

@@ -97,22 +97,16 @@ _AREA = {"alpha": 0.15, "linewidth": 0}
 """Default Matplotlib keywords of a band."""
 
 
-def _line(axes: "Axes", mark: Mark, x: Any, y: Any) -> None:
-    axes.plot(x, y, color=mark.colour, label=mark.label, **mark.style)
-
-
-def _reach(axes: "Axes", mark: Mark, x: Any, y: Any) -> None:
-    axes.errorbar(x, y, xerr=mark.to, color=mark.colour, label=mark.label, **{"fmt": "o", **mark.style})
-
-
 def _bars(axes: "Axes", mark: Mark, x: Any, _y: Any) -> None:
     axes.stairs(mark.y, x, fill=True, color=mark.colour, alpha=0.35)
     axes.stairs(mark.y, x, color=mark.colour, label=mark.label, **{"linewidth": 1.2, **mark.style})
 
 
 SHAPES: "Mapping[str, Callable[[Axes, Mark, Any, Any], object]]" = {
-    "line": _line,
-    "reach": _reach,
+    "line": lambda axes, mark, x, y: axes.plot(x, y, color=mark.colour, label=mark.label, **mark.style),
+    "reach": lambda axes, mark, x, y: axes.errorbar(
+        x, y, xerr=mark.to, color=mark.colour, label=mark.label, **{"fmt": "o", **mark.style}
+    ),
     "bars": _bars,
     "band": lambda axes, mark, x, y: axes.fill_between(
         x, y[0], y[1], color=mark.colour, label=mark.label, **_AREA | dict(mark.style)
@@ -167,11 +161,11 @@ def draw_panels(
     # Beside the title stands what kind of numbers these are.
     lines = textwrap.wrap(title, max(_FEWEST_LETTERS, round(_LETTERS * (width - _KIND))))
     shared = next((panel for panel in panels if panel.legend == "figure"), None)
-    names, rows_of_names = (0, 0) if shared is None else _legend_rows(shared, "", width if title else width - _KIND)
-    room_of_names = 0.0 if shared is None else _LINE * max(1, rows_of_names) + _UNDER_NAMES
+    names, legend_rows = (0, 0) if shared is None else _legend_rows(shared, "", width if title else width - _KIND)
+    legend_height = 0.0 if shared is None else _LINE * max(1, legend_rows) + _UNDER_NAMES
     # A title makes its own room.
-    above = room_of_names if title else max(_TOP, room_of_names)
-    height = size[1] * sum(heights) + 0.4 + below + room_of_names
+    above = legend_height if title else max(_TOP, legend_height)
+    height = size[1] * sum(heights) + 0.4 + below + legend_height
     with house_style():
         rect = (0.0, below / height, 1.0, 1.0 - (above + below) / height)
         figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, rect=rect))
@@ -187,8 +181,8 @@ def draw_panels(
         _share_scales(figure, drawn, size[1])
         if names:
             handles = next(each.axes for each in drawn if each.panel is shared).get_legend_handles_labels()
-            place = (0.002, 1.0 - (_TITLE_LINE * len(lines) + 0.08) / height)
-            figure.legend(*handles, loc="upper left", bbox_to_anchor=place, ncols=names, **_OF_LEGEND)
+            anchor = (0.002, 1.0 - (_TITLE_LINE * len(lines) + 0.08) / height)
+            figure.legend(*handles, loc="upper left", bbox_to_anchor=anchor, ncols=names, **_OF_LEGEND)
         # Names and messages come from files: a dollar sign in them begins no formula.
         if title:
             figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=11, parse_math=False)
@@ -204,8 +198,8 @@ def _legend_rows(panel: Panel, title: str, width: float) -> tuple[int, int]:
     """Return the legend entries per row for a width [inches], and the number of legend rows above the title."""
     names = [mark.label for mark in panel.marks if mark.label and mark.shape != "text"]
     widths = [_ENTRY + len(name) / _ENTRY_LETTERS for name in dict.fromkeys(names)]
-    beside = len(title) / _LETTERS if title else 0.0
-    if sum(widths) + beside <= width:
+    title_width = len(title) / _LETTERS if title else 0.0
+    if sum(widths) + title_width <= width:
         return len(widths), 0
     for rows in range(1, len(widths)):
         # A legend is filled column by column.
@@ -227,8 +221,8 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float]) -> Any:
     for mark in panel.marks:
         is_dashed = len(plain) > 1 and mark.shape in _DASHED_SHAPES
         style = {"linestyle": DASHES.get(mark.colour, "-"), **mark.style} if is_dashed else mark.style
-        shown = SHAPES[mark.shape](axes, replace(mark, style=style), panel.x.values(mark.x), panel.y.values(mark.y))
-        mapped = shown if mark.shape in ("map", "points") else mapped
+        artist = SHAPES[mark.shape](axes, replace(mark, style=style), panel.x.values(mark.x), panel.y.values(mark.y))
+        mapped = artist if mark.shape in ("map", "points") else mapped
     title = panel.title or (panel.y.axis if panel.shares_x else "")
     pad = _ABOVE
     axes.set_xlabel(_wrapped(panel.x.axis, size[0]))
@@ -248,8 +242,8 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float]) -> Any:
         elif panel.legend == "inside":
             axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", handlelength=2.2)
     # A long title is smaller before it is cut off at the next panel.
-    room, letters = _LETTERS * (size[0] - _AXIS_ROOM), len(_MARKUP.sub("", title))
-    axes.set_title(title, pad=pad, fontsize=_TITLE_SIZE * min(1.0, max(_SMALLEST_TITLE, room / max(1, letters))))
+    fitting, letters = _LETTERS * (size[0] - _AXIS_ROOM), len(_MARKUP.sub("", title))
+    axes.set_title(title, pad=pad, fontsize=_TITLE_SIZE * min(1.0, max(_SMALLEST_TITLE, fitting / max(1, letters))))
     # Last, so that it can undo what Matplotlib chose.
     if panel.then is not None:
         panel.then(axes)

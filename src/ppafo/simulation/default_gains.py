@@ -55,7 +55,7 @@ _OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
 """Rule for each number that depends on torque loop and joint."""
 
 
-class GainParts(NamedTuple):
+class _GainParts(NamedTuple):
     """Functions for a gain: torque loop or reach of a device, and rule of ``control.torque_loop``."""
 
     number_of: Callable[..., Any]
@@ -70,7 +70,7 @@ def gain_of_device(
     valve: Any,
     signals: Any,
     *,
-    parts: GainParts,
+    parts: _GainParts,
 ) -> float:
     """Gain from ``parts.rule`` for the torque loop or the reach of a device."""
     return parts.rule(parts.number_of(settings, stops, around, numbers, valve, signals))
@@ -85,7 +85,7 @@ def gain_with_setting(
     signals: Any,
     setting: float,
     *,
-    parts: GainParts,
+    parts: _GainParts,
 ) -> float:
     """Gain from ``parts.rule`` for the torque loop of a device and another setting of the controller."""
     return parts.rule(parts.number_of(settings, stops, around, numbers, valve, signals), setting)
@@ -100,7 +100,7 @@ def opening_beyond_band(
     signals: Any,
     setting: float,
     *,
-    parts: GainParts,
+    parts: _GainParts,
 ) -> float:
     """Command [-] for the valve opening from ``parts.rule``, for a valve with a dead band."""
     opening = parts.rule(parts.number_of(settings, stops, around, numbers, valve, signals), setting)
@@ -132,12 +132,12 @@ def loop_terms(
     """
     controls_torque = TORQUE in law.controls
 
-    def of_loop(loops: LoopFunctions, rule: PlainFunction) -> GainParts:
+    def of_loop(loops: LoopFunctions, rule: PlainFunction) -> _GainParts:
         # A law of the angle alone has the torque loop inside it.
-        return GainParts(loops.loop if controls_torque else loops.torque_loop, rule)
+        return _GainParts(loops.loop if controls_torque else loops.torque_loop, rule)
 
-    def of_reach(loops: LoopFunctions, rule: PlainFunction) -> GainParts:
-        return GainParts(loops.reach, rule)
+    def of_reach(loops: LoopFunctions, rule: PlainFunction) -> _GainParts:
+        return _GainParts(loops.reach, rule)
 
     def of_joint(loops: LoopFunctions, rule: PlainFunction) -> JointGainParts:
         assert loops.joint is not None, "a law of the angle knows its joint"

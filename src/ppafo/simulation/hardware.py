@@ -1,5 +1,7 @@
 """Device of a scenario: its parameter set with the overrides of the file, then those of the caller."""
 
+import functools
+import logging
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +23,8 @@ from ppafo.simulation.document import DocumentReader, ScenarioRequest, value_at
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Origin
 from ppafo.wording import nearest_name, one_line
+
+logger = logging.getLogger("ppafo")
 
 _SECTIONS_WITH_UNITS = ("initial", "motion", "controller", "reference")
 """Sections whose quantities define the display units of their author, in increasing priority."""
@@ -52,11 +56,19 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
             )
         name = chosen_valve(parameter_set, valve)
         parameter_set = with_overrides(parameter_set, of_file, valve)
+        if of_file and section["set"] != in_file.get("set"):
+            _report_file_overrides(reading.file, section["set"], ", ".join(map(str, of_file)))
     except ParameterError as error:
         raise device_error(reading, error) from error
     before = atmospheric_pressure(parameter_set) if overrides else None
     changed = with_overrides(parameter_set, overrides, valve)
     return Hardware(changed, name, links_of_set(changed, {override.typed for override in overrides}, before))
+
+
+@functools.lru_cache(maxsize=64)
+def _report_file_overrides(file: str, set_name: str, overrides: str) -> None:
+    """Log, once for each set, that values which a scenario gives its own device replace those of another one."""
+    logger.warning("ppafo: %s: [device] overrides replace values of %s too: %s", file, set_name, overrides)
 
 
 def parameter_set_of(origin: Origin) -> ParameterSet:

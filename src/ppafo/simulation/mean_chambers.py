@@ -46,7 +46,7 @@ class MeanChambers(NamedTuple):
     growth_2: float
 
 
-class RestingPlant(NamedTuple):
+class _RestingPlant(NamedTuple):
     """Plant of an actuator alone at rest (``ShapedPlant``), as the functions of an actuator kind read it."""
 
     shape: Any
@@ -58,14 +58,14 @@ class RestingPlant(NamedTuple):
     external_torque: float
 
 
-class MeasuredParts(NamedTuple):
+class _MeasuredParts(NamedTuple):
     """Shape of a measured actuator: the kind's function ``prepare``, and the measured table, its third argument."""
 
     prepare: Callable[[Any, Range, Any], Any]
     table: Any
 
 
-class ShapedParts(NamedTuple):
+class _ShapedParts(NamedTuple):
     """Functions of an actuator that is no vane: shape from settings and stops, both chambers, torque [N m]."""
 
     shape: Callable[[Any, Range], Any]
@@ -73,13 +73,13 @@ class ShapedParts(NamedTuple):
     torque: Callable[[Any, float, float, float], float]
 
 
-class ChamberParts(NamedTuple):
+class _ChamberParts(NamedTuple):
     """Function for the chambers of an actuator at an angle [rad]."""
 
     at: Callable[[Any, Range, Surroundings, float], MeanChambers]
 
 
-def measured_shape_of(settings: Any, stops: Range, *, parts: MeasuredParts) -> Any:
+def measured_shape_of(settings: Any, stops: Range, *, parts: _MeasuredParts) -> Any:
     """Shape of an actuator with a measured table."""
     return parts.prepare(settings, stops, parts.table)
 
@@ -109,10 +109,10 @@ def vane_at(settings: VaneSettings, stops: Range, _around: Surroundings, angle: 
     )
 
 
-def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float, *, parts: ShapedParts) -> MeanChambers:
+def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float, *, parts: _ShapedParts) -> MeanChambers:
     """Both chambers at an angle [rad] of an actuator that is no vane, at half of the supply's gauge pressure."""
     room = around.atmospheric_pressure
-    plant = RestingPlant(
+    plant = _RestingPlant(
         shape=parts.shape(settings, stops),
         gas_product=1.0,
         supply_pressure=around.supply_pressure,
@@ -139,7 +139,7 @@ def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float, *
     )
 
 
-def usual_chambers(settings: Any, stops: Range, around: Surroundings, *, parts: ChamberParts) -> MeanChambers:
+def usual_chambers(settings: Any, stops: Range, around: Surroundings, *, parts: _ChamberParts) -> MeanChambers:
     """Both chambers at the usual angle, for an unknown joint angle."""
     return parts.at(settings, stops, around, usual_place(stops.angle_min, stops.angle_max))
 
@@ -149,7 +149,7 @@ def vane_growth(settings: VaneSettings, _stops: Range, _around: Surroundings) ->
     return settings.displacement_per_radian
 
 
-def shaped_growth(settings: Any, stops: Range, around: Surroundings, *, parts: ShapedParts) -> float:
+def shaped_growth(settings: Any, stops: Range, around: Surroundings, *, parts: _ShapedParts) -> float:
     """Mean volume displaced per angle [m^3/rad] in chamber 1 between the stops, for an actuator that is no vane."""
     gauge = around.supply_pressure - around.atmospheric_pressure
     return mean_growth(parts.shape(settings, stops), stops, gauge, parts.chambers)
@@ -182,14 +182,14 @@ def chambers_of(device: Device) -> ChambersOf:
         for quantity in quantities_of(row)
     )
     if actuator.kind == VANE:
-        usual = made_of(usual_chambers, "usual_chambers_of_vane", ChamberParts(vane_at))
+        usual = made_of(usual_chambers, "usual_chambers_of_vane", _ChamberParts(vane_at))
         return ChambersOf(function=usual, at=vane_at, growth=vane_growth, sources=sources, rows=rows)
     name, model, shape = actuator.kind, kind.model, kind.model.prepare
     if actuator.table is not None:
-        shape = made_of(measured_shape_of, f"shape_of_{name}", MeasuredParts(model.prepare, actuator.table))
-    shaped = ShapedParts(shape, model.chambers, model.torque)
+        shape = made_of(measured_shape_of, f"shape_of_{name}", _MeasuredParts(model.prepare, actuator.table))
+    shaped = _ShapedParts(shape, model.chambers, model.torque)
     at = made_of(shaped_at, f"chambers_at_of_{name}", shaped)
-    middle = made_of(usual_chambers, f"usual_chambers_of_{name}", ChamberParts(at))
+    middle = made_of(usual_chambers, f"usual_chambers_of_{name}", _ChamberParts(at))
     growth = made_of(shaped_growth, f"growth_of_{name}", shaped)
     return ChambersOf(function=middle, at=at, growth=growth, sources=sources, rows=rows)
 

@@ -22,12 +22,9 @@ from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_
 if TYPE_CHECKING:
     from ppafo.model.regulator import SupplyLines
 
-_GAS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
-_MASS = ("gas.molar_mass", "gas.temperature")
-_ANY = ("supply.pressure",)
-"""Dummy source for a term that depends on no number."""
-
-_SAME = {
+_GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
+_GAS_PRODUCT_PATHS = ("gas.molar_mass", "gas.temperature")
+_SAME_NUMBERS = {
     "supply_pressure": "supply.pressure",
     "dorsiflexion_pressure": "supply.dorsiflexion_pressure",
     "atmospheric_pressure": "supply.atmospheric_pressure",
@@ -51,14 +48,19 @@ _PAIRS = ("solenoid", "solenoid_recycling")
 _SPOOL = "proportional"
 
 
-def yes(number: float) -> float:
+def always_one(number: float) -> float:
     """Return 1 for any finite number, elementwise for a column."""
     return 1.0 + 0.0 * number
 
 
-def no(number: float) -> float:
+def always_zero(number: float) -> float:
     """Return 0 for any finite number, elementwise for a column."""
     return 0.0 * number
+
+
+# Neither depends on a number: the source is there because a term needs one.
+_ONE, _ZERO = (LinkFunction(("supply.pressure",), constant) for constant in (always_one, always_zero))
+"""Terms whose value is always 1 or 0."""
 
 
 def flow_of_area(molar_mass: float, ratio: float, temperature: float, area: float, discharge: float) -> float:
@@ -121,24 +123,24 @@ def time_of_joint(joining: float, holding: float) -> float:
     return joining + holding
 
 
-class NominalParts(NamedTuple):
+class _NominalParts(NamedTuple):
     """Function for the chambers of the actuator at the usual angle."""
 
     mean_chambers: Callable[[Any, Range, Surroundings], MeanChambers]
 
 
-def torque_per_pressure(settings: Any, stops: Range, around: Surroundings, *, parts: NominalParts) -> float:
+def torque_per_pressure(settings: Any, stops: Range, around: Surroundings, *, parts: _NominalParts) -> float:
     """Torque per pressure of chamber 1 [m^3] at the usual angle."""
     return parts.mean_chambers(settings, stops, around).torque_per_pressure_1
 
 
-def dead_volume_1(settings: Any, stops: Range, around: Surroundings, *, parts: NominalParts) -> float:
+def dead_volume_1(settings: Any, stops: Range, around: Surroundings, *, parts: _NominalParts) -> float:
     """Dead volume [m^3] of a vane whose chamber 1 has the same volume at mid-range."""
     mean = parts.mean_chambers(settings, stops, around)
     return rest_of(mean.volume_1, mean.torque_per_pressure_1, stops)
 
 
-def dead_volume_2(settings: Any, stops: Range, around: Surroundings, *, parts: NominalParts) -> float:
+def dead_volume_2(settings: Any, stops: Range, around: Surroundings, *, parts: _NominalParts) -> float:
     """Dead volume [m^3] of a vane whose chamber 2 has the same volume at mid-range."""
     mean = parts.mean_chambers(settings, stops, around)
     return rest_of(mean.volume_2, mean.torque_per_pressure_1, stops)
@@ -157,47 +159,44 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Link
     valve, kind = device.valve, VALVES[device.valve.kind]
     names = tuple(quantity.name for quantity in kind.quantities)
     is_pair, is_known = valve.kind in _PAIRS, valve.kind in (*_PAIRS, _SPOOL)
-    terms = {name: LinkFunction((path,)) for name, path in _SAME.items()} | _chamber_terms(device)
+    terms = {name: LinkFunction((path,)) for name, path in _SAME_NUMBERS.items()} | _chamber_terms(device)
     terms |= {
-        "gas_product": LinkFunction(_MASS, product_of),
+        "gas_product": LinkFunction(_GAS_PRODUCT_PATHS, product_of),
         "valve_conductance": _conductance(device, VALVE),
         "leak_conductance": _conductance(device, LEAK),
         "flow": in_its_form(
             device,
             VALVE,
-            LinkFunction((*_GAS, *AREA_PATHS[VALVE]), flow_of_area),
-            LinkFunction((*_MASS, SONIC_PATHS[VALVE][0]), flow_of_sonic),
+            LinkFunction((*_GAS_PATHS, *AREA_PATHS[VALVE]), flow_of_area),
+            LinkFunction((*_GAS_PRODUCT_PATHS, SONIC_PATHS[VALVE][0]), flow_of_sonic),
         )
         if is_known
-        else LinkFunction(_ANY, no),
+        else _ZERO,
         "critical_ratio": in_its_form(
-            device, VALVE, LinkFunction(_GAS[1:2], critical_pressure_ratio), LinkFunction(SONIC_PATHS[VALVE][1:])
+            device, VALVE, LinkFunction(_GAS_PATHS[1:2], critical_pressure_ratio), LinkFunction(SONIC_PATHS[VALVE][1:])
         ),
-        # Not a number that varies: the source is there because a term needs one.
-        "relieving": LinkFunction(_ANY, yes if device.supply.takes_back else no),
-        "pair": LinkFunction(_ANY, yes if is_pair else no),
-        "delay": LinkFunction(("valve.delay",)) if valve.kind == _SPOOL else LinkFunction(_ANY, no),
+        "relieving": _ONE if device.supply.takes_back else _ZERO,
+        "pair": _ONE if is_pair else _ZERO,
+        "delay": LinkFunction(("valve.delay",)) if valve.kind == _SPOOL else _ZERO,
         "lag": LinkFunction(tuple(f"valve.{name}" for name in names), spool_lag, (kind.settings,))
         if valve.kind == _SPOOL
-        else LinkFunction(_ANY, no),
+        else _ZERO,
         "converter_range": LinkFunction(("supply.pressure", "supply.dorsiflexion_pressure"), converter_range),
         "joining_time": LinkFunction(("valve.joining_time", "valve.holding_time"), time_of_joint)
         if "joining_time" in names
-        else LinkFunction(_ANY, no),
+        else _ZERO,
     }
     for name in ("opening_delay", "closing_delay", "switching_interval", "dead_band"):
-        terms[name] = LinkFunction((f"valve.{name}",)) if name in names and is_known else LinkFunction(_ANY, no)
+        terms[name] = LinkFunction((f"valve.{name}",)) if name in names and is_known else _ZERO
     for number, line in enumerate(SUPPLY_LINES, start=1):
         path = f"{SUPPLY_LINE}.{line}"
         of_line = {
-            "line_droop": LinkFunction((f"{path}.droop", *_MASS), per_content),
-            "line_largest_flow": LinkFunction((f"{path}.largest_flow", *_MASS), as_content),
+            "line_droop": LinkFunction((f"{path}.droop", *_GAS_PRODUCT_PATHS), per_content),
+            "line_largest_flow": LinkFunction((f"{path}.largest_flow", *_GAS_PRODUCT_PATHS), as_content),
             "line_volume": LinkFunction((f"{path}.volume",)),
         }
-        terms |= {
-            f"{name}_{number}": LinkFunction(_ANY, no) if lines is None else term for name, term in of_line.items()
-        }
-    terms["line_relieving"] = LinkFunction(_ANY, yes if lines is not None and first(lines.relieving) else no)
+        terms |= {f"{name}_{number}": _ZERO if lines is None else term for name, term in of_line.items()}
+    terms["line_relieving"] = _ONE if lines is not None and first(lines.relieving) else _ZERO
     return {nominal_term(name): term for name, term in terms.items()}
 
 
@@ -206,8 +205,8 @@ def _conductance(device: Device, section: str) -> LinkFunction:
     return in_its_form(
         device,
         section,
-        LinkFunction((*_GAS, *AREA_PATHS[section]), conductance_of_area),
-        LinkFunction((*_MASS, SONIC_PATHS[section][0]), conductance_of_sonic),
+        LinkFunction((*_GAS_PATHS, *AREA_PATHS[section]), conductance_of_area),
+        LinkFunction((*_GAS_PRODUCT_PATHS, SONIC_PATHS[section][0]), conductance_of_sonic),
     )
 
 
@@ -230,7 +229,7 @@ def _chamber_terms(device: Device) -> dict[str, LinkFunction]:
     chambers = chambers_of(device)
 
     def term(frame: Callable[..., float]) -> LinkFunction:
-        made = made_of(frame, f"{frame.__name__}_of_device", NominalParts(chambers.function))
+        made = made_of(frame, f"{frame.__name__}_of_device", _NominalParts(chambers.function))
         return LinkFunction(chambers.sources, made, chambers.rows)
 
     return own | {

@@ -31,13 +31,13 @@ class FlowNumbers(NamedTuple):
     orifice_2: Annotated[float, Number("", "discharge coefficient or critical ratio")]
 
 
-class SpoolParts(NamedTuple):
+class _SpoolParts(NamedTuple):
     """Function for the time [s] that a spool takes to follow a command."""
 
     follow_time: Callable[[Any], float]
 
 
-class LoopParts(NamedTuple):
+class _LoopParts(NamedTuple):
     """Functions for the torque loop; each takes the rows that it needs.
 
     ``chambers_at`` gives the chambers at an angle [rad]; ``places`` the lowest and highest joint angle [rad];
@@ -55,7 +55,7 @@ class LoopParts(NamedTuple):
     per_pressure_2: Callable[[MeanChambers], float]
 
 
-class JointParts(NamedTuple):
+class _JointParts(NamedTuple):
     """Functions for the joint: mean chambers of the actuator; inertia [kg m^2] and gravity torque [N m]."""
 
     mean_chambers: Callable[[Any, Range, Surroundings], MeanChambers]
@@ -82,7 +82,7 @@ def sonic_flow(numbers: FlowNumbers) -> float:
     return flow_of_sonic(numbers.molar_mass, numbers.temperature, numbers.orifice_1)
 
 
-def time_of_spool(valve: Any, period: float, *, parts: SpoolParts) -> float:
+def time_of_spool(valve: Any, period: float, *, parts: _SpoolParts) -> float:
     """Delay [s] from a sample to the flow of a proportional valve: time of the spool, plus sample delay."""
     return parts.follow_time(valve) + SAMPLES_LATE * period
 
@@ -122,7 +122,7 @@ def loop_of(
     valve: Any,
     signals: Any,
     *,
-    parts: LoopParts,
+    parts: _LoopParts,
 ) -> TorqueLoop:
     """Torque or pressure loop at constant volume: R = K q max(P_1 / V_1, P_2 / V_2), theta; K 1 or 0 for a pressure.
 
@@ -154,7 +154,7 @@ def reach_of(
     _valve: Any,
     signals: Any,
     *,
-    parts: LoopParts,
+    parts: _LoopParts,
 ) -> float:
     """Largest change of torque [N m] or pressure [Pa] from one supply while the other chamber is vented."""
     lowest, _ = parts.places(stops, signals)
@@ -165,7 +165,7 @@ def reach_of(
 
 
 def joint_of(
-    settings: Any, stops: Range, around: Surroundings, signals: Any, travel: float, *, parts: JointParts
+    settings: Any, stops: Range, around: Surroundings, signals: Any, travel: float, *, parts: _JointParts
 ) -> Joint:
     """Joint of a device with its gas at atmospheric pressure, where the gas spring is softest."""
     mean = parts.mean_chambers(settings, stops, around)
@@ -236,9 +236,9 @@ def loop_functions(device: Device, seen: LawSignals, controlled: str, sonic: boo
         time_of_valve: PlainFunction = time_of_pair
     else:
         follow_time = valve.lag or valve.choose(valve_settings(device.valve)).command_delay
-        time_of_valve = made_of(time_of_spool, "time_of_spool_valve", SpoolParts(follow_time))
+        time_of_valve = made_of(time_of_spool, "time_of_spool_valve", _SpoolParts(follow_time))
     per_pressure_1, per_pressure_2 = _PER_PRESSURE.get(controlled, (torque_by_pressure_1, torque_by_pressure_2))
-    parts = LoopParts(
+    parts = _LoopParts(
         chambers_at=chambers.at,
         places=seen.places,
         valve_flow=sonic_flow if sonic else area_flow,
@@ -250,7 +250,7 @@ def loop_functions(device: Device, seen: LawSignals, controlled: str, sonic: boo
     loop = torque_loop = made_of(loop_of, "loop_of_device", parts)
     joint: PlainFunction | None = None
     if seen.turning is not None:
-        joint = made_of(joint_of, "joint_of_device", JointParts(chambers.function, seen.turning))
+        joint = made_of(joint_of, "joint_of_device", _JointParts(chambers.function, seen.turning))
         slow_parts = JointGainParts(torque_loop, joint, angle_loop.slow_loop)
         loop = made_of(slow_loop_of, "slow_loop_of_device", slow_parts)
     sources = (

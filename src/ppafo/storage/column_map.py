@@ -98,7 +98,7 @@ class ColumnMap(StrictTable):
     direction: Annotated[MappedDirection | None, Field(description="direction from the rate of a channel")] = None
 
 
-class ColumnMaps(BaseModel):
+class _ColumnMaps(BaseModel):
     """Column maps of a file, by name; a problem file of ``ppafo identify`` has further tables."""
 
     model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
@@ -114,7 +114,7 @@ def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
 
     Raises DataError if there is no such map, or if there are several and no name is given.
     """
-    parsed, file = read_model(_FILE, ColumnMaps, path)
+    parsed, file = read_model(_FILE, _ColumnMaps, path)
     maps = parsed.columns
     known = ", ".join(maps)
     if name is None and len(maps) > 1:
@@ -126,7 +126,7 @@ def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a file of column maps."""
-    return make_schema(ColumnMaps, "ppafo column maps")
+    return make_schema(_ColumnMaps, "ppafo column maps")
 
 
 def column_map_of(columns: ColumnMap | str | Path) -> tuple[ColumnMap, str]:

@@ -3,7 +3,6 @@
 Error messages name file, line and column of an invalid cell, and the key of an error in the map.
 """
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,120 +20,16 @@ from ppafo.storage.column_map import (
     MappedTable,
     check_sources,
     in_map,
-    shown_names,
 )
 from ppafo.storage.comma_separated import HeaderColumn, check_clock, in_si
 from ppafo.storage.files import read_bytes
 from ppafo.storage.frames import remedy_for
 from ppafo.storage.mapped_text import read_mapped_text
-from ppafo.storage.matlab import MATLAB_SUFFIX, MatlabFile, read_matlab
-from ppafo.wording import nearest_name, one_line
-
-# What a column map takes of a MATLAB file, by the names of its variables: ``M(:,3)``, ``log.pressure``.
-
-
-def read_mapped_matlab(file: MatlabFile, columns: ColumnMap, map_name: str) -> MappedTable:
-    """Return the columns of a MATLAB file that a map selects, in the units of the file.
-
-    Raises DataError with the key of a channel whose variable is absent or unusable, and with the map if it has a name.
-    """
-    numbers: dict[str, Floats] = {}
-    clock: list[str] | None = None
-    dates: list[str] | None = None
-    with in_map(map_name):
-        for name, mapped in columns.channels.items():
-            if mapped.column is None:
-                continue
-            variable = _variable(f"channels.{name}.column", mapped.column, file)
-            if name == TIME and variable in file.texts:
-                clock = file.texts[variable]
-            else:
-                numbers[name] = file.columns[variable]
-        date = columns.channels[TIME].date
-        if date is not None:
-            dates = file.texts.get(_variable(f"channels.{TIME}.date", date, file))
-        lengths = {name: values.size for name, values in numbers.items()}
-        if clock:
-            lengths[TIME] = len(clock)
-        if len(set(lengths.values())) != 1:
-            listed = ", ".join(f"channels.{name} has {length}" for name, length in lengths.items())
-            raise DataError(f"all columns must have the same number of samples: {listed or 'there is no column'}")
-        size = next(iter(lengths.values()))
-        for name, values in numbers.items():
-            gaps = np.flatnonzero(~np.isfinite(values))
-            if gaps.size:
-                first = int(gaps[0])
-                raise DataError(f"channels.{name}.column: sample {first + 1} is {values[first]}, not a finite number")
-    return MappedTable(
-        size=size, numbers=numbers, clock=clock, dates=dates, rows=range(1, size + 1), noun="sample", kind="measured"
-    )
-
-
-def _variable(key: str, column: int | str, file: MatlabFile) -> str:
-    """Return the variable that a map names at ``key``; a number selects a column of the file's only matrix."""
-    if isinstance(column, int):
-        matrices = sorted({name.partition("(")[0] for name in file.columns if "(:," in name and "." not in name})
-        if len(matrices) != 1:
-            raise DataError(f"{key} = {column}: columns of a .mat file have names; it has {shown_names(file.columns)}")
-        column = f"{matrices[0]}(:,{column})"
-    name = re.sub(r"\s+", "", column) if "(" in column else column
-    if name not in file.columns and name not in file.texts:
-        known = (*file.columns, *file.texts)
-        raise DataError(
-            f"{key} = {column!r}: the file has no such column{nearest_name(name, known)}; it has {shown_names(known)}"
-            f"{file.said_of_objects()}"
-        )
-    return name
-
-
-# The direction of a movement, up or down, from how fast a recorded channel moves, as a column map asks for it.
+from ppafo.storage.matlab import MATLAB_SUFFIX, read_mapped_matlab, read_matlab
+from ppafo.wording import one_line
 
 _SHORTEST = 1e-12
 """Least time [s] between two means of samples for their slope; a shorter time is rounding."""
-
-
-def with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
-    """Return a recording with the channel ``direction``: 1 up, -1 down, 0 for slower than the threshold.
-
-    Unless the recording has a channel ``repetition``, one is added that numbers the sweeps from 1; it is 0 where the
-    motion is too slow. Raises DataError for a channel that is absent or never moves, and for an invalid threshold or
-    window.
-    """
-    from ppafo.units import parse_quantity
-
-    with refused_as(DataError, f"direction.of = {wanted.of!r}", DataError):
-        unit = recording.unit(wanted.of)
-    rate_unit = "1/s" if unit == PLAIN_NUMBER else f"{unit.removesuffix('_d')}/s"
-    with refused_as(DataError, f"direction.threshold = {wanted.threshold!r}", UnitError):
-        threshold = parse_quantity(wanted.threshold, rate_unit)
-    with refused_as(DataError, f"direction.window = {wanted.window!r}", UnitError):
-        window = parse_quantity(wanted.window, TIME_UNIT)
-    # The slope [1/s] between the means of the half windows [s] before and after each sample.
-    sum_of_values = np.concatenate(([0.0], np.cumsum(recording[wanted.of])))
-    sum_of_times = np.concatenate(([0.0], np.cumsum(recording.time)))
-    here = np.arange(recording.time.size)
-    # At least the sample itself on either side, where the window is shorter than a sample.
-    first = np.minimum(np.searchsorted(recording.time, recording.time - 0.5 * window), here)
-    end = np.maximum(np.searchsorted(recording.time, recording.time + 0.5 * window, side="right"), here + 1)
-    count_before, count_after = here - first + 1, end - here
-    mean_before = (sum_of_values[here + 1] - sum_of_values[first]) / count_before
-    mean_after = (sum_of_values[end] - sum_of_values[here]) / count_after
-    time_before = (sum_of_times[here + 1] - sum_of_times[first]) / count_before
-    time_after = (sum_of_times[end] - sum_of_times[here]) / count_after
-    rate = wanted.sign * np.asarray((mean_after - mean_before) / np.maximum(time_after - time_before, _SHORTEST))
-    direction = np.where(rate > threshold, 1.0, np.where(rate < -threshold, -1.0, 0.0))
-    moving = np.flatnonzero(direction)
-    if moving.size == 0:
-        raise DataError(f"direction.threshold: '{wanted.of}' never moves faster than {wanted.threshold}")
-    directed = recording.with_channel("direction", direction, PLAIN_NUMBER)
-    if "repetition" in recording:
-        return directed
-    sweeps = np.zeros(direction.size)
-    is_reversed = np.diff(direction[moving]) != 0.0
-    sweeps[moving] = np.concatenate(([1], 1 + np.cumsum(is_reversed)))
-    return directed.with_channel("repetition", sweeps, PLAIN_NUMBER)
-
-
 _MASS_FLOW = "kg/s"
 
 
@@ -196,15 +91,15 @@ def read_trials(
             time = _time(columns.channels[TIME], table, atmosphere)
             trials = {"": slice(None)} if columns.trial is None else _rows_of_trials(time, columns.trial)
         recordings = []
-        for name, rows in trials.items():
+        for suffix_of_label, rows in trials.items():
             check_clock(time[rows], table.rows[rows], table.noun)
-            of_trial = {channel: replace(one, values=one.values[rows]) for channel, one in channels.items()}
+            trial = {name: replace(channel, values=channel.values[rows]) for name, channel in channels.items()}
+            trial_label = f"{label or one_line(Path(path).stem)}{suffix_of_label}"
             # A synthetic recording stays one through a column map.
-            said = (label or one_line(Path(path).stem)) + name
-            recording = Recording(said, time[rows], of_trial, table.kind)
+            recording = Recording(trial_label, time[rows], trial, table.kind)
             with in_map(map_name):
                 recordings.append(
-                    recording if columns.direction is None else with_direction(recording, columns.direction)
+                    recording if columns.direction is None else _with_direction(recording, columns.direction)
                 )
         return tuple(recordings)
 
@@ -284,3 +179,45 @@ def _time(mapped: MappedChannel, table: MappedTable, atmosphere: float) -> Float
             f'column, such as {TIME} = {{ rate = "{mean_rate:g} Hz" }}, which is the mean of this file'
         )
     return time
+
+
+def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
+    """Return a recording with the channel ``direction``: 1 up, -1 down, 0 for slower than the threshold.
+
+    Unless the recording has a channel ``repetition``, one is added that numbers the sweeps from 1; it is 0 where the
+    motion is too slow. Raises DataError for a channel that is absent or never moves, and for an invalid threshold or
+    window.
+    """
+    from ppafo.units import parse_quantity
+
+    with refused_as(DataError, f"direction.of = {wanted.of!r}", DataError):
+        unit = recording.unit(wanted.of)
+    rate_unit = "1/s" if unit == PLAIN_NUMBER else f"{unit.removesuffix('_d')}/s"
+    with refused_as(DataError, f"direction.threshold = {wanted.threshold!r}", UnitError):
+        threshold = parse_quantity(wanted.threshold, rate_unit)
+    with refused_as(DataError, f"direction.window = {wanted.window!r}", UnitError):
+        window = parse_quantity(wanted.window, TIME_UNIT)
+    # The slope [1/s] between the means of the half windows [s] before and after each sample.
+    sum_of_values = np.concatenate(([0.0], np.cumsum(recording[wanted.of])))
+    sum_of_times = np.concatenate(([0.0], np.cumsum(recording.time)))
+    here = np.arange(recording.time.size)
+    # At least the sample itself on either side, where the window is shorter than a sample.
+    first = np.minimum(np.searchsorted(recording.time, recording.time - 0.5 * window), here)
+    end = np.maximum(np.searchsorted(recording.time, recording.time + 0.5 * window, side="right"), here + 1)
+    count_before, count_after = here - first + 1, end - here
+    mean_before = (sum_of_values[here + 1] - sum_of_values[first]) / count_before
+    mean_after = (sum_of_values[end] - sum_of_values[here]) / count_after
+    time_before = (sum_of_times[here + 1] - sum_of_times[first]) / count_before
+    time_after = (sum_of_times[end] - sum_of_times[here]) / count_after
+    rate = wanted.sign * np.asarray((mean_after - mean_before) / np.maximum(time_after - time_before, _SHORTEST))
+    direction = np.where(rate > threshold, 1.0, np.where(rate < -threshold, -1.0, 0.0))
+    moving = np.flatnonzero(direction)
+    if moving.size == 0:
+        raise DataError(f"direction.threshold: '{wanted.of}' never moves faster than {wanted.threshold}")
+    directed = recording.with_channel("direction", direction, PLAIN_NUMBER)
+    if "repetition" in recording:
+        return directed
+    sweeps = np.zeros(direction.size)
+    is_reversed = np.diff(direction[moving]) != 0.0
+    sweeps[moving] = np.concatenate(([1], 1 + np.cumsum(is_reversed)))
+    return directed.with_channel("repetition", sweeps, PLAIN_NUMBER)

@@ -1,4 +1,4 @@
-"""Variables of MATLAB files: version 4 to 7 by SciPy, 7.3 (HDF5) by h5py. No code in a file is run.
+"""Variables of MATLAB files (4 to 7 by SciPy, 7.3 by h5py), and those that a column map selects. No code is run.
 
 A field of a structure is named ``a.b``, a field in an array of structures ``a(2).b``, a column of a matrix ``M(:,3)``
 and a row ``M(3,:)``. In a structure with ``data`` and ``colheaders``, as made by ``importdata``, each column is also
@@ -6,6 +6,7 @@ available under its label. The format of objects (timeseries, timetable, table, 
 name them together with the MATLAB code that saves them as plain arrays.
 """
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import DataError
-from ppafo.signals.recording import Floats
+from ppafo.signals.recording import TIME, Floats
+from ppafo.storage.column_map import ColumnMap, MappedTable, in_map, shown_names
 from ppafo.storage.files import read_bytes
 from ppafo.storage.trial_reading import check_can_be_read
-from ppafo.wording import one_line
+from ppafo.wording import nearest_name, one_line
 
 MATLAB_SUFFIX = ".mat"
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -59,15 +61,15 @@ class MatlabFile:
     words: list[str] = field(default_factory=list)
     objects: list[tuple[str, str]] = field(default_factory=list)
 
-    def said_of_objects(self) -> str:
+    def advice_on_objects(self) -> str:
         """Return advice on saving the objects of the file as arrays, to append to a message; empty without objects."""
-        said = ""
+        advice = ""
         for name, kind in self.objects:
             save = "its numbers are saved as arrays of their own, such as t = ts.Time; y = ts.Data; save plain.mat t y"
             if kind in _PLAIN:
                 save = f"it is saved as plain arrays by {_PLAIN[kind].format(name=name)}"
-            said += f"; {name}{f' ({kind})' * bool(kind)} is an object that only MATLAB reads, where {save}"
-        return said
+            advice += f"; {name}{f' ({kind})' * bool(kind)} is an object that only MATLAB reads, where {save}"
+        return advice
 
 
 _OF_TABLE = "s = table2struct(T, 'ToScalar', true); save('plain.mat', '-struct', 's')"
@@ -106,7 +108,7 @@ def open_matlab(path: str | Path) -> MatlabFile:
     except _OF_DAMAGE as error:
         raise DataError(f"{path}: cannot be read as a .mat file: {one_line(error)}") from error
     if not contents.columns and not contents.texts:
-        raise DataError(f"{path}: has no variable of numbers{contents.said_of_objects()}")
+        raise DataError(f"{path}: has no variable of numbers{contents.advice_on_objects()}")
     return contents
 
 
@@ -137,11 +139,11 @@ def _read_older(path: str | Path, contents: MatlabFile) -> None:
             # An object says name and class in its first fields.
             names = getattr(getattr(value, "dtype", None), "names", None) or ()
             if {"s0", "s2"} <= set(names) and value.size == 1:
-                said = [
+                words = [
                     one_line(word.decode("ascii", "replace") if isinstance(word, bytes) else word)
                     for word in value.ravel()[0]
                 ]
-                contents.objects.append((said[0], said[2]))
+                contents.objects.append((words[0], words[2]))
             elif not contents.objects:
                 contents.objects.append(("a variable", ""))
         elif not name.startswith("__"):
@@ -245,6 +247,60 @@ def _add_numbers(name: str, array: NDArray[Any], contents: MatlabFile) -> None:
     if numbers.ndim <= 1:
         contents.columns[name] = np.atleast_1d(numbers)
     elif numbers.ndim == 2:
-        for lines, place in ((numbers.T, ":,{}"), (numbers, "{},:")):
+        for lines, index in ((numbers.T, ":,{}"), (numbers, "{},:")):
             if len(lines) <= _MOST_COLUMNS:
-                contents.columns |= {f"{name}({place.format(at)})": line for at, line in enumerate(lines, start=1)}
+                contents.columns |= {f"{name}({index.format(k)})": line for k, line in enumerate(lines, start=1)}
+
+
+def read_mapped_matlab(file: MatlabFile, columns: ColumnMap, map_name: str) -> MappedTable:
+    """Return the columns of a MATLAB file that a map selects, in the units of the file.
+
+    Raises DataError with the key of a channel whose variable is absent or unusable, and with the map if it has a name.
+    """
+    numbers: dict[str, Floats] = {}
+    clock: list[str] | None = None
+    dates: list[str] | None = None
+    with in_map(map_name):
+        for name, mapped in columns.channels.items():
+            if mapped.column is None:
+                continue
+            variable = _variable(f"channels.{name}.column", mapped.column, file)
+            if name == TIME and variable in file.texts:
+                clock = file.texts[variable]
+            else:
+                numbers[name] = file.columns[variable]
+        date = columns.channels[TIME].date
+        if date is not None:
+            dates = file.texts.get(_variable(f"channels.{TIME}.date", date, file))
+        lengths = {name: values.size for name, values in numbers.items()}
+        if clock:
+            lengths[TIME] = len(clock)
+        if len(set(lengths.values())) != 1:
+            listed = ", ".join(f"channels.{name} has {length}" for name, length in lengths.items())
+            raise DataError(f"all columns must have the same number of samples: {listed or 'there is no column'}")
+        size = next(iter(lengths.values()))
+        for name, values in numbers.items():
+            gaps = np.flatnonzero(~np.isfinite(values))
+            if gaps.size:
+                first = int(gaps[0])
+                raise DataError(f"channels.{name}.column: sample {first + 1} is {values[first]}, not a finite number")
+    return MappedTable(
+        size=size, numbers=numbers, clock=clock, dates=dates, rows=range(1, size + 1), noun="sample", kind="measured"
+    )
+
+
+def _variable(key: str, column: int | str, file: MatlabFile) -> str:
+    """Return the variable that a map names at ``key``; a number selects a column of the file's only matrix."""
+    if isinstance(column, int):
+        matrices = sorted({name.partition("(")[0] for name in file.columns if "(:," in name and "." not in name})
+        if len(matrices) != 1:
+            raise DataError(f"{key} = {column}: columns of a .mat file have names; it has {shown_names(file.columns)}")
+        column = f"{matrices[0]}(:,{column})"
+    name = re.sub(r"\s+", "", column) if "(" in column else column
+    if name not in file.columns and name not in file.texts:
+        known = (*file.columns, *file.texts)
+        raise DataError(
+            f"{key} = {column!r}: the file has no such column{nearest_name(name, known)}; it has {shown_names(known)}"
+            f"{file.advice_on_objects()}"
+        )
+    return name

@@ -34,7 +34,7 @@ _KINDS: tuple[RecordingKind, ...] = ("simulated", "synthetic")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OpenSimTable:
+class _OpenSimTable:
     """OpenSim table.
 
     ``time``: times [s]. ``columns``: values by label. ``in_degrees``: None if the header does not state the unit of
@@ -68,7 +68,7 @@ class _Header(NamedTuple):
     is_old: bool
 
 
-def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> OpenSimTable:
+def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> _OpenSimTable:
     """Return the table in a ``.mot`` or ``.sto`` file. Raises DataError with file, line and column of an error.
 
     A column count in the header that contradicts all rows, and last rows that repeat a time, are repaired with a
@@ -111,7 +111,7 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> OpenSimTable:
     if dropped := len(table) - count:
         rows, verb = ("the last row repeats", "was") if dropped == 1 else (f"the last {dropped} rows repeat", "were")
         remarks.append(f"{rows} the time {table[-1, 0]:g} s and {verb} dropped")
-    return OpenSimTable(
+    return _OpenSimTable(
         name=header.name,
         time=time,
         columns=columns,

@@ -26,7 +26,7 @@ _UNSEEN = ("", "nan")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MarkerTable:
+class _MarkerTable:
     """Marker positions over time [s]: coordinates (3, frames) by name, in ``unit``; NaN if a marker was not seen.
 
     ``remarks`` name markers that were renamed because of duplicated names.
@@ -38,7 +38,7 @@ class MarkerTable:
     remarks: tuple[str, ...] = ()
 
 
-def read_trc(path: str | Path) -> MarkerTable:
+def read_trc(path: str | Path) -> _MarkerTable:
     """Return the markers in a ``.trc`` file. Raises DataError with file, line and error."""
     try:
         lines = text_lines(path)
@@ -62,7 +62,7 @@ def read_trc(path: str | Path) -> MarkerTable:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
     twins = doubled(written, names)
     markers = without_copies(dict(zip(names, coordinates, strict=True)), twins)
-    return MarkerTable(time, markers, unit, tuple(said_of_doubled(twins, markers, "markers")))
+    return _MarkerTable(time, markers, unit, tuple(said_of_doubled(twins, markers, "markers")))
 
 
 def _rows(lines: list[str], names: list[str]) -> tuple[Floats, list[Floats]]:

@@ -36,6 +36,20 @@ _SOBOL_BITS = 32
 """Number of bits of a Sobol sequence, which repeats after 2**32 draws."""
 MAXIMUM_SOBOL_DIMENSIONS = 21201
 """Largest number of dimensions with direction numbers in SciPy (Joe and Kuo, 2008)."""
+_ENGINES: dict[tuple[int, int], Any] = {}
+"""SciPy's Sobol engines by seed and dimensions, at their last position."""
+_LOCK = threading.Lock()
+_MAXIMUM_ENGINES = 64
+"""Number of cached engines; the oldest one is dropped first."""
+_LEAST_SPREAD = 1.0e-6
+"""Smallest conditional standard deviation of a normal score, given the others, for a positive definite correlation."""
+NOISE = "sensors.seed"
+"""Path of the seed of a run's noise."""
+_NOISE_LEVELS = ("sensors.angle_noise", "sensors.pressure_noise", "sensors.force_noise")
+_KEY = 1
+"""Seed of the permutation from which other noise seeds follow."""
+NOISE_DRAWS = 512
+"""Largest number of draws repeated with other noise: enough for the noise fraction of the variance to some percent."""
 
 
 def uniform_numbers(sample: SamplingPlan, dimensions: int, first: int, count: int) -> Floats:
@@ -73,13 +87,6 @@ def uniform_numbers(sample: SamplingPlan, dimensions: int, first: int, count: in
     return (strata.astype(np.float64) + uniform) / sample.runs
 
 
-_ENGINES: dict[tuple[int, int], Any] = {}
-"""SciPy's Sobol engines by seed and dimensions, at their last position."""
-_LOCK = threading.Lock()
-_MAXIMUM_ENGINES = 64
-"""Number of cached engines; the oldest one is dropped first."""
-
-
 def permute(numbers: Words, size: int, seed: int, stream: int) -> Words:
     """Return the images of numbers below ``size`` under a permutation, determined by seed and stream."""
     half = np.uint64(max(1, -(-(size - 1).bit_length() // 2)))
@@ -100,10 +107,6 @@ def _mix(words: Words) -> Words:
     words = (words ^ (words >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     words = (words ^ (words >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return words ^ (words >> np.uint64(31))
-
-
-_LEAST_SPREAD = 1.0e-6
-"""Smallest conditional standard deviation of a normal score, given the others, for a positive definite correlation."""
 
 
 def cholesky_factor(matrix: Floats) -> Factor | None:
@@ -136,13 +139,6 @@ def correlate(uniform: Floats, factor: Factor) -> Floats:
     return np.asarray(np.clip(ndtr(np.stack(columns, axis=1)), smallest, 1.0 - smallest))
 
 
-NOISE = "sensors.seed"
-"""Path of the seed of a run's noise."""
-_NOISE_LEVELS = ("sensors.angle_noise", "sensors.pressure_noise", "sensors.force_noise")
-_KEY = 1
-"""Seed of the permutation from which other noise seeds follow."""
-
-
 def with_noise(
     drawn: tuple[RandomValue, ...], scores: Factor | None, scenarios: Iterable[Scenario], paths: Sequence[str]
 ) -> tuple[tuple[RandomValue, ...], Factor | None]:
@@ -163,10 +159,6 @@ def with_noise(
         return (*drawn, noise), None
     alone = (*(0.0,) * len(drawn), 1.0)
     return (*drawn, noise), (*((*row, 0.0) for row in scores), alone)
-
-
-NOISE_DRAWS = 512
-"""Largest number of draws repeated with other noise: enough for the noise fraction of the variance to some percent."""
 
 
 def with_new_noise(columns: Mapping[str, Floats]) -> dict[str, Floats]:

@@ -43,6 +43,10 @@ _TRIED_RUNS = 8
 """Number of runs of each configuration made before a study starts, to detect errors at once."""
 STATUSES = ("completed", "diverged", "refused")
 _PLAIN, _OVER_TIME = "-", "_over_time"
+"""Unit of a plain number, and ending of the name of a column with a trace."""
+OSCILLATES, FOLLOWS = "oscillates", "follows"
+"""Columns of flags: the loop of the run oscillates; the run follows its reference."""
+_TEXT_COLUMNS = ("configuration", "status", "reason", "channel")
 ASKED_ABOVE = 10_000_000_000
 """Size [bytes] above which a study only starts with ``--yes``."""
 _FIXED_BYTES_OF_ROW = 3
@@ -98,22 +102,22 @@ class StudyStore:
 
     def finished(self) -> list[FinishedChunk]:
         """Return the chunks whose files match their notes."""
-        there, found = self.folder.names(), []
+        names, chunks = self.folder.names(), []
         for number in range(chunk_count(self.study)):
             name = chunk_file(number)
-            if note_file(number) not in there:
+            if note_file(number) not in names:
                 continue
             try:
                 note = self.folder.read_document(note_file(number))
                 finished = FinishedChunk(number, int(note["runs"]), int(note["failed"]))
                 with self.folder.open(name) as file:
-                    is_whole = hashlib.file_digest(file, "sha256").hexdigest() == note["sha256"][name]
+                    is_intact = hashlib.file_digest(file, "sha256").hexdigest() == note["sha256"][name]
             except (OSError, ValueError, KeyError, TypeError, OverflowError):
                 continue
-            # A whole file of another size is of a study that was cut into other chunks.
-            if is_whole and finished.runs == chunk(self.study, number).runs:
-                found.append(finished)
-        return found
+            # An intact file of another size is of a study that was divided into other chunks.
+            if is_intact and finished.runs == chunk(self.study, number).runs:
+                chunks.append(finished)
+        return chunks
 
     def write(self, finished: FinishedChunk, content: bytes) -> FinishedChunk:
         """Write the file of a chunk, then the note that marks it as finished; return the chunk."""
@@ -142,11 +146,6 @@ def stored_rows(
             ) from error
 
 
-OSCILLATES, FOLLOWS = "oscillates", "follows"
-"""Columns of flags: the loop of the run oscillates; the run follows its reference."""
-_TEXTS = ("configuration", "status", "reason", "channel")
-
-
 def check_types(table: "pa.Table", name: str) -> None:
     """Raise DataError for columns of a type that a study never writes: only texts, numbers and lists of numbers."""
     import pyarrow as pa
@@ -158,7 +157,7 @@ def check_types(table: "pa.Table", name: str) -> None:
             # As many samples in each row, or they are no matrix.
             lengths = table.column(field.name).combine_chunks().value_lengths().to_numpy() if is_list else np.arange(2)
             fits = bool(np.all(lengths == lengths[:1]))
-        elif field.name in _TEXTS:
+        elif field.name in _TEXT_COLUMNS:
             fits = pa.types.is_string(kind) or pa.types.is_dictionary(kind)
         else:
             fits = pa.types.is_floating(kind) or pa.types.is_integer(kind)

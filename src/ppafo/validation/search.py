@@ -79,7 +79,7 @@ class SizedCause(NamedTuple):
         return self.residuals.is_noise and self.gain > 0.0
 
 
-class Slope(NamedTuple):
+class _Slope(NamedTuple):
     """Derivative of all errors divided by noise (all samples,) with respect to the magnitude of a candidate."""
 
     candidate: CandidateCause
@@ -211,7 +211,7 @@ class CauseSearch:
 
     def slopes(
         self, change: ModelChange, residuals: ScaledResiduals, candidates: Sequence[CandidateCause]
-    ) -> list[Slope]:
+    ) -> list[_Slope]:
         """Return the derivatives of the errors under a change by the magnitude of each further candidate."""
         # A delay of all sensors is free already, unless the change has one itself.
         is_free = self.settings.longest_delay > 0.0 and not change.has_delay
@@ -219,7 +219,7 @@ class CauseSearch:
         steps = [_SMALL * min(map(abs, candidate.grid)) for candidate in candidates]
         changes = [joined(change, candidate.at(step)) for candidate, step in zip(candidates, steps, strict=True)]
         return [
-            Slope(candidate, (moved.errors - residuals.errors) / step)
+            _Slope(candidate, (moved.errors - residuals.errors) / step)
             for candidate, step, moved in zip(candidates, steps, self.evaluated(changes), strict=True)
             if moved is not None
         ]
@@ -246,7 +246,7 @@ class CauseSearch:
         words = "zeros, gains and delays of several sensors seem to be off"
         return [CandidateCause("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
 
-    def beside_usual(self, slopes: Sequence[Slope], none: ScaledResiduals, known: Collection[str]) -> list[SizedCause]:
+    def beside_usual(self, slopes: Sequence[_Slope], none: ScaledResiduals, known: Collection[str]) -> list[SizedCause]:
         """Return unusually large changes that explain the recordings in combination with usual sensor errors.
 
         Magnitudes come from a linear fit, and a replay verifies each. Usual errors cost no penalty. Names in ``known``
@@ -276,7 +276,7 @@ class CauseSearch:
         ]
         return [cause for cause in causes if cause.explains and cause.is_inside]
 
-    def needs_another(self, first: SizedCause, slopes: Sequence[Slope]) -> bool:
+    def needs_another(self, first: SizedCause, slopes: Sequence[_Slope]) -> bool:
         """Return whether a second, unusually large change is needed to explain the residuals left by the first.
 
         The test is linear in both magnitudes. The squared error explained by the second change must exceed 2 (ln N + ln
@@ -309,7 +309,7 @@ class CauseSearch:
         return False
 
 
-def _bounded(slopes: Sequence[Slope], errors: Floats) -> list[_Sized]:
+def _bounded(slopes: Sequence[_Slope], errors: Floats) -> list[_Sized]:
     """Return each candidate with its most likely magnitude within its usual limit, from a linear fit of the errors.
 
     Each usual limit acts as a prior, so that a magnitude on which the errors carry no information stays small. A

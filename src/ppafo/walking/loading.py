@@ -1,8 +1,6 @@
 """Loading of a walk scenario by name or file; every mistake is reported in a single line."""
 
-import math
-from collections.abc import Iterable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterable
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -10,78 +8,25 @@ from typing import Any
 
 from ppafo.arguments import Overrides, checked
 from ppafo.arguments.door import argument_text
-from ppafo.control.kind import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
-from ppafo.control.walking.catalog import walking_controllers
-from ppafo.control.walking.timings import TIMINGS, with_timing
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, at_fault, refused_as
-from ppafo.gait import NORMATIVE, load_gait
-from ppafo.model.catalog import VALVES
-from ppafo.model.fault_catalogue import PLANT_FAULTS
-from ppafo.model.regulator import SupplyLines
-from ppafo.model.shut_off import SHUT_OFF
+from ppafo.errors import ScenarioError, at_fault
 from ppafo.parameters import ParameterSet
-from ppafo.parameters.device import Device
-from ppafo.parameters.graph import Graph, LinkFunction
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import read_overrides
-from ppafo.parameters.plant import venting_valve
 from ppafo.plugins import Plugins, name_plugins
-from ppafo.simulation.assumptions import assumed_lines
-from ppafo.simulation.building import origin_of, read_gas_model, read_supply_line
-from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE
-from ppafo.simulation.default_gains import loop_terms
-from ppafo.simulation.document import DocumentReader, ScenarioRequest, kind_at, value_at
-from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
-from ppafo.simulation.hardware import read_device, read_hardware
-from ppafo.simulation.law_signals import IN_WALK, PERIOD_PATH
+from ppafo.simulation.document import ScenarioRequest
 from ppafo.simulation.loading import Layout, request_again, scenario_of
-from ppafo.simulation.motion_kind import MOTIONS, WALK
-from ppafo.simulation.nominal import nominal_terms
-from ppafo.simulation.overrides import OverriddenDocument, over_layer
-from ppafo.simulation.scenario import (
-    Assumption,
-    Control,
-    Initial,
-    RunSettings,
-    Scenario,
-    Sensors,
-    SupplyLine,
-)
-from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
-from ppafo.walking.contradictions import check_walk
-from ppafo.walking.declaration import (
-    DURATION,
-    FAULTY,
-    FORCES,
-    OF_A_WALK,
-    PERSON,
-    SEED,
-    STEP,
-    WALK_SENSORS,
-    fault_numbers,
-    timing_of,
-    walk_file,
-)
-from ppafo.walking.motion import (
-    WalkMotion,
-    duration_problems,
-    record_interval,
-    walk_of,
-    with_duration,
-)
-from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence
-from ppafo.walking.preparation import FaultSettings
-from ppafo.walking.task_sequence import load_task_sequence
-from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
+from ppafo.simulation.overrides import over_layer
+from ppafo.simulation.scenario import Scenario
+from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME
+from ppafo.walking.building import build_walk
+from ppafo.walking.declaration import OF_A_WALK, walk_file
+from ppafo.walking.motion import walk_of
 from ppafo.wording import one_line
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
-DEFAULT_PERIOD = 1.0e-3
-DEFAULT_DURATION, BOTTLE_DURATION = 60.0, 600.0
-"""Default duration of a walk [s], and of a walk on a bottle, which may end it earlier."""
-
-_TURN = 2.0 * math.pi
+WALKING = Layout(FILE, OF_A_WALK, walk_file, walk_file, build_walk)
+"""Layout of scenarios whose motion is a walk."""
 
 
 def list_walks() -> tuple[str, ...]:
@@ -99,8 +44,8 @@ def check_duration_once(overrides: Iterable[str], minutes: float | None) -> None
     if minutes is not None and any(
         override.typed == "run.duration" for override in read_overrides(overrides, ScenarioError)
     ):
-        given = argument_text("overrides", option="--set")
-        raise ScenarioError(f"{given} run.duration: the same as {argument_text('minutes')}; leave one out")
+        argument = argument_text("overrides", option="--set")
+        raise ScenarioError(f"{argument} run.duration: the same as {argument_text('minutes')}; leave one out")
 
 
 @checked
@@ -140,11 +85,11 @@ def load_walk(
     'solenoid'
     """
     name_plugins(plugins)
-    file, given = label(str(scenario)), read_overrides(overrides, ScenarioError)
-    named = {"gait": gait, "task_sequence": task_sequence, BOTTLE_NAME: bottle}
-    instead = {path: str(value) for path, value in named.items() if value is not None}
-    # Refuse an override of what an argument has chosen too.
-    for override in given:
+    file, changes = label(str(scenario)), read_overrides(overrides, ScenarioError)
+    chosen = {"gait": gait, "task_sequence": task_sequence, BOTTLE_NAME: bottle}
+    instead = {path: str(value) for path, value in chosen.items() if value is not None}
+    # An override of a file that is given as an argument is refused.
+    for override in changes:
         path = override.typed
         other = instead.get(OF_A_WALK.same.get(path, path))
         if other is not None:
@@ -155,9 +100,8 @@ def load_walk(
     with at_fault("scenario"):
         content = FILE.read(scenario)
     document, folder = FILE.parse(content, file), Path(scenario).parent
-    return scenario_of(
-        ScenarioRequest(file, str(scenario), folder, document, given, set_or_load(parameter_set), instead), WALKING
-    )
+    request = ScenarioRequest(file, str(scenario), folder, document, changes, set_or_load(parameter_set), instead)
+    return scenario_of(request, WALKING)
 
 
 def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable[str] = ()) -> Scenario:
@@ -167,222 +111,25 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
     if the walk cannot be combined with the bottle, and ScenarioError if the walk no longer matches its file and
     overrides.
     """
-    as_given = replace(request_again(scenario.origin), file=scenario.name)
-    if _without_bottle(scenario_of(as_given, WALKING)) != _without_bottle(scenario):
+    request = replace(request_again(scenario.origin), file=scenario.name)
+    if _without_bottle(scenario_of(request, WALKING)) != _without_bottle(scenario):
         raise ScenarioError(
             f"{scenario.name}: this walk differs from its file (changed after it was loaded, or file or package "
             f"changed since): give the bottle where the walk is loaded, with {argument_text('bottle')}"
         )
-    content, before = as_given.content, as_given.overrides
+    content, before, instead = request.content, request.overrides, {}
     if bottle is not None:
-        # Another bottle takes the place of the whole section, its overrides included.
-        content = {name: part for name, part in content.items() if name != BOTTLE}
+        # Another bottle replaces the whole section, including its overrides.
+        content = {name: section for name, section in content.items() if name != BOTTLE}
         before = tuple(override for override in before if not override.typed.startswith(f"{BOTTLE}."))
-    changes = read_overrides(
-        (text if text.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{text}" for text in overrides), ScenarioError
-    )
-    instead = {} if bottle is None else {BOTTLE_NAME: str(bottle)}
-    every = over_layer(content, before, changes, scenario.name, WALKING.declared)
-    return scenario_of(replace(as_given, content=content, overrides=every, instead=instead), WALKING)
+        instead = {BOTTLE_NAME: str(bottle)}
+    prefix = f"{BOTTLE}."
+    texts = (text if text.startswith(prefix) else f"{prefix}{text}" for text in overrides)
+    combined = over_layer(content, before, read_overrides(texts, ScenarioError), scenario.name, WALKING.declared)
+    return scenario_of(replace(request, content=content, overrides=combined, instead=instead), WALKING)
 
 
 def _without_bottle(scenario: Scenario) -> tuple[Any, ...]:
     """Return all parts of a walk that do not depend on its bottle; the duration is left out too."""
     hardware = scenario.device, scenario.supply_lines, scenario.gas_model, scenario.sensors, scenario.controller
     return *hardware, scenario.run.step, replace(walk_of(scenario), bottle=None)
-
-
-def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
-    """Return the walk described by a document whose keys have been validated.
-
-    Raises ScenarioError, ParameterError or DataError for the first value that cannot be used.
-    """
-    document = changed.document
-    if BOTTLE_NAME in request.instead:
-        document.setdefault(BOTTLE, {})["name"] = request.instead[BOTTLE_NAME]
-    reading = DocumentReader(request.file, document, changed.paths)
-    hardware = read_hardware(reading, request, changed.device)
-    device = read_device(reading, hardware)
-    with refused_as(ParameterError, f"{request.file}: [device]", ParameterError):
-        device.check_pressurised("a walk, whose controllers fill the chambers,")
-    bottle = read_bottle(reading, device, Path() if BOTTLE_NAME in request.instead else request.folder)
-    if bottle is not None:
-        # A bottle always feeds lines, with the defaults of what the file does not say of them.
-        document.setdefault(SUPPLY_LINE, {})
-    line = read_supply_line(reading, device)
-    if line is not None and bottle is not None:
-        line = bottle.fed(line)
-    sensors = reading.section("sensors", WALK_SENSORS)
-    motion = _motion(reading, request, line, bottle, sensors)
-    step = reading.number("run.step", STEP)
-    controller, links = _control(reading, device, None if line is None else line.row(device.supply), sensors)
-    atmosphere = device.supply.atmospheric_pressure
-    # The path of a file in full means the same from any folder.
-    full = {
-        path: Path(name).absolute() if Path(name).suffix == ".toml" else name for path, name in request.instead.items()
-    }
-    scenario = Scenario(
-        name=document["name"],
-        description=document.get("description", ""),
-        device=device,
-        run=RunSettings(DEFAULT_DURATION, step, record_interval(DEFAULT_DURATION)),
-        motion=motion,
-        initial=Initial(atmosphere, atmosphere),
-        controller=controller,
-        reference=NO_REFERENCE,
-        sensors=Sensors(
-            **{name: number for name, number in sensors.items() if name not in FORCES},
-            seed=int(reading.number("sensors.seed", SEED)),
-        ),
-        assumptions=_assumed(reading, bottle),
-        origin=origin_of(request, document, hardware.valve, tuple(f"{path}={name}" for path, name in full.items())),
-        gas_model=read_gas_model(reading),
-        supply_line=line,
-        links={**links, **links_of_stature(reading.document)},
-    )
-    # Contradictions are looked for in the whole, once each number is usable by itself.
-    check_walk(scenario, reading)
-    return with_duration(scenario, _duration(reading, scenario))
-
-
-def _motion(
-    reading: DocumentReader,
-    request: ScenarioRequest,
-    line: SupplyLine | None,
-    bottle: BottleSupply | None,
-    sensors: Mapping[str, float],
-) -> WalkMotion:
-    """Return the motion of a walk: wearer, gait, tasks, faults, bottle; ``sensors`` are the sensor settings [SI]."""
-    sequence_file = _named_file("task_sequence", request, reading.document)
-    with _named_by("task_sequence", reading, request, ScenarioError):
-        sequence = None if sequence_file is None else load_task_sequence(sequence_file)
-    with _named_by("gait", reading, request, DataError):
-        gait = load_gait(_named_file("gait", request, reading.document) or NORMATIVE)
-    is_named = "gait" in request.instead or "gait" in reading.document
-    faults = {sensor: _fault(reading, sensor) for sensor in FAULTY}
-    shut_off = reading.section("shut_off", SHUT_OFF) if "shut_off" in reading.document else {}
-    if shut_off and shut_off["area"] <= 0.0:
-        raise reading.refusal("shut_off.area", "must be above 0; leave [shut_off] out where none is fitted")
-    broken = {part: fault for part in PLANT_FAULTS if (fault := _fault(reading, part)).kind}
-    own = next((part for part in broken if line is not None and part.startswith(("regulator", "bottle"))), "")
-    if own:
-        raise reading.refusal(
-            f"faults.{own}.kind", "a walk with [supply_line] has regulators of its own: leave these lines out"
-        )
-    person = reading.number(f"wearer.{PERSON.name}", PERSON)
-    if person != int(person):
-        raise reading.refusal(f"wearer.{PERSON.name}", "must be a whole number")
-    return WalkMotion(
-        motion_kind=MOTIONS[kind_at(reading.document, "motion") or WALK],
-        gait=gait,
-        wearer=read_wearer(reading, gait, is_named),
-        timing=timing_of(reading.document),
-        forces={name: sensors[name] for name in FORCES},
-        faults=faults,
-        task_sequence=sequence,
-        bottle=bottle,
-        wearer_origin=wearer_origin(reading, gait, is_named),
-        person=person,
-        broken=broken,
-        shut_off=shut_off,
-    )
-
-
-def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]) -> str | None:
-    """Return the name or file of a gait or task sequence; a relative path is resolved in the folder of the document."""
-    if path in request.instead:
-        return request.instead[path]
-    name = document.get(path)
-    if name is None or Path(name).suffix != ".toml" or Path(name).is_absolute():
-        return name
-    return str(request.folder / name)
-
-
-def _named_by(
-    path: str, reading: DocumentReader, request: ScenarioRequest, kind: type[PpafoError]
-) -> AbstractContextManager[None]:
-    """Context manager that prefixes errors about a referenced file with the key at ``path``.
-
-    For a file given as an option, the message is left unchanged, because it names the file already.
-    """
-    is_of_walk = path not in request.instead and path in reading.document
-    return refused_as(kind, reading.quote(path), kind) if is_of_walk else nullcontext()
-
-
-def _control(
-    reading: DocumentReader, device: Device, lines: SupplyLines | None, sensors: Mapping[str, float]
-) -> tuple[Control, Graph]:
-    """Return the controller with its settings and those of the phase estimator [SI], and the links between the numbers.
-
-    Defaults may depend on valve, device, supply lines and sensors; each such dependence is a link.
-    """
-    kind = kind_at(reading.document, "controller")
-    law = walking_controllers()[kind]
-    timing = TIMINGS[timing_of(reading.document)]
-    with refused_as(ScenarioError, f"{reading.file}", ScenarioError):
-        # A timing of a controller that uses no gait phase is refused.
-        with_timing(law, timing)
-    rate, period = (value_at(reading.document, f"controller.{name}") for name in ("rate", "period"))
-    seconds = DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)
-    if rate is not None:
-        seconds = 1.0 / reading.number("controller.rate", RATE)
-    # Lags and delays [s] of valve and sensors, which a controller may follow, from their settings.
-    valve = VALVES[device.valve.kind]
-    names, delay = tuple(quantity.name for quantity in valve.quantities), venting_valve(device.valve).command_delay
-    paths = tuple(f"valve.{name}" for name in names)
-    terms = {
-        VALVE_LAG: LinkFunction(paths, valve.lag or delay, (valve.settings,)),
-        VALVE_DELAY: LinkFunction(paths, delay, (valve.settings,)),
-        PRESSURE_LAG: LinkFunction(("sensors.pressure_bandwidth",), lag_of_bandwidth),
-        FORCE_LAG: LinkFunction(("sensors.force_bandwidth",), lag_of_bandwidth),
-        **nominal_terms(device, lines),
-        **loop_terms(device, law, IN_WALK),
-    }
-    present = numbers_of_sensors(sensors) | numbers_of_lines(lines) | {PERIOD_PATH: seconds}
-    sections = {"controller": law.quantities, "timing": timing.quantities}
-    found, links = read_followers(reading, sections, terms, device, present)
-    settings = {path.partition(".")[2]: number for path, number in found.items()}
-    # A law named by its module is found by that name alone; one of the catalogue by its name in walking.
-    return Control(kind if ":" in kind else law.name, settings, seconds), links
-
-
-def _fault(reading: DocumentReader, part: str) -> FaultSettings:
-    """Return the fault of a sensor or of a part of the plant; its kind is empty if the part is sound."""
-    kind = kind_at(reading.document, f"faults.{part}")
-    return FaultSettings(kind, reading.section(f"faults.{part}", fault_numbers(part, kind)))
-
-
-def _assumed(reading: DocumentReader, bottle: BottleSupply | None) -> tuple[Assumption, ...]:
-    """Return the assumptions of a walk: from its file, its supply lines and its bottle."""
-    own = reading.document.get("assumed", {}) | ({} if bottle is None else bottle.assumed)
-    values = ((path, value_at(reading.document, path), note) for path, note in own.items())
-    assumed = {path: Assumption(path, "" if value is None else str(value), note) for path, value, note in values}
-    lines = {
-        assumption.path: replace(assumption, note=f"{assumption.value}, {assumption.note}")
-        for assumption in assumed_lines(reading)
-    }
-    return tuple({**assumed, **lines}.values())
-
-
-def _duration(reading: DocumentReader, scenario: Scenario) -> float:
-    """Return the duration of a walk [s] from its file, else of its task sequence, else 60 s, or 600 s on a bottle."""
-    motion = walk_of(scenario)
-    if value_at(reading.document, "run.duration") is not None:
-        duration = reading.number("run.duration", DURATION)
-        for is_bad, line in duration_problems(scenario, duration):
-            if is_bad:
-                raise ScenarioError(f"{reading.file}: {line(0)}")
-        return duration
-    if motion.task_sequence is not None:
-        # As long as the wearer with the gait as it is takes for it, whoever walks.
-        return float(planned_task_sequence(motion.task_sequence, motion.gait).duration)
-    return DEFAULT_DURATION if motion.bottle is None else BOTTLE_DURATION
-
-
-WALKING = Layout(FILE, OF_A_WALK, walk_file, walk_file, build_walk)
-"""Layout of scenarios whose motion is a walk."""
-
-
-def lag_of_bandwidth(bandwidth: float) -> float:
-    """Return the time constant [s] of a sensor with a bandwidth [Hz]; a bandwidth of 0 means no lag and returns 0."""
-    return 1.0 / (_TURN * bandwidth) if bandwidth > 0.0 else 0.0

@@ -15,7 +15,7 @@ from typing import Annotated, Any, NamedTuple
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
-from ppafo.model.declaration import Number, quantities_of
+from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.leg import LegParameters
 from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
 from ppafo.simulation.declaration import FOOT
@@ -35,6 +35,14 @@ _KEEPS_GAIT = (
 
 STATURES = (1.45, 2.0)
 """Range of statures [m] of nearly all adults, for which the segment fractions were measured."""
+
+
+SCALED_MASS = (0.6, 1.7)
+"""Range of body masses, relative to the gait's subject, in which moment and force are scaled without a remark.
+
+About the 2nd to the 98th percentile of adults for a subject in their middle: 45 to 120 kg for 72 kg. Children do not
+only have less mass but walk differently.
+"""
 
 
 class HeelRocker(NamedTuple):
@@ -150,7 +158,7 @@ _SHARES: Mapping[str, float] = {
 }
 """Numbers of the paper subject's leg divided by the powers of body mass and stature from ``SCALING``."""
 
-# Constants of their own, for the functions below are translated to C.
+# Module constants, because the functions below are translated to C.
 _SHANK_CENTRE, _FOOT_CENTRE = _SHARES["shank_mass_centre"], _SHARES["foot_mass_centre"]
 _HEEL, _TOE = _SHARES["heel_lever"], _SHARES["toe_lever"]
 _SHANK_MASS, _FOOT_MASS = _SHARES["shank_mass"], _SHARES["foot_mass"]
@@ -218,13 +226,13 @@ STATURE, BODY_MASS = "wearer.stature", "wearer.body_mass"
 
 def links_of_stature(document: Mapping[str, Any]) -> Graph:
     """Return links from stature and body mass to segments of a walk file, active now or when a stature is given."""
-    later = value_at(document, STATURE) is None
+    is_later = value_at(document, STATURE) is None
     links: dict[str, tuple[LinkedDefault, ...]] = {}
     for name, function in _FOLLOWING.items():
-        # A link waits until its first source is given, so the stature comes first for masses too.
+        # A link becomes active when its first source is given, so the stature is a source of masses too.
         sources = (STATURE,) if SCALING[name] == (0, 1) else (STATURE, BODY_MASS)
         if value_at(document, f"wearer.{name}") is None:
-            links[f"wearer.{name}"] = (LinkedDefault((LinkFunction(sources, function),), when_set=later),)
+            links[f"wearer.{name}"] = (LinkedDefault((LinkFunction(sources, function),), when_set=is_later),)
     return links
 
 
@@ -233,42 +241,41 @@ def read_wearer(reading: DocumentReader, gait: Gait, is_named: bool) -> Wearer:
 
     With a given stature, the default segments are scaled with stature and body mass.
     """
-    paper = subject = _PAPER
-    # The built-in gait, where nobody names it, is walked by the paper's subject and not by its own.
-    if is_named:
-        # A subject of unknown stature has the lengths of the paper's.
-        stature = 1.0 if gait.stature is None else SHANK_SHARE * gait.stature / paper.shank_length
-        segments = scaled(paper, gait.body_mass / paper.body_mass, stature)
-        subject = replace(paper, stature=paper.stature if gait.stature is None else gait.stature, **segments)
+    # Without a named gait the wearer is the paper's subject, not the subject of the built-in gait.
+    subject = _subject_of(gait) if is_named else _PAPER
     if value_at(reading.document, STATURE) is not None:
-        known = {quantity.name: replace(quantity, default=getattr(subject, quantity.name)) for quantity in WEARER}
-        stated = {path: reading.number(path, known[path.partition(".")[2]]) for path in (STATURE, BODY_MASS)}
-        links = links_of_stature(reading.document)
-        scaled_numbers = {path.partition(".")[2]: float(of[0].number(stated.__getitem__)) for path, of in links.items()}
-        subject = replace(subject, **scaled_numbers)
-    quantities = tuple(replace(quantity, default=getattr(subject, quantity.name)) for quantity in WEARER)
-    if not is_named:
-        return Wearer(**reading.section("wearer", quantities))
-    for quantity in quantities:
-        value = getattr(subject, quantity.name)
-        if (
-            not quantity.minimum <= value <= quantity.maximum
-            and value_at(reading.document, f"wearer.{quantity.name}") is None
-        ):
+        declared = {quantity.name: quantity for quantity in _quantities(subject)}
+        paths = {STATURE: "stature", BODY_MASS: "body_mass"}
+        numbers = {path: reading.number(path, declared[name]) for path, name in paths.items()}
+        segments = {
+            path.partition(".")[2]: float(links[0].number(numbers.__getitem__))
+            for path, links in links_of_stature(reading.document).items()
+        }
+        subject = replace(subject, **segments)
+    quantities = _quantities(subject)
+    for quantity in quantities if is_named else ():
+        value, path = getattr(subject, quantity.name), f"wearer.{quantity.name}"
+        is_usable = quantity.minimum <= value <= quantity.maximum
+        if not is_usable and value_at(reading.document, path) is None:
             raise ScenarioError(
                 f"{reading.file}: gait '{gait.name}' is of a subject of {gait.body_mass:g} kg, which makes "
-                f"wearer.{quantity.name} {value:.3g} {quantity.unit}; a wearer has {quantity.minimum:g} to "
-                f"{quantity.maximum:g} {quantity.unit}: give wearer.{quantity.name}"
+                f"{path} {value:.3g} {quantity.unit}; a wearer has {quantity.minimum:g} to "
+                f"{quantity.maximum:g} {quantity.unit}: give {path}"
             )
     return Wearer(**reading.section("wearer", quantities))
 
 
-SCALED_MASS = (0.6, 1.7)
-"""Range of body masses, relative to the gait's subject, in which moment and force are scaled without a remark.
+def _subject_of(gait: Gait) -> Wearer:
+    """Return the paper's subject scaled to the subject of a gait; an unknown stature is the paper's."""
+    if gait.stature is None:
+        return replace(_PAPER, **scaled(_PAPER, gait.body_mass / _PAPER.body_mass, 1.0))
+    stature = SHANK_SHARE * gait.stature / _PAPER.shank_length
+    return replace(_PAPER, stature=gait.stature, **scaled(_PAPER, gait.body_mass / _PAPER.body_mass, stature))
 
-About the 2nd to the 98th percentile of adults for a subject in their middle: 45 to 120 kg for 72 kg. Children do not
-only have less mass but walk differently.
-"""
+
+def _quantities(subject: Wearer) -> tuple[Quantity, ...]:
+    """Return the declarations of a wearer whose defaults are the numbers of a subject."""
+    return tuple(replace(quantity, default=getattr(subject, quantity.name)) for quantity in WEARER)
 
 
 def wearer_origin(reading: DocumentReader, gait: Gait, is_named: bool) -> str:
@@ -282,8 +289,8 @@ def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
     """Return a line on the wearer, and on the gait's own subject if that is another person."""
     line = f"wearer: {wearer.body_mass:.4g} kg, {origin}"
     is_subject = origin.startswith("the subject of")
-    usual = (gait.stature if is_subject else None) or _PAPER.stature
-    if abs(wearer.stature - usual) > _SAME * wearer.stature:
+    default_stature = (gait.stature if is_subject else None) or _PAPER.stature
+    if abs(wearer.stature - default_stature) > _SAME * wearer.stature:
         low, high = STATURES
         line += f"; {wearer.stature:.4g} m tall, and the segments follow mass and stature"
         if not low <= wearer.stature <= high:
@@ -293,14 +300,14 @@ def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
         return line if gait.stature is None or wearer.stature != gait.stature else f"{line}, {gait.stature:.4g} m"
     if abs(wearer.body_mass - gait.body_mass) <= _SAME * gait.body_mass:
         return line
-    scaled = (
-        f"{line}; the subject of gait '{gait.name}' has {gait.body_mass:.4g} kg: moment and force of the gait are "
+    line += (
+        f"; the subject of gait '{gait.name}' has {gait.body_mass:.4g} kg: moment and force of the gait are "
         "scaled by body mass"
     )
-    low, high = (share * gait.body_mass for share in SCALED_MASS)
-    if low <= wearer.body_mass <= high:
-        return scaled
-    return (
-        f"{scaled}, which is not known to hold for a body so different (outside {low:.0f} to {high:.0f} kg): "
-        "take a gait of such a person"
-    )
+    low, high = (fraction * gait.body_mass for fraction in SCALED_MASS)
+    if not low <= wearer.body_mass <= high:
+        line += (
+            f", which is not known to hold for a body so different (outside {low:.0f} to {high:.0f} kg): "
+            "take a gait of such a person"
+        )
+    return line

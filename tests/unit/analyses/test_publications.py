@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.analyses.reproduce.answer import Studies
 from ppafo.analyses.reproduce.publication import COMPUTATIONS, judge, list_studies, load_publication, study_names
 from ppafo.analyses.reproduce.question import reproduce
+from ppafo.analyses.reproduce.result import Studies
 from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
 from ppafo.parameters.publications.publication import FILE, PAPER

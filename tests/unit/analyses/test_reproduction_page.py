@@ -6,19 +6,17 @@ import re
 
 import pytest
 
-from ppafo.analyses.reproduce.answer import (
+from ppafo.analyses.reproduce.answer import finding_of
+from ppafo.analyses.reproduce.bench import SyntheticEvidence
+from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
+from ppafo.analyses.reproduce.page import (
     DEVICE_FIGURE,
     IDENTIFICATION_FIGURE,
     STEP_FIGURE,
     TORQUE_FIGURE,
-    Reproduction,
-    finding_of,
-    holding_torque,
     reproduction_page,
-    result_on_u,
 )
-from ppafo.analyses.reproduce.bench import SyntheticEvidence
-from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
+from ppafo.analyses.reproduce.result import Reproduction, holding_torque, result_on_u
 from ppafo.analyses.reproduce.step_response import SupplyLevels
 from ppafo.identification.bench.result import figure_3
 from ppafo.page.html import bundled, digest

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.engine.in_python import GOING_ON, quotient, rewritten, whole_part
+from ppafo.engine.in_python import WITHOUT_EXCEPTIONS, quotient, rewritten, whole_part
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.loading import BACKEND_VARIABLE
 from ppafo.engine.rows import row_numbers
@@ -52,7 +52,7 @@ def halved(value: float) -> float:
 
 
 def test_operations_that_go_on_give_what_processors_give() -> None:
-    code = rewritten(halved, GOING_ON.writer)
+    code = rewritten(halved, WITHOUT_EXCEPTIONS.writer)
     assert code.co_firstlineno == halved.__code__.co_firstlineno
     assert (quotient(1.0, 0.0), quotient(-1.0, 0.0), quotient(1.0, -0.0)) == (np.inf, -np.inf, -np.inf)
     assert np.isnan(quotient(0.0, 0.0))

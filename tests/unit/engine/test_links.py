@@ -8,8 +8,7 @@ import pytest
 from ppafo.engine import linking
 from ppafo.engine.generator import StepText
 from ppafo.engine.linking import link_effects, link_program
-from ppafo.engine.replacements import Replacements
-from ppafo.engine.source_text import SourceCollector, composed_lines
+from ppafo.engine.source_text import Replacements, SourceCollector, composed_lines
 from ppafo.errors import ProgramError
 from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect, effect_problem

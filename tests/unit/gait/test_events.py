@@ -5,7 +5,7 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.gait.recorded.footfalls import strides_from_force, strides_from_shank
-from ppafo.gait.recorded.walk import Signal
+from ppafo.gait.recorded.signal import Signal
 from ppafo.signals.recording import Floats
 
 RATE = 1000.0

@@ -9,10 +9,10 @@ from ppafo.errors import DataError
 from ppafo.gait import Gait, load_gait, walk_recording
 from ppafo.gait.plausible import check_force_scale
 from ppafo.gait.recorded import ImportSettings, import_gait
-from ppafo.gait.recorded.footfalls import wrap_cycle
+from ppafo.gait.recorded.cycle import wrap_cycle
 from ppafo.gait.recorded.mapping import AngleMap, GaitMap, ShankMap, Side
+from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.source import find_convention, read_table
-from ppafo.gait.recorded.walk import Signal
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 from ppafo.storage.opensim import write_opensim

@@ -261,7 +261,7 @@ def test_the_low_pass_takes_noise_away_and_leaves_the_curve(
 
 
 def test_the_low_pass_is_at_its_half_power_where_it_says() -> None:
-    from ppafo.gait.recorded.walk import Signal, low_pass
+    from ppafo.gait.recorded.signal import Signal, low_pass
 
     time = np.arange(0.0, 20.0, 0.005)
     passed = low_pass(Signal("sine", time, np.sin(2.0 * np.pi * 6.0 * time)), 6.0)

@@ -3,11 +3,13 @@
 import itertools
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import ppafo
 from ppafo.errors import ParameterError, PpafoError, ScenarioError
 from ppafo.loading import reloaded
 from ppafo.parameters.overrides import split_override
@@ -217,3 +219,15 @@ def test_the_choice_of_a_valve_drops_what_a_layer_below_gives_of_another() -> No
     chosen = reloaded(below, ["device.valve=solenoid"])
     assert chosen.origin.overrides == ("run.duration=1 s", "device.valve=solenoid")
     assert chosen.device == load_scenario(TASK, ["device.valve=solenoid"]).device
+
+
+def test_values_of_the_scenario_s_own_device_that_replace_those_of_another_set_are_logged(
+    caplog: pytest.LogCaptureFixture, tmp_path: Path
+) -> None:
+    own = tmp_path / "mine.toml"
+    own.write_text((Path(ppafo.__file__).parent / "parameters" / "sets" / "ppafo2011.toml").read_text())
+    load_scenario("step-response", [f"device.set={own}"])
+    assert caplog.messages == [
+        f"ppafo: step-response: [device] overrides replace values of {own} too: "
+        "supply.pressure=55 psi_g, supply.dorsiflexion_pressure=55 psi_g"
+    ]

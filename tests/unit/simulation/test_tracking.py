@@ -210,7 +210,7 @@ def test_a_joint_that_is_flung_at_the_start_is_told_so_with_pressures_that_carry
     assert verdict is not None
     assert "at the start its chambers give 0 N m for a load of 4 N m: the joint is flung 19" in verdict.sentence
     offered = re.search(
-        r"with `(initial.pressure_1 = [^`]*)` and `(initial.pressure_2 = [^`]*)` it does", verdict.sentence
+        r"with `(initial.pressure_1 = [^`]*)` and `(initial.pressure_2 = [^`]*)` it follows", verdict.sentence
     )
     assert offered is not None
     again = simulate("cylinder-servo", [*changes, *(text.replace(" = ", "=") for text in offered.groups())])

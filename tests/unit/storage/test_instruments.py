@@ -327,8 +327,8 @@ def test_an_object_of_an_older_file_is_named_with_the_line_that_saves_it_plainly
     monkeypatch.setattr(scipy.io, "loadmat", lambda *_, **__: {"y": PRESSURE, "None": thing})
     file = open_matlab(path)
     assert file.objects == [("log", kind)]
-    assert f"log ({kind}) is an object that only MATLAB reads" in file.said_of_objects()
-    assert line in file.said_of_objects()
+    assert f"log ({kind}) is an object that only MATLAB reads" in file.advice_on_objects()
+    assert line in file.advice_on_objects()
 
 
 def test_what_the_line_of_a_table_saves_is_read_by_its_names(tmp_path: Path) -> None:

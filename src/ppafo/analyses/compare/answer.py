@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.analyses.compare.pairs import Paired, pareto_front
+from ppafo.analyses.compare.pairs import PairedMetric, pareto_front
 from ppafo.metrics import Metric
 from ppafo.report.display_units import display_difference
 from ppafo.report.finding import Column, Finding, Section
@@ -72,7 +72,7 @@ class ConfigurationResult:
 
 
 @dataclass(frozen=True, slots=True)
-class OnTask:
+class TaskComparison:
     """Results of all configurations on one task.
 
     ``pareto_front``: configurations that are Pareto-optimal in error and gas
@@ -84,7 +84,7 @@ class OnTask:
     overrides: list[str]
     cases: list[ConfigurationResult]
     pareto_front: list[str]
-    pairs: dict[str, list[Paired]]
+    pairs: dict[str, list[PairedMetric]]
     best: dict[str, dict[str, ConfidenceInterval]]
 
     def case(self, configuration: str) -> ConfigurationResult:
@@ -109,7 +109,7 @@ class ComparisonResult:
     remarks: list[str]
     varied: list[str]
     confidence: float
-    tasks: list[OnTask]
+    tasks: list[TaskComparison]
     metrics: tuple[str, ...] = field(compare=False)
 
     @property
@@ -180,7 +180,7 @@ def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
     )
 
 
-def _parts(comparison: ComparisonResult, task: OnTask) -> list[Section]:
+def _parts(comparison: ComparisonResult, task: TaskComparison) -> list[Section]:
     """Return the tables of a task: metrics, changes against the baseline, probability of being the best."""
     where = "" if len(comparison.tasks) == 1 else f", {task.task}"
     kinds = [(name, of_metric(name)) for name in comparison.metrics]
@@ -207,7 +207,7 @@ def _parts(comparison: ComparisonResult, task: OnTask) -> list[Section]:
     ]
 
 
-def _paired(comparison: ComparisonResult, task: OnTask, name: str) -> list[Column]:
+def _paired(comparison: ComparisonResult, task: TaskComparison, name: str) -> list[Column]:
     """Return the columns of a table with a row for each metric: change, mean difference, probability of improvement."""
     pairs = task.pairs[name]
     kinds = [of_metric(pair.metric, "+.3g") for pair in pairs]
@@ -291,7 +291,7 @@ _SHOWN_PERCENTILES = (0.5, 99.5)
 """Percentiles between which changes are plotted; a few distant ones would squeeze all others into one bar."""
 
 
-def _pareto(comparison: ComparisonResult, task: OnTask) -> Panel:
+def _pareto(comparison: ComparisonResult, task: TaskComparison) -> Panel:
     """Return a panel of error over gas, with a mark for each completed configuration and a dot for each draw."""
     cases = [case for case in task.cases if case.status.is_completed]
     front, marks, on_front = front_of(cases), [], []
@@ -316,7 +316,7 @@ def _pareto(comparison: ComparisonResult, task: OnTask) -> Panel:
     return Panel(of_metric(_GAS), of_metric(_ERROR), marks, title, legend="inside")
 
 
-def _change(comparison: ComparisonResult, task: OnTask, metric: str) -> Panel:
+def _change(comparison: ComparisonResult, task: TaskComparison, metric: str) -> Panel:
     """Return a panel with histograms of the change of a metric against the baseline; dashed: nominal device."""
     baseline, marks, ends = task.case(comparison.baseline), [], []
     for number, name in enumerate(comparison.configurations):

@@ -34,7 +34,7 @@ COMPARED: dict[str, int] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Paired:
+class PairedMetric:
     """Paired statistics of a metric of a configuration against the baseline, over the pairs in which both have a value.
 
     ``pairs``: number of pairs
@@ -77,7 +77,7 @@ def compare_pairs(
     better: int,
     confidence: float,
     other_noise: tuple[Floats, Floats] | None = None,
-) -> Paired | None:
+) -> PairedMetric | None:
     """Return the paired statistics of values (draws,) [SI], nan for a missing value; None without any pair.
 
     Draws are assigned to the replicates in turn. ``other_noise`` has the values of both configurations for the first
@@ -85,11 +85,11 @@ def compare_pairs(
     neither. A draw with equal values counts for neither configuration.
     """
     both = np.isfinite(baseline) & np.isfinite(other)
-    first, second = baseline[both], other[both]
-    if first.size == 0:
+    baseline_values, other_values = baseline[both], other[both]
+    if baseline_values.size == 0:
         return None
     # Relative to the size of the baseline, so that the sign is the difference's; a baseline of 0 has no fractions.
-    change = (second - first)[first != 0.0] / np.abs(first[first != 0.0])
+    change = (other_values - baseline_values)[baseline_values != 0.0] / np.abs(baseline_values[baseline_values != 0.0])
     low, middle, high = (
         np.quantile(change, (OUTER_QUANTILES[0], 0.5, OUTER_QUANTILES[1])) if change.size else (np.nan,) * 3
     )
@@ -99,16 +99,16 @@ def compare_pairs(
         noise = noise_interval(difference, other_noise[1] - other_noise[0], confidence)
     # A tie is no win on either side: of equal configurations neither is better in any draw.
     wins = np.where(both, better * (other - baseline) > 0.0, np.nan)
-    return Paired(
+    return PairedMetric(
         metric=metric,
-        pairs=first.size,
+        pairs=baseline_values.size,
         difference=replicates_interval(difference, REPLICATES, confidence),
         change=float(middle),
         change_low=float(low),
         change_high=float(high),
         better=share_interval(wins, REPLICATES, confidence) if better else None,
-        equal=float(np.mean(first == second)),
-        effective_size=effective_sample_size(second - first),
+        equal=float(np.mean(baseline_values == other_values)),
+        effective_size=effective_sample_size(other_values - baseline_values),
         noise=noise,
     )
 

@@ -79,13 +79,13 @@ def compare(
     from dataclasses import replace
 
     from ppafo.analyses.compare.answer import finding_of
-    from ppafo.analyses.compare.solve import Draws, compared
+    from ppafo.analyses.compare.solve import DrawSettings, compared
     from ppafo.arguments.conversion import taken_tasks
     from ppafo.studies.draws import study_of
     from ppafo.studies.study import choose_configurations
     from ppafo.units.shown import shown_in
 
-    requested = Draws(draws, seed, confidence, maximum_failed, threads, progress)
+    requested = DrawSettings(draws, seed, confidence, maximum_failed, threads, progress)
     requested.check()
     loaded = study_of(study) if study is not None else None
     chosen = choose_configurations(configurations or None, loaded, overrides)

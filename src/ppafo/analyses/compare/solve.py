@@ -4,8 +4,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from ppafo.analyses.compare.answer import ComparisonResult, ConfigurationResult, OnTask, front_of, remarks_of
-from ppafo.analyses.compare.pairs import COMPARED, Paired, best_probabilities, compare_pairs
+from ppafo.analyses.compare.answer import ComparisonResult, ConfigurationResult, TaskComparison, front_of, remarks_of
+from ppafo.analyses.compare.pairs import COMPARED, PairedMetric, best_probabilities, compare_pairs
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
@@ -33,7 +33,7 @@ _SAME = 1.0e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Draws:
+class DrawSettings:
     """Number of draws of the uncertain values, and acceptance rules for their runs.
 
     ``requested``: number of draws; None for the default
@@ -84,7 +84,7 @@ def compared(
     baseline: str | None,
     tasks: Iterable[tuple[str, Sequence[str]]],
     study: Study | None,
-    draws: Draws,
+    draws: DrawSettings,
 ) -> ComparisonResult:
     """Return the comparison of configurations on tasks and over the uncertain values of a study.
 
@@ -186,7 +186,7 @@ def _runs_over_draws(
     metrics: Sequence[str],
     study: Study | None,
     uncertainty: Uncertainty,
-    draws: Draws,
+    draws: DrawSettings,
     seed: int,
 ) -> dict[tuple[str, str], _DrawnRuns]:
     """Return the runs of every scenario over the same draws; StudyError if too many of them fail."""
@@ -215,7 +215,7 @@ def _task_result(
     baseline: str,
     metrics: Sequence[str],
     confidence: float,
-) -> OnTask:
+) -> TaskComparison:
     """Return the results of a task; with draws, also paired statistics and probabilities of being the best."""
     base = next(case for case in cases if case.configuration == baseline)
     pairs = {
@@ -232,12 +232,12 @@ def _task_result(
             # All at once: no pair says which of three is the best. Empty where no draw has a value of all.
             shares = best_probabilities([row[name] for row in rows], better, confidence)
             best[name] = dict(zip([case.configuration for case in following], shares, strict=False))
-    return OnTask(task, list(overrides), cases, front_of(cases), pairs, best)
+    return TaskComparison(task, list(overrides), cases, front_of(cases), pairs, best)
 
 
 def _paired_metrics(
     base: ConfigurationResult, other: ConfigurationResult, metrics: Sequence[str], confidence: float
-) -> Iterator[Paired]:
+) -> Iterator[PairedMetric]:
     """Yield the paired statistics of two configurations for each metric with a pair of values; none without draws."""
     if base.rows is None or other.rows is None:
         return

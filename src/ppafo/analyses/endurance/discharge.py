@@ -84,24 +84,24 @@ def ending(bottle: Bottle, draw: GasDemand, mass: float, content: BottleContent,
     otherwise.
     """
     usable = max(0.0, mass - smallest_mass_when_warm(bottle, draw))
-    left = f"{mass * GRAMS_PER_KILOGRAM:.3g} g are left"
+    remaining = f"{mass * GRAMS_PER_KILOGRAM:.3g} g are left"
     warm = f"{usable * GRAMS_PER_KILOGRAM:.3g} g of this would be usable at room temperature"
     if stopped_by == "time":
         return DischargeEnd(
-            TIME_IS_UP, f"the supply pressure was maintained for the whole requested time; {left}", mass, usable
+            TIME_IS_UP, f"the supply pressure was maintained for the whole requested time; {remaining}", mass, usable
         )
     if stopped_by == "frozen":
         cold = "the liquid begins to freeze (dry ice)" if has_liquid(bottle.fluid.table) else "the gas is too cold"
-        return DischargeEnd("frozen", f"{cold}, and the property table ends here; {left}, {warm}", mass, usable)
-    of_pressure, of_flow = reserves(bottle, draw, content.pressure, content.temperature)
+        return DischargeEnd("frozen", f"{cold}, and the property table ends here; {remaining}, {warm}", mass, usable)
+    pressure_margin, flow_margin = reserves(bottle, draw, content.pressure, content.temperature)
     # Both are fractions, so that the smaller one says what went short first.
-    is_pressure = of_pressure <= of_flow
+    is_pressure = pressure_margin <= flow_margin
     short = "maintain the supply pressure" if is_pressure else "drive the largest flow through the regulator"
     why = f"its pressure is too low to {short}"
     # What a warm bottle would still give decides between the two: cold is mended by waiting, empty is not.
     if usable > _NEXT_TO_NOTHING * bottle.mass:
-        return DischargeEnd("too cold", f"the bottle is too cold: {why}; {left}, {warm}", mass, usable)
-    return DischargeEnd("empty", f"the bottle is empty: {why}, and would be also when warm; {left}", mass, usable)
+        return DischargeEnd("too cold", f"the bottle is too cold: {why}; {remaining}, {warm}", mass, usable)
+    return DischargeEnd("empty", f"the bottle is empty: {why}, and would be also when warm; {remaining}", mass, usable)
 
 
 MAXIMUM_INTERVALS = 2000
@@ -131,7 +131,7 @@ class _Interval:
     stopped_by: Stop | None
 
 
-class Balance(NamedTuple):
+class _Balance(NamedTuple):
     """Mass and energy balance of bottle and wall over a run.
 
     Across the boundary: gas drawn [kg], its enthalpy [J], heat from the room [J]. Changes inside: mass of the content
@@ -154,7 +154,7 @@ class Discharge:
     total_time: float
     strides: float
     ending: DischargeEnd
-    balance: Balance | SupplyBalance
+    balance: _Balance | SupplyBalance
     record: Callable[[], Recording] = field(repr=False, compare=False)
 
     @cached_property
@@ -207,7 +207,7 @@ def discharge(bottle: Bottle, draw: GasDemand, schedule: Schedule) -> Discharge:
     last = intervals[-1].last
     walked = sum(interval.end - interval.start for interval in intervals if interval.draw > 0.0)
     change = last - start
-    balance = Balance(
+    balance = _Balance(
         drawn_mass=float(last[3]),
         outflow_energy=float(last[4]),
         room_heat=float(last[5]),

@@ -69,7 +69,7 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
     path, condition, tried = outcome.path, outcome.condition, outcome.tried
     # In the unit of the range that was given.
     kind = of_path(path.path, path.quantity.unit, given=path.given)
-    met, (place, beyond) = outcome.stretches, outcome.found
+    met, (index, neighbour) = outcome.met_intervals, outcome.found
     columns = [Column(title, [kind.text(ends[end]) for ends in met]) for end, title in enumerate(("from", "to"))]
     remarks = list(_remarks(outcome, kind))
     return Finding(
@@ -94,9 +94,9 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
             metric=condition.metric,
             limit=condition.limit,
             wanted=wanted,
-            value=None if place is None else float(tried["value"][place]),
-            metric_at_value=None if place is None else float(tried["metric"][place]),
-            not_met_at=beyond,
+            value=None if index is None else float(tried["value"][index]),
+            metric_at_value=None if index is None else float(tried["metric"][index]),
+            not_met_at=neighbour,
             changes=_changes(outcome),
             met=met,
             remarks=remarks,
@@ -106,7 +106,7 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
             unsettled=int(tried["unsettled"].sum()),
             tried=[FindSample(*row) for row in tried[["value", "metric", "judged", "is_of_grid"]].tolist()],
         ),
-        passed=place is not None,
+        passed=index is not None,
     )
 
 
@@ -123,29 +123,29 @@ def _not_followed(outcome: FindResult) -> int:
 def _verdict(outcome: FindResult, kind: Kind) -> str:
     """Return a sentence on the value found, or on the nearest value if none meets the condition."""
     path, condition, tried = outcome.path.path, outcome.condition, outcome.tried
-    of_condition, (place, beyond) = of_metric(condition.metric), outcome.found
+    of_condition, (index, neighbour) = of_metric(condition.metric), outcome.found
     wanted, further = ("highest", "higher") if outcome.highest else ("lowest", "lower")
-    if place is None:
+    if index is None:
         # The nearest one says whether a wider range could.
         row = int((np.nanargmin if condition.is_most else np.nanargmax)(tried["judged"]))
         return (
             f"no {path} from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])} meets {condition.text}; "
             f"the nearest is {of_condition.text(tried['judged'][row])} at {kind.text(tried['value'][row])}"
         )
-    value = float(tried["value"][place])
+    value = float(tried["value"][index])
     # Beyond it the condition may be met by a loop that does not follow its reference.
     follows = " and follows its reference" if _not_followed(outcome) else ""
     lead = f"{path} = {kind.text(value)} is the {wanted} value that meets {condition.text}{follows}"
-    there = f"{condition.metric} is {of_condition.text(float(tried['metric'][place]))} there"
-    if beyond is None:
+    there = f"{condition.metric} is {of_condition.text(float(tried['metric'][index]))} there"
+    if neighbour is None:
         return f"{lead}, and the end of the range: {there}; a wider range may have a {further} one"
-    return f"{lead}: {there} (bracketed to {kind.change(abs(value - beyond), '.1g')})"
+    return f"{lead}: {there} (bracketed to {kind.change(abs(value - neighbour), '.1g')})"
 
 
 def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
     """Yield remarks on runs, further intervals, noise, oscillation and failures."""
     condition, is_met, tried, runs = outcome.condition, outcome.is_met, outcome.tried, outcome.runs
-    place, _ = outcome.found
+    index, _ = outcome.found
     evenly = np.count_nonzero(tried["is_of_grid"])
     met = np.count_nonzero(is_met)
     where = "everywhere" if is_met.all() else f"at {met} of them" if met else "nowhere"
@@ -164,10 +164,10 @@ def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
             f"sensors are noisy: the metric is the mean over {outcome.noise_streams} noise streams, the same for all "
             "values"
         )
-        if place is not None:
+        if index is not None:
             noise += (
                 f"; at the value that was found it varies by "
-                f"{of_metric(condition.metric).change(float(tried['spread'][place]))} (standard deviation) from stream "
+                f"{of_metric(condition.metric).change(float(tried['spread'][index]))} (standard deviation) from stream "
                 "to stream, so a single run may miss the condition there"
             )
         yield noise
@@ -189,8 +189,8 @@ def _panel(outcome: FindResult, kind: Kind) -> Panel:
     tried, condition = outcome.tried, outcome.condition
     values, metrics, judged = tried["value"], tried["metric"], tried["judged"]
     dots, dashes = {"linestyle": "", "marker": "o", "markersize": 3}, {"linestyle": "--", "linewidth": 1.0}
-    of_grid = tried[tried["is_of_grid"]]
-    marks = [Mark("line", values, metrics), Mark("line", of_grid["value"], of_grid["metric"], style=dots)]
+    grid_samples = tried[tried["is_of_grid"]]
+    marks = [Mark("line", values, metrics), Mark("line", grid_samples["value"], grid_samples["metric"], style=dots)]
     # The RMS error on the hold where that is larger, and what the condition is asked of.
     larger = np.where(judged > metrics, judged, np.nan)
     if np.isfinite(larger).any():
@@ -200,11 +200,11 @@ def _panel(outcome: FindResult, kind: Kind) -> Panel:
     marks.append(Mark("level", (), condition.limit, label="limit", colour=BLACK, style=dashes))
     marks += [
         Mark("span", ends, label="" if row else "condition met", colour=GREEN)
-        for row, ends in enumerate(outcome.stretches)
+        for row, ends in enumerate(outcome.met_intervals)
     ]
-    place, _ = outcome.found
-    if place is not None:
-        found = float(values[place])
-        text = f"found: {kind.number(found, '.4g')} {kind.axis_unit}".rstrip()
-        marks.append(Mark("at", found, label=text, colour=VERMILION))
+    index, _ = outcome.found
+    if index is not None:
+        value = float(values[index])
+        text = f"found: {kind.number(value, '.4g')} {kind.axis_unit}".rstrip()
+        marks.append(Mark("at", value, label=text, colour=VERMILION))
     return Panel(kind, of_metric(condition.metric), tuple(marks))

@@ -107,14 +107,14 @@ class FindResult:
         met = np.flatnonzero(self.is_met)
         if met.size == 0:
             return None, None
-        place = int(met[-1] if self.highest else met[0])
-        beyond = place + (1 if self.highest else -1)
-        return place, float(self.tried["value"][beyond]) if 0 <= beyond < self.tried.size else None
+        index = int(met[-1] if self.highest else met[0])
+        outer = index + (1 if self.highest else -1)
+        return index, float(self.tried["value"][outer]) if 0 <= outer < self.tried.size else None
 
     @property
-    def stretches(self) -> list[list[float]]:
+    def met_intervals(self) -> list[list[float]]:
         """First and last value of each interval of consecutive values that meet the condition."""
-        # Not met beyond both ends: a stretch that reaches the end of the range ends there.
+        # False beyond both ends, where an interval that reaches the end of the range ends.
         padded = np.concatenate([[False], self.is_met, [False]]).astype(int)
         first, after = np.flatnonzero(np.diff(padded) > 0), np.flatnonzero(np.diff(padded) < 0)
         values = self.tried["value"].tolist()
@@ -171,8 +171,8 @@ def outermost(
         raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
     # The same streams for all values, so that neighbours differ by the value alone.
     seeds = seeds_of_noise([base], [path.path], 0, _STREAMS, _SEED)
-    tally = RunCounter(grid * max(1, seeds.size), progress)
-    runs = scenario_runs(base, with_companions([condition.metric], base), tally, (), threads)
+    counter = RunCounter(grid * max(1, seeds.size), progress)
+    runs = scenario_runs(base, with_companions([condition.metric], base), counter, (), threads)
     search = FindResult(base.name, path, condition, highest, seeds.size, runs, np.empty(0, TRIED))
     search = search.with_values(base, np.linspace(low, high, grid), seeds, True)
     if not np.isfinite(search.tried["judged"]).any():
@@ -185,11 +185,11 @@ def outermost(
         reason = f"; the first: {runs.reason}" if runs.reason else ""
         raise StudyError(f"scenario '{base.name}': no run {ends} has a '{condition.metric}'{reason}")
     # All parts of a bracket side by side: a bisection would wait for every one of its runs.
-    place, beyond = search.found
-    while place is not None and beyond is not None:
-        value = float(search.tried["value"][place])
-        if abs(value - beyond) <= ACCURACY * (high - low):
+    index, neighbour = search.found
+    while index is not None and neighbour is not None:
+        value = float(search.tried["value"][index])
+        if abs(value - neighbour) <= ACCURACY * (high - low):
             break
-        search = search.with_values(base, np.linspace(value, beyond, _PARTS + 1)[1:-1], seeds, False)
-        place, beyond = search.found
+        search = search.with_values(base, np.linspace(value, neighbour, _PARTS + 1)[1:-1], seeds, False)
+        index, neighbour = search.found
     return search

@@ -29,6 +29,21 @@ from ppafo.units import percentage
 from ppafo.units.shown import counted_from, in_units
 from ppafo.wording import count_of
 
+_FAR = 2.0
+"""Number of standard deviations above which a tolerance counts as contradicted."""
+_SHOWN = 0.05
+"""Smallest share of a variance that is shown."""
+_MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
+"""Range of the number of digits; more than the minimum only for narrow intervals."""
+_FAR_FROM_SET = 5.0
+"""Ratio to the previous value above which a wrong unit is suspected: 6.89 is psi read as kPa, 8.85 N m as lbf in."""
+_KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
+_CHANNELS = {
+    "angle": (Kind("Vane angle", "rad", "angle"), ACTUAL),
+    "pressure_1": (Kind("Pressure in chamber 1", "Pa_a", "pressure"), CHAMBER_1),
+    "pressure_2": (Kind("Pressure in chamber 2", "Pa_a", "pressure"), CHAMBER_2),
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Identification:
@@ -94,14 +109,6 @@ class Identification:
         }
 
 
-_KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
-_CHANNELS = {
-    "angle": (Kind("Vane angle", "rad", "angle"), ACTUAL),
-    "pressure_1": (Kind("Pressure in chamber 1", "Pa_a", "pressure"), CHAMBER_1),
-    "pressure_2": (Kind("Pressure in chamber 2", "Pa_a", "pressure"), CHAMBER_2),
-}
-
-
 def trajectory_panels(measurement: Recording, model: Recording) -> list[Panel]:
     """Return samples, model and residuals of one experiment over time, two panels for each fitted channel.
 
@@ -111,9 +118,9 @@ def trajectory_panels(measurement: Recording, model: Recording) -> list[Panel]:
         raise DataError(f"{model.label}: is not at the times of {measurement.label}")
     panels: list[Panel] = []
     for name in (name for name in _CHANNELS if name in measurement):
-        kind, look = _CHANNELS[name]
+        kind, style = _CHANNELS[name]
         is_angle = name == "angle"
-        course = FittedCurve(
+        curve = FittedCurve(
             time=TIME,
             level=kind,
             change=Kind("Residual (measured - model)", quantity="angle" if is_angle else "pressure change"),
@@ -121,18 +128,10 @@ def trajectory_panels(measurement: Recording, model: Recording) -> list[Panel]:
             samples=measurement[name],
             model=model[name],
             names=(_KIND_WORDS[measurement.kind], "model"),
-            colour=look.colour,
+            colour=style.colour,
         )
-        panels += course_panels(course, "circles", "" if panels else "above")
+        panels += course_panels(curve, "circles", "" if panels else "above")
     return panels
-
-
-_FAR = 2.0
-"""Number of standard deviations above which a tolerance counts as contradicted."""
-_SHOWN = 0.05
-"""Smallest share of a variance that is shown."""
-_MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
-"""Range of the number of digits; more than the minimum only for narrow intervals."""
 
 
 @in_units(lambda found: counted_from(found.before.shown, atmospheric_pressure(found.before)))
@@ -157,34 +156,25 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     count = "no value of the set identified"
     if written:
         count = f"{count_of(len(written), 'value')} of the set identified: {', '.join(written)}"
-    rest = f"; for this model only: {', '.join(fitted)}" if fitted else ""
+    fitted_text = f"; for this model only: {', '.join(fitted)}" if fitted else ""
     problem = (f"it makes no device yet: {new_set.problem}",) if new_set.problem else ()
     return Finding(
         name="identify",
         kicker="Identification",
         title=f"The parameter set {name}",
         said=(),
-        parts=(*parts, Section(said=(f"new set '{name}': {count}{rest}", *problem)), *_figures(identification)),
+        parts=(*parts, Section(said=(f"new set '{name}': {count}{fitted_text}", *problem)), *_figures(identification)),
         found=identification,
         passed=identification.is_good,
         kind=identification.kind,
-        files={f"{name}.toml": partial(_toml_bytes, new_set.parameter_set)},
+        files={f"{name}.toml": lambda: parameter_set_toml(new_set.parameter_set).encode()},
     )
-
-
-def _toml_bytes(parameter_set: ParameterSet) -> bytes:
-    """Return a parameter set as the content of a TOML file."""
-    return parameter_set_toml(parameter_set).encode()
 
 
 def _table(heading: str, estimates: Iterable[Estimate], before: ParameterSet, remarks: Sequence[str]) -> Section:
     """Return a table with a row for each estimate in the units of the previous set, with remarks below."""
     rows = (estimate_row(estimate, before) for estimate in estimates)
     return Section(heading, columns_of(("",) * 4, rows), remarks=tuple(remarks))
-
-
-_FAR_FROM_SET = 5.0
-"""Ratio to the previous value above which a wrong unit is suspected: 6.89 is psi read as kPa, 8.85 N m as lbf in."""
 
 
 def _far_from(before: ParameterSet, estimates: Iterable[Estimate]) -> Iterator[str]:
@@ -266,8 +256,8 @@ def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> lis
 
 def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[float, str]:
     """Return a number in the unit of the set, or in the display unit if the set does not have the number."""
-    reported, own = in_set_unit(number, path, unit, before)
-    return in_shown_unit(number, unit) if own == unit else (reported, own)
+    reported, set_unit = in_set_unit(number, path, unit, before)
+    return in_shown_unit(number, unit) if set_unit == unit else (reported, set_unit)
 
 
 def estimate_row(estimate: Estimate, before: ParameterSet) -> tuple[str, ...]:
@@ -277,10 +267,10 @@ def estimate_row(estimate: Estimate, before: ParameterSet) -> tuple[str, ...]:
     """
     if math.isnan(estimate.value):
         return estimate.path, "no value", "", estimate.verdict
-    shown = [
+    numbers = [
         _shown(number, estimate.path, estimate.unit, before) for number in (estimate.value, estimate.low, estimate.high)
     ]
-    (value, unit), (low, _), (high, _) = shown
+    (value, unit), (low, _), (high, _) = numbers
     half_width, digits = 0.5 * abs(high - low), _MINIMUM_DIGITS
     if half_width > 0.0 and math.isfinite(half_width) and value != 0.0:
         # One digit more than the interval has, so that its ends differ from the value.
@@ -306,9 +296,9 @@ def _figures(identification: Identification) -> list[Section]:
         panels = partial(trajectory_panels, measurement, model)
         name, caption = f"trajectory-fit-{label}", f"{label} and the fit."
         figures.append(Section(name=name, caption=caption, is_detail=True, panels=panels, title=label, size=(5.4, 1.9)))
-    first = {result.procedure: result for result in reversed(identification.results)}
-    if {"static-torque", "free-decay"} <= first.keys():
-        draw = partial(figure_3, first["static-torque"], first["free-decay"])
+    by_procedure = {result.procedure: result for result in reversed(identification.results)}
+    if {"static-torque", "free-decay"} <= by_procedure.keys():
+        draw = partial(figure_3, by_procedure["static-torque"], by_procedure["free-decay"])
         figures.append(Section(name="figure-3", caption="Like figure 3 of the paper.", is_detail=True, draw=draw))
     return figures
 

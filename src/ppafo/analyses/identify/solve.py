@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from ppafo.analyses.identify.answer import Identification
@@ -23,6 +24,11 @@ from ppafo.storage.foreign import read_trials
 from ppafo.storage.reading import read_recording
 from ppafo.units.shown import counted_from, shown_in
 
+_FILES_IN_TITLE = 4
+"""Number of recordings named in the title of the new set; its notes name all."""
+_REPORTED = "reported."
+"""Prefix of the paths of values that others report of their device."""
+
 
 def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:
     """Return the result of an identification problem.
@@ -30,68 +36,52 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     Paths are relative to ``folder``; ``file`` is the name used in error messages. The procedures run first, in the
     order in which each depends on the earlier ones, then the section [trajectory]. Raises the errors of ``identify``.
     """
-    name = problem.device.set
-    beside = folder / name
-    base = load_parameter_set(beside if beside.suffix == ".toml" else name)
-    valve, overrides = problem.device.valve, read_overrides(problem.device.overrides)
-    check_valve(overrides, valve, f"device.valve = '{valve}'")
-    before = with_overrides(base, overrides, valve)
+    device = problem.device
+    beside = folder / device.set
+    base = load_parameter_set(beside if beside.suffix == ".toml" else device.set)
+    overrides = read_overrides(device.overrides)
+    check_valve(overrides, device.valve, f"device.valve = '{device.valve}'")
+    before = with_overrides(base, overrides, device.valve)
     with shown_in(counted_from(before.shown, atmospheric_pressure(before))):
-        valve = chosen_valve(before, problem.device.valve)
-        tasks = [
-            _Task(
-                procedure,
-                tuple(
-                    one
-                    for recording in procedure.recordings
-                    for one in _sources(problem, folder / recording, file, procedure.columns, before)
-                ),
-                f"{file}: procedure {number}, {procedure.kind}",
-            )
-            for number, procedure in enumerate(problem.procedure, start=1)
-        ]
+        valve = chosen_valve(before, device.valve)
+        tasks = []
+        for number, procedure in enumerate(problem.procedure, start=1):
+            sources = [
+                source
+                for recording in procedure.recordings
+                for source in _sources(problem, folder / recording, file, procedure.columns, before)
+            ]
+            tasks.append(_Task(procedure, tuple(sources), f"{file}: procedure {number}, {procedure.kind}"))
         # In the order in which they are applied.
         tasks.sort(key=lambda task: PROCEDURES.index(task.procedure.kind))
-        used = _uses(tasks, before, valve, file)
+        used = _used_recordings(tasks, before, valve, file)
         tolerances = tolerances_of(problem.bench, file)
         current, results = before, list[BenchResult]()
         for task in tasks:
-            result = run_procedure(
-                task.sources, task.procedure, ProcedureContext(current, valve, task.place, tolerances)
-            )
+            context = ProcedureContext(current, valve, task.label, tolerances)
+            result = run_procedure(task.sources, task.procedure, context)
             results.append(result)
             # The next procedure leans on what this one found; the new set is made of the old one at the end.
             current = with_estimates(current, result.estimates).parameter_set
         estimates = [estimate for result in results for estimate in result.estimates]
-        fitted = None
+        trajectory = None
         if problem.trajectory is not None:
-
-            def read(experiment: ExperimentSection) -> RecordingSource:
-                recording, columns = experiment.recording, experiment.columns
-                source, *others = _sources(problem, folder / recording, file, columns, current)
-                if others:
-                    raise IdentificationError(
-                        f"{recording}: columns.{columns}.trial: an experiment has one recording, not "
-                        f"{1 + len(others)}: name one trial"
-                    )
-                return source
-
-            setting = SectionContext(
-                read=read,
+            section = SectionContext(
+                read=partial(_experiment_source, problem, folder, file, current),
                 folder=folder,
                 file=f"{file}: trajectory",
                 parameter_set=current,
-                valve=problem.device.valve,
+                valve=device.valve,
                 bench={estimate.path: estimate for estimate in estimates},
                 used=used,
                 tolerances=tolerances,
             )
-            fitted = solve_section(problem.trajectory, setting, progress)
-            estimates += fitted.fit.estimates
+            trajectory = solve_section(problem.trajectory, section, progress)
+            estimates += trajectory.fit.estimates
         new_set = with_estimates(before, estimates, valve)
-        identification = Identification(problem.name, tuple(results), fitted, before, new_set)
-        named = replace(new_set, parameter_set=_named_set(identification, problem))
-        return replace(identification, new_set=named)
+        identification = Identification(problem.name, tuple(results), trajectory, before, new_set)
+        described = replace(new_set, parameter_set=_described_set(identification, problem))
+        return replace(identification, new_set=described)
 
 
 def _sources(
@@ -109,7 +99,21 @@ def _sources(
     molar_mass = number_in_si(parameter_set, "gas.molar_mass")
     gas = "" if molar_mass is None else f"{molar_mass!r} kg/mol"
     recordings = read_trials(path, problem.columns[columns], None, atmosphere, f"{file}:{columns}", gas)
-    return tuple(source_of(path, one, one.label.removeprefix(path.stem)) for one in recordings)
+    return tuple(source_of(path, recording, recording.label.removeprefix(path.stem)) for recording in recordings)
+
+
+def _experiment_source(
+    problem: ProblemFile, folder: Path, file: str, parameter_set: ParameterSet, experiment: ExperimentSection
+) -> RecordingSource:
+    """Return the recording of an experiment; IdentificationError for a file with several."""
+    recording, columns = experiment.recording, experiment.columns
+    source, *others = _sources(problem, folder / recording, file, columns, parameter_set)
+    if others:
+        raise IdentificationError(
+            f"{recording}: columns.{columns}.trial: an experiment has one recording, not {1 + len(others)}: name one "
+            "trial"
+        )
+    return source
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,38 +122,30 @@ class _Task:
 
     procedure: ProcedureProblem
     sources: tuple[RecordingSource, ...]
-    place: str
+    label: str
 
 
-def _uses(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -> tuple[UsedRecording, ...]:
+def _used_recordings(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -> tuple[UsedRecording, ...]:
     """Return the use of each recording by each procedure.
 
     A recording may serve two different procedures. Raises IdentificationError if a procedure uses a recording twice.
     """
-    uses: dict[str, list[UsedRecording]] = {}
+    by_procedure: dict[str, list[UsedRecording]] = {}
     for task in tasks:
         kind = task.procedure.kind
-        window = window_of(task.procedure, ProcedureContext(before, valve, task.place))
-        uses.setdefault(kind, []).extend(
-            UsedRecording(
-                f"recording {number} of procedure {kind}", source.trace, source.recording, frozenset(), *window
-            )
-            for number, source in enumerate(task.sources, start=1)
-        )
-    for of_kind in uses.values():
-        used_twice = double_use(of_kind)
+        window = window_of(task.procedure, ProcedureContext(before, valve, task.label))
+        for number, source in enumerate(task.sources, start=1):
+            name = f"recording {number} of procedure {kind}"
+            used = UsedRecording(name, source.trace, source.recording, frozenset(), *window)
+            by_procedure.setdefault(kind, []).append(used)
+    for recordings in by_procedure.values():
+        used_twice = double_use(recordings)
         if used_twice:
             raise IdentificationError(f"{file}: {used_twice}")
-    return tuple(use for of_kind in uses.values() for use in of_kind)
+    return tuple(used for recordings in by_procedure.values() for used in recordings)
 
 
-_FILES_IN_TITLE = 4
-"""Number of recordings named in the title of the new set; its notes name all."""
-_REPORTED = "reported."
-"""Prefix of the paths of values that others report of their device."""
-
-
-def _named_set(identification: Identification, problem: ProblemFile) -> ParameterSet:
+def _described_set(identification: Identification, problem: ProblemFile) -> ParameterSet:
     """Return the new set with name, title, citation and notes that state the recordings behind its values.
 
     Values reported by others for another device are left out if the set has identified values.
@@ -161,8 +157,8 @@ def _named_set(identification: Identification, problem: ProblemFile) -> Paramete
     paths = dict.fromkeys(map(Path, named))
     names = [path.name for path in paths]
     files = ["/".join(path.parts[-2:]) if names.count(path.name) > 1 else path.name for path in paths]
-    left_out = len(files) - _FILES_IN_TITLE
-    shown = ", ".join(files[:_FILES_IN_TITLE]) + (f" and {left_out} more" if left_out > 0 else "")
+    more = len(files) - _FILES_IN_TITLE
+    shown = ", ".join(files[:_FILES_IN_TITLE]) + (f" and {more} more" if more > 0 else "")
     outcome = "identified" if new.written or new.fitted else "no value identified"
     changes = f" with {', '.join(problem.device.overrides)}" if problem.device.overrides else ""
     origins = (
@@ -171,8 +167,8 @@ def _named_set(identification: Identification, problem: ProblemFile) -> Paramete
         f"only, the others from '{old.name}'."
     )
     if new.written or new.fitted:
-        # Of a device that was measured, what others report of another one says nothing.
-        is_of_report = {
+        # Values reported of another device do not describe the measured one.
+        reported_findings = {
             finding.id
             for finding in findings_of(identification.before)
             if any(value.path.startswith(_REPORTED) for value in finding.values)
@@ -180,7 +176,7 @@ def _named_set(identification: Identification, problem: ProblemFile) -> Paramete
         old = replace(
             old,
             numbers={path: entry for path, entry in old.numbers.items() if not path.startswith(_REPORTED)},
-            accepted={name: why for name, why in old.accepted.items() if name not in is_of_report},
+            accepted={name: why for name, why in old.accepted.items() if name not in reported_findings},
         )
     return replace(
         old,

@@ -137,8 +137,8 @@ def equilibrium(scenario: Scenario) -> Point:
         if most is not None:
             most_torque = run.program.actuator.torque(run.plant, most["angle"], most["pressure_1"], most["pressure_2"])
             line += f": with the valve fully open the actuator comes to {most_torque:.4g} N m"
-        other = " or hold the ankle" if rest is not None else ""
-        raise ScenarioError(f"{scenario.name}: {line}; set another reference{other}, or give --at a time")
+        remedy = " or hold the ankle" if rest is not None else ""
+        raise ScenarioError(f"{scenario.name}: {line}; set another reference{remedy}, or give --at a time")
     direction = _direction(run, steady, scenario.run.duration)
     if direction:
         raise ScenarioError(

@@ -39,15 +39,15 @@ def sides_of(run: Run, point: Point, joint: JointNames) -> dict[str, str]:
     """Return in words the side of each limit at the operating point, by component; ``joint`` names the joint."""
     at, plant = point.values, run.plant
     openings = valve_at(run, functions_in(run), at).openings
-    room, first, second = plant.atmospheric_pressure, at["pressure_1"], at["pressure_2"]
+    atmosphere, pressure_1, pressure_2 = plant.atmospheric_pressure, at["pressure_1"], at["pressure_2"]
     paths = {
-        "source to chamber 1": (at["supply_pressure"], first, openings.source_1),
-        "chamber 1 to atmosphere": (first, room, openings.vent_1),
-        "source to chamber 2": (at["dorsiflexion_pressure"], second, openings.source_2),
-        "chamber 2 to atmosphere": (second, room, openings.vent_2),
+        "source to chamber 1": (at["supply_pressure"], pressure_1, openings.source_1),
+        "chamber 1 to atmosphere": (pressure_1, atmosphere, openings.vent_1),
+        "source to chamber 2": (at["dorsiflexion_pressure"], pressure_2, openings.source_2),
+        "chamber 2 to atmosphere": (pressure_2, atmosphere, openings.vent_2),
     }
     regimes = {name: _regime(plant.valve_curve, *values) for name, values in paths.items()}
-    regimes["leak over the vane"] = _regime(plant.leak_curve, first, second, 1.0)
+    regimes["leak over the vane"] = _regime(plant.leak_curve, pressure_1, pressure_2, 1.0)
     motion = {
         None: "prescribed",
         0.0: "at rest",
@@ -61,7 +61,7 @@ def sides_of(run: Run, point: Point, joint: JointNames) -> dict[str, str]:
     valve = "closed"
     if any(openings):
         chamber = 1 if openings.source_1 > 0.0 else 2
-        is_vacuum = min(at["supply_pressure"], at["dorsiflexion_pressure"]) < room
+        is_vacuum = min(at["supply_pressure"], at["dorsiflexion_pressure"]) < atmosphere
         valve = f"{'evacuates' if is_vacuum else 'feeds'} chamber {chamber}, open by {max(openings):.4g}"
     return {"valve": valve, joint.name: vane, **regimes}
 
@@ -114,21 +114,21 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     # What the valve takes from its command at once is no state: nothing but the output that shows it asks for it.
     rows, idle = [*(f"rate of {state}" for state in here.rates), *here.outputs], []
     for name in (name for name in here.rates if name.startswith(VALVE)):
-        others = [row != name for row in rows]
-        if not any(np.any(side[others]) for side in slopes[name][:2]):
+        other_rows = [row != name for row in rows]
+        if not any(np.any(side[other_rows]) for side in slopes[name][:2]):
             idle.append(name)
     states, outputs = ([name for name in names if name not in idle] for names in (here.rates, here.outputs))
     columns = [*states, *plant.inputs]
     is_row = [name not in idle for name in (*here.rates, *here.outputs)]
-    taken, beyond, errors = (np.array([slopes[name][part] for name in columns]).T[is_row] for part in (0, 1, 2))
+    near, far, errors = (np.array([slopes[name][index] for name in columns]).T[is_row] for index in (0, 1, 2))
     count = len(states)
-    a, b, c, d = taken[:count, :count], taken[:count, count:], taken[count:, :count], taken[count:, count:]
+    a, b, c, d = near[:count, :count], near[:count, count:], near[count:, :count], near[count:, count:]
     sides = sides_of(run, point, scenario.device.joint)
     if not np.any(b[:, 0]) and not np.any(d[:, 0]):
         sides["valve"] += f"; {DEAF}"
     sizes = np.array([size_of(name) for name in columns])
-    largest = np.max(np.maximum(np.abs(taken), np.abs(beyond)) * sizes, axis=1, keepdims=True)
-    is_kink = np.any(np.abs(taken - beyond) * sizes > ON_THE_EDGE * largest + 10.0 * errors * sizes, axis=0)
+    largest = np.max(np.maximum(np.abs(near), np.abs(far)) * sizes, axis=1, keepdims=True)
+    is_kink = np.any(np.abs(near - far) * sizes > ON_THE_EDGE * largest + 10.0 * errors * sizes, axis=0)
     kinks = [name for name, differs in zip(columns, is_kink.tolist(), strict=True) if differs]
     return LinearModel(
         scenario=scenario,

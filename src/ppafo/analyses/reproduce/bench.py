@@ -56,11 +56,11 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
         origin = scenario.origin
         changed = apply_overrides(origin.content, read_overrides(origin.overrides), scenario.name)
         written = read_overrides(origin.content["device"].get("overrides", ()))
-        of_file = with_overrides(load_parameter_set(origin.parameter_set), written, origin.valve)
-        in_force = with_followers(with_overrides(of_file, changed.device, origin.valve))
+        file_set = with_overrides(load_parameter_set(origin.parameter_set), written, origin.valve)
+        in_force = with_followers(with_overrides(file_set, changed.device, origin.valve))
         summaries = {path: quantity.summary for path, quantity in quantities(changed.document).items()}
         summaries |= {path: quantity.summary for path, quantity in in_force.declarations().items()}
-        own = [
+        values = [
             AssumedValue(
                 assumption.path,
                 summaries.get(assumption.path, ""),
@@ -72,7 +72,7 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
             )
             for assumption in scenario.assumptions
         ]
-        settled = {assumption.path for assumption in own}
+        settled = {assumption.path for assumption in values}
         # Reported results are what a run is compared with; of two valves one is in the device.
         settled |= {path for path in in_force.numbers if path.startswith("reported.")}
         valve = f"valves.{origin.valve}."
@@ -81,13 +81,13 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
             settled |= _ONLY_FOR_A_FREE_VANE
         for path, entry in in_force.numbers.items():
             is_set_here = entry.source == OVERRIDE
-            of_the_file = is_set_here and of_file.numbers.get(path) == entry
-            if path not in settled and entry.origin in _NOT_OF_THE_PAPER and not of_the_file:
+            is_of_file = is_set_here and file_set.numbers.get(path) == entry
+            if path not in settled and entry.origin in _NOT_OF_THE_PAPER and not is_of_file:
                 # What was set for this run says what it replaces.
                 reason, source = (f"set for this run; {entry.note}", "") if is_set_here else (entry.note, entry.source)
                 meaning, text = summaries[path], number_text(entry)
-                own.append(AssumedValue(path, meaning, text, entry.origin, reason, source, (name,)))
-        for value in own:
+                values.append(AssumedValue(path, meaning, text, entry.origin, reason, source, (name,)))
+        for value in values:
             key = (value.path, value.value, value.reason)
             earlier = merged.get(key)
             merged[key] = value if earlier is None else replace(earlier, used_by=(*earlier.used_by, name))

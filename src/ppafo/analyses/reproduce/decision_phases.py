@@ -5,7 +5,7 @@ unknown. The pair is therefore simulated for each phase, with either valve first
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,22 +22,11 @@ _STEP = 0.5e-3
 """Time step and output interval [s], which divide every phase."""
 
 
-@dataclass(frozen=True, slots=True)
-class PhasedRuns:
-    """RMS torque error [N m] and supplied gas [g] of the solenoid pair for each phase of its decisions.
+def phased_runs(solenoid: Result) -> tuple[Floats, Floats]:
+    """Return RMS torque error [N m] and supplied gas [g] of the solenoid pair's task for each phase of its decisions.
 
     Both have shape (runs,), with valve A first and then with valve B first. Run number ``PHASES``, a whole period with
-    A first, is the scenario as written.
-    """
-
-    errors: Floats
-    gas: Floats
-
-
-def phased_runs(solenoid: Result) -> PhasedRuns:
-    """Return the solenoid pair's task with its decisions at each phase.
-
-    If the task has no undefined phase, the result contains only the given run.
+    A first, is the scenario as written. If the task has no undefined phase, there is only the given run.
     """
     scenario = solenoid.scenario
     # Two runs are joined by their pressures, which are the whole state only of a locked vane at constant temperature
@@ -60,7 +49,8 @@ def phased_runs(solenoid: Result) -> PhasedRuns:
     else:
         gas = GRAMS_PER_KILOGRAM * solenoid.metrics["gas_supplied"].value
         runs = [(solenoid.metrics["rms_error"].value, gas)]
-    return PhasedRuns(*np.array(runs).T)
+    errors, gas_masses = np.array(runs).T
+    return errors, gas_masses
 
 
 def _runs_with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[float, float]]:
@@ -74,22 +64,23 @@ def _runs_with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[flo
     slope = ramp["level"] / ramp["ramp_time"]
     # A constant reference just off 0 calls one valve at once and holds it on.
     constant = with_reference(scenario, start_level=tie, level=tie)
-    held = simulate(replace(constant, run=replace(scenario.run, duration=period))).recording
+    start = simulate(replace(constant, run=replace(scenario.run, duration=period))).recording
     for number in range(1, PHASES + 1):
         phase = period * number / PHASES
         last = round(phase / _STEP)
         onward = with_reference(scenario, start_level=slope * phase, ramp_time=ramp["ramp_time"] - phase)
-        rest = simulate(
+        continued = simulate(
             replace(
                 onward,
                 run=replace(scenario.run, duration=duration - phase),
-                initial=Initial(float(held["pressure_1"][last]), float(held["pressure_2"][last])),
+                initial=Initial(float(start["pressure_1"][last]), float(start["pressure_2"][last])),
             )
         )
-        error_before = slope * held.time[: last + 1] - held["torque"][: last + 1]
+        error_before = slope * start.time[: last + 1] - start["torque"][: last + 1]
         # Mean squares of both parts, each with its time.
-        square = phase * float(np.mean(error_before**2)) + (duration - phase) * rest.metrics["rms_error"].value ** 2
-        gas = float(held["supplied_mass"][last]) + rest.metrics["gas_supplied"].value
+        error_after = continued.metrics["rms_error"].value
+        square = phase * float(np.mean(error_before**2)) + (duration - phase) * error_after**2
+        gas = float(start["supplied_mass"][last]) + continued.metrics["gas_supplied"].value
         yield float(np.sqrt(square / duration)), GRAMS_PER_KILOGRAM * gas
 
 

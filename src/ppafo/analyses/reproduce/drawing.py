@@ -134,8 +134,8 @@ def _solenoid_valve(axes: "Axes", _name: str, valve: str, colour: str, y: float)
     x, orange = 3.1, SOLENOID.colour
     centre, low, high = x + _BOX, y - _HALF, y + _HALF
     _pipe(axes, 1.25 + _BOX, y, 2.72, low - 0.16, centre + 0.12, low, colour=colour)
-    for left in (x, centre):
-        _box(axes, left, low, _BOX, _BOX, orange)
+    for edge in (x, centre):
+        _box(axes, edge, low, _BOX, _BOX, orange)
     _arrow(axes, (x + 0.12, low), (x + 0.21, high), orange)
     _arrow(axes, (centre + 0.21, high), (centre + 0.33, low), orange)
     _blocked(axes, x + 0.33, low, 0.1, 0.05)

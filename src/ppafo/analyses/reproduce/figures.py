@@ -72,17 +72,14 @@ def step_response_figure(
     ends = -_SHOWN_BEFORE_STEP * end, end
     upper: list[Panel] = []
     lower: list[Panel] = []
-    for letter, (name, quantity, unit, colour, place), values, measured in zip(
-        "ABCD",
-        _CURVES,
-        _curves(recording, levels),
-        [None] * len(_CURVES) if synthetic is None else _curves(synthetic, levels),
-        strict=True,
-    ):
+    curves = _curves(recording, levels)
+    measured_curves = None if synthetic is None else _curves(synthetic, levels)
+    for index, (name, quantity, unit, colour, frame) in enumerate(_CURVES):
+        values = curves[index]
         model = Mark("line", _MILLISECONDS * recording.time, values, label="model", colour=colour, style={"zorder": 3})
-        marks, then = [model, *marked, *named], partial(_enlarge, place, ends)
-        if synthetic is not None and measured is not None:
-            times = _MILLISECONDS * synthetic.time
+        marks, then = [model, *marked, *named], partial(_enlarge, frame, ends)
+        if synthetic is not None and measured_curves is not None:
+            times, measured = _MILLISECONDS * synthetic.time, measured_curves[index]
             marks[1:1] = _measurement(times, measured)
             apart = measured - np.interp(synthetic.time, recording.time, values)
             differences = [
@@ -93,7 +90,7 @@ def step_response_figure(
             kind, title = Kind("Error", unit.replace("psig", "psi")), "Measurement less model"
             limit = methodcaller("set_xlim", *ends)
             lower.append(Panel(_AFTER_STEP, kind, differences, title, then=limit, tall=0.85, shares_x=True))
-        legend, title = "" if upper else "figure", f"$\\bf{{{letter}}}$   {name}"
+        legend, title = "" if upper else "figure", f"$\\bf{{{'ABCD'[index]}}}$   {name}"
         upper.append(Panel(_AFTER_STEP, Kind(quantity, unit), marks, title, None, legend, then, 2.3, shares_x=True))
         named = []
     panels = [*upper[:2], *lower[:2], *upper[2:], *lower[2:]]
@@ -109,12 +106,12 @@ def _curves(recording: Recording, levels: SupplyLevels) -> tuple[Floats, ...]:
 
 def _measurement(times: Floats, values: Floats) -> list[Mark]:
     """Return marks for a measurement over time [ms]: a line, and a band from smallest to largest readings."""
-    first = np.flatnonzero(np.diff(np.floor(times / _BIN), prepend=-np.inf) > 0.0)
-    ends = np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
+    starts = np.flatnonzero(np.diff(np.floor(times / _BIN), prepend=-np.inf) > 0.0)
+    ends = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
     thin = {"linestyle": "-", "linewidth": 0.8, "zorder": 2}
     return [
         Mark("line", times, values, label="synthetic measurement", colour=EXPERIMENT.colour, style=thin),
-        Mark("band", times[first] + 0.5 * _BIN, ends, colour=EXPERIMENT.colour, style={"alpha": 0.3, "zorder": 1}),
+        Mark("band", times[starts] + 0.5 * _BIN, ends, colour=EXPERIMENT.colour, style={"alpha": 0.3, "zorder": 1}),
     ]
 
 
@@ -157,14 +154,14 @@ def torque_task_figure(
     runs = ((solenoid, SOLENOID, "solenoid"), (proportional, PROPORTIONAL, "proportional"))
     torques, gas, at_end = [], [], []
     errors = [Mark("level", y=0.0, colour=GREY, style={"linewidth": 0.8})]
-    for (run, look, name), stated, bench in zip(runs, gas_in_paper, synthetic or (None, None), strict=True):
-        torques.append(_torque_marks(run, look, ceiling, bench))
-        errors.append(Mark("line", run.time, run["reference"] - run["torque"], colour=look.colour))
+    for (run, style, name), stated, bench in zip(runs, gas_in_paper, synthetic or (None, None), strict=True):
+        torques.append(_torque_marks(run, style, ceiling, bench))
+        errors.append(Mark("line", run.time, run["reference"] - run["torque"], colour=style.colour))
         supplied = run["supplied_mass"]
-        said = f"{name}: {GRAMS_PER_KILOGRAM * supplied[-1]:.2f} g simulated, {stated:g} g in the paper (dotted)"
-        gas.append(Mark("line", run.time, supplied, label=said, colour=look.colour))
-        gas.append(Mark("level", y=stated / GRAMS_PER_KILOGRAM, colour=look.colour, style=_LEVEL))
-        at_end += _end_marks(1.0 if run is solenoid else 0.0, run, look)
+        gas_label = f"{name}: {GRAMS_PER_KILOGRAM * supplied[-1]:.2f} g simulated, {stated:g} g in the paper (dotted)"
+        gas.append(Mark("line", run.time, supplied, label=gas_label, colour=style.colour))
+        gas.append(Mark("level", y=stated / GRAMS_PER_KILOGRAM, colour=style.colour, style=_LEVEL))
+        at_end += _end_marks(1.0 if run is solenoid else 0.0, run, style)
     most = GRAMS_PER_KILOGRAM * max(float(run["supplied_mass"][-1]) for run, _, _ in runs)
     drawn = [mark.y for marks in torques for mark in marks]
     low, high = min(float(np.min(values)) for values in drawn), max(float(np.max(values)) for values in drawn)
@@ -201,14 +198,14 @@ def torque_task_figure(
     return draw_panels(panels, 1, (6.3, 1.0), kind=solenoid.kind)
 
 
-def _torque_marks(recording: Recording, look: DrawingStyle, ceiling: float, synthetic: Recording | None) -> list[Mark]:
+def _torque_marks(recording: Recording, style: DrawingStyle, ceiling: float, synthetic: Recording | None) -> list[Mark]:
     """Return marks of reference, torque and largest torque, over the broad line of a synthetic experiment."""
     time, dashed = recording.time, {"linestyle": REFERENCE.line, "linewidth": 1.3}
-    held = f"maximum that the supply can hold: {ceiling:.1f} N m"
+    ceiling_label = f"maximum that the supply can hold: {ceiling:.1f} N m"
     marks = [
         Mark("line", time, recording["reference"], label="reference", colour=REFERENCE.colour, style=dashed),
-        Mark("level", y=ceiling, label=held, colour=GREY, style=_LEVEL),
-        Mark("line", time, recording["torque"], label="torque, simulated", colour=look.colour),
+        Mark("level", y=ceiling, label=ceiling_label, colour=GREY, style=_LEVEL),
+        Mark("line", time, recording["torque"], label="torque, simulated", colour=style.colour),
     ]
     if synthetic is not None:
         named: dict[str, Any] = {"label": "torque, synthetic experiment", "colour": EXPERIMENT.colour}
@@ -221,27 +218,29 @@ def _torque_marks(recording: Recording, look: DrawingStyle, ceiling: float, synt
 def _filling_marks(recording: Recording) -> list[Mark]:
     """Return bars for the times at which each of the two valves is on, in the colour of its chamber."""
     marks = []
-    for row, valve, look in ((1, 1.0, CHAMBER_1), (0, -1.0, CHAMBER_2)):
+    for row, valve, style in ((1, 1.0, CHAMBER_1), (0, -1.0, CHAMBER_2)):
         is_on = np.sign(recording["command"]) == valve
         # A command holds until the next sample, so that a bar reaches to the first sample at which the valve is off.
-        held = is_on | np.concatenate(([False], is_on[:-1]))
+        is_filling = is_on | np.concatenate(([False], is_on[:-1]))
         edges = np.full((2, is_on.size), [[row + 0.12], [row + 0.88]])
-        marks.append(Mark("band", recording.time, edges, colour=look.colour, style={"where": held, "alpha": 1.0}))
+        marks.append(
+            Mark("band", recording.time, edges, colour=style.colour, style={"where": is_filling, "alpha": 1.0})
+        )
     return marks
 
 
-def _end_marks(height: float, run: Recording, look: DrawingStyle) -> list[Mark]:
+def _end_marks(height: float, run: Recording, style: DrawingStyle) -> list[Mark]:
     """Return bars of the supplied gas at the end: in the chambers, vented, and below it leaked past the vane."""
     supplied, vented, leaked = (float(run[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass"))
     bars = (
-        (0.0, supplied - vented, height, 0.25, look.colour, 1.0),
-        (supplied - vented, supplied, height, 0.25, look.colour, 0.35),
+        (0.0, supplied - vented, height, 0.25, style.colour, 1.0),
+        (supplied - vented, supplied, height, 0.25, style.colour, 0.35),
         (supplied - leaked, supplied, height - 0.36, 0.05, GREY, 1.0),
     )
     inside, out, past = (f"{GRAMS_PER_KILOGRAM * mass:.2f} g" for mass in (supplied - vented, vented, leaked))
-    said = f"  {inside} in the chambers, {out} vented (pale); {past} leaked (grey)"
+    label = f"  {inside} in the chambers, {out} vented (pale); {past} leaked (grey)"
     return [
-        Mark("text", supplied, height, label=said, colour=BLACK, style=_WORDS),
+        Mark("text", supplied, height, label=label, colour=BLACK, style=_WORDS),
         *(
             Mark("band", (low, high), ((y - half,) * 2, (y + half,) * 2), colour=colour, style={"alpha": alpha})
             for low, high, y, half, colour, alpha in bars

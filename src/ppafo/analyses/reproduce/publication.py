@@ -32,7 +32,6 @@ PAIR, RECYCLING = "solenoid", "solenoid-recycling"
 """Names of the walks with direct event control and with recycling."""
 KEEPS_GAIT = "wearer.keeps_gait=1"
 """Override for a nondisabled wearer, whose muscles keep the measured ankle angle."""
-Values = Mapping[str, str | float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +40,7 @@ class _Computation:
 
     unit: str
     arguments: Mapping[str, str]
-    compute: Callable[[Values], float]
+    compute: Callable[..., float]
 
 
 # Several claims rest on one walk, which takes seconds.
@@ -57,57 +56,57 @@ def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
     return result
 
 
-def _nondisabled(name: str, values: Values) -> WalkResult:
-    holding = (f"valve.holding_time={values['holding_time']!r} s",) if name == RECYCLING else ()
+def _nondisabled(name: str, holding_time: float | None = None) -> WalkResult:
+    """Return a shipped walk of a nondisabled wearer; a valve between the chambers holds for a time [s]."""
+    holding = () if holding_time is None else (f"valve.holding_time={holding_time!r} s",)
     return _walked(name, (KEEPS_GAIT, *holding))
 
 
-def held_torque(values: Values) -> float:
-    """Static torque [N m] at a supply pressure: torque constant times gauge pressure. Equation (2)."""
-    constant = load_device(DEVICE).actuator.torque_constant
-    return constant * (float(values["pressure"]) - STANDARD_ATMOSPHERE)
+def held_torque(pressure: float) -> float:
+    """Static torque [N m] at a supply pressure [Pa absolute]: torque constant times gauge pressure. Equation (2)."""
+    return load_device(DEVICE).actuator.torque_constant * (pressure - STANDARD_ATMOSPHERE)
 
 
-def share_of_healthy_moment(values: Values) -> float:
-    """Static torque at a pressure divided by the largest ankle moment of the built-in gait [-]."""
+def share_of_healthy_moment(pressure: float) -> float:
+    """Static torque at a pressure [Pa absolute] divided by the largest ankle moment of the built-in gait [-]."""
     configuration = load_walk(PAIR)
     moment = walk_of(configuration).gait.curve("ankle_moment").values_at(np.linspace(0.0, 1.0, 1001))
-    return held_torque(values) / (walk_of(configuration).wearer.body_mass * float(moment.max()))
+    return held_torque(pressure) / (walk_of(configuration).wearer.body_mass * float(moment.max()))
 
 
-def walking_torque(values: Values) -> float:
-    """Peak torque [N m] of the mean stride of the walk 'solenoid' at a supply pressure."""
+def walking_torque(pressure: float) -> float:
+    """Peak torque [N m] of the mean stride of the walk 'solenoid' at a supply pressure [Pa absolute]."""
     # As repr, so that the walk has this very number. Nothing is published of a limit of the torque.
-    overrides = (f"supply.pressure={float(values['pressure'])!r} SI", "controller.largest_torque=100 N m")
+    overrides = (f"supply.pressure={pressure!r} SI", "controller.largest_torque=100 N m")
     return float(_walked(PAIR, overrides).averages["torque"].mean.max())
 
 
-def dorsiflexor_share(values: Values) -> float:
+def dorsiflexor_share() -> float:
     """Dorsiflexor moment of a nondisabled wearer with the device divided by the moment without [-], stride means."""
-    worn = _nondisabled(PAIR, values)
+    worn = _nondisabled(PAIR)
     return worn.metrics["dorsiflexor_moment"].value / healthy_metrics(worn.scenario)["dorsiflexor_moment"].value
 
 
-def recycling_saving(values: Values) -> float:
-    """Fraction of the gas of a stride that the valve between the chambers saves [-].
+def recycling_saving(holding_time: float) -> float:
+    """Fraction of the gas of a stride that the valve between the chambers, open for a time [s], saves [-].
 
     The reference is event-based control without this valve.
     """
-    plain, recycling = (_nondisabled(name, values).metrics["gas"].value for name in (PAIR, RECYCLING))
-    return 1.0 - recycling / plain
+    plain, recycling = _nondisabled(PAIR), _nondisabled(RECYCLING, holding_time)
+    return 1.0 - recycling.metrics["gas"].value / plain.metrics["gas"].value
 
 
-def recycling_work(values: Values) -> float:
+def recycling_work(holding_time: float) -> float:
     """Net work of the actuator on the ankle in a stride, with the valve between the chambers divided by without [-].
 
     The work is a mean over the strides with help; without the valve, control is event-based.
     """
-    walks = (_nondisabled(name, values) for name in (PAIR, RECYCLING))
+    walks = _nondisabled(PAIR), _nondisabled(RECYCLING, holding_time)
     plain, recycling = (integral_of_a_stride(result, result.recording["torque"]) for result in walks)
     return recycling / plain
 
 
-def event_reduction(wearer: str, _values: Values) -> float:
+def event_reduction(wearer: str) -> float:
     """Relative reduction of the event time error by state estimation instead of thresholds, for one wearer [-]."""
     configuration = load_walk(PAIR, WEARERS[wearer])
     # Two steps a stride.
@@ -133,12 +132,12 @@ COMPUTATIONS: dict[str, _Computation] = {
 
 
 @dataclass(frozen=True, slots=True)
-class PublishedClaim:
+class _PublishedClaim:
     """Claim with a known computation; ``arguments`` in SI."""
 
     entry: ClaimEntry
     computation: _Computation | None
-    arguments: Mapping[str, str | float]
+    arguments: Mapping[str, float]
     source: str
 
 
@@ -149,7 +148,7 @@ class Publication:
     name: str
     title: str
     citation: str
-    claims: tuple[PublishedClaim, ...]
+    claims: tuple[_PublishedClaim, ...]
 
 
 def load_publication(name_or_path: str | Path) -> Publication:
@@ -162,13 +161,13 @@ def load_publication(name_or_path: str | Path) -> Publication:
     return Publication(document.name, document.title, document.citation, claims)
 
 
-def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
+def _checked(entry: ClaimEntry, citation: str, file: str) -> _PublishedClaim:
     where = f"{file}: claims.{entry.id}"
     source = f"{entry.source or citation}, {entry.where}"
     if bool(entry.computation) == bool(entry.not_testable):
         raise ScenarioError(f"{where}: give either computation or not_testable, which says why there is none")
     if entry.not_testable:
-        return PublishedClaim(entry, None, {}, source)
+        return _PublishedClaim(entry, None, {}, source)
     if entry.computation not in COMPUTATIONS:
         hint = nearest_name(entry.computation, COMPUTATIONS)
         known = ", ".join(COMPUTATIONS)
@@ -190,17 +189,17 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
     with refused_as(ScenarioError, f"{where}.unit", UnitError):
         # Only for what it raises: here the place in the file is known.
         from_si(1.0, entry.unit, computation.unit)
-    return PublishedClaim(entry, computation, _arguments(entry, computation, where), source)
+    return _PublishedClaim(entry, computation, _arguments(entry, computation, where), source)
 
 
-def _arguments(entry: ClaimEntry, computation: _Computation, where: str) -> dict[str, str | float]:
+def _arguments(entry: ClaimEntry, computation: _Computation, where: str) -> dict[str, float]:
     """Return the arguments of a claim in SI, checked against the arguments of its computation."""
     known = ", ".join(computation.arguments)
     for name in entry.arguments:
         if name not in computation.arguments:
             hint = nearest_name(name, computation.arguments)
             raise ScenarioError(f"{where}.arguments: '{name}' is unknown{hint}; {entry.computation} takes {known}")
-    values: dict[str, str | float] = {}
+    values: dict[str, float] = {}
     for name, unit in computation.arguments.items():
         if name not in entry.arguments:
             raise ScenarioError(f"{where}.arguments: '{name}' is missing; {entry.computation} takes {known}")
@@ -221,7 +220,7 @@ SEED, ALL = PAPER, "all"
 class JudgedClaim:
     """Claim of a publication with the verdict and our value in its unit; None if nothing is computed."""
 
-    claim: PublishedClaim
+    claim: _PublishedClaim
     value: float | None
     verdict: Verdict
 
@@ -302,12 +301,12 @@ def run_studies(study: str, report: Report) -> tuple[tuple[Publication, tuple[Ju
     return tuple(studies)
 
 
-def judge(claim: PublishedClaim) -> JudgedClaim:
+def judge(claim: _PublishedClaim) -> JudgedClaim:
     """Return a claim with our value and the verdict; SimulationError if a walk fails."""
     entry, computation = claim.entry, claim.computation
     if computation is None:
         return JudgedClaim(claim, None, "not_testable")
-    value = from_si(computation.compute(claim.arguments), entry.unit, computation.unit)
+    value = from_si(computation.compute(**claim.arguments), entry.unit, computation.unit)
     low = -math.inf if entry.at_least is None else entry.at_least
     high = math.inf if entry.at_most is None else entry.at_most
     # A model with assumptions that does not agree is no evidence against what was measured.

@@ -10,7 +10,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
 
 if TYPE_CHECKING:
-    from ppafo.analyses.reproduce.answer import Reproduction, Studies
+    from ppafo.analyses.reproduce.result import Reproduction, Studies
     from ppafo.report.finding import Finding
 
 PublicationName = Annotated[str | Path, Word("NAME", option="--study")]
@@ -39,8 +39,9 @@ def reproduce(
     ('jmd-2016, run again', True)
     """
     name_plugins(plugins)
-    from ppafo.analyses.reproduce.answer import Studies, finding_of, finding_of_studies
+    from ppafo.analyses.reproduce.answer import finding_of, finding_of_studies
     from ppafo.analyses.reproduce.publication import ALL, SEED, check_study, run_studies
+    from ppafo.analyses.reproduce.result import Studies
     from ppafo.analyses.reproduce.solve import reproduce_paper
 
     report = progress or report_nothing

@@ -6,12 +6,12 @@ from functools import partial
 
 import numpy as np
 
-from ppafo.analyses.reproduce.answer import PROPORTIONAL, SOLENOID, STEP, Reproduction
 from ppafo.analyses.reproduce.bench import AssumedValue, assumed_values, synthetic_evidence
 from ppafo.analyses.reproduce.claim import Claim, Observation, Verdict, claim_on_text, observation, stated_claim
-from ppafo.analyses.reproduce.decision_phases import PhasedRuns, phased_runs
+from ppafo.analyses.reproduce.decision_phases import phased_runs
 from ppafo.analyses.reproduce.meaning_of_u import readings_of_u
 from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED_CLAIM, arithmetic_claims, load_reported
+from ppafo.analyses.reproduce.result import PROPORTIONAL, SOLENOID, STEP, Reproduction
 from ppafo.analyses.reproduce.step_response import SupplyLevels, step_events, step_observations
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
@@ -35,22 +35,25 @@ FEWEST_REVERSALS = paper_entries()["solenoid_oscillates_on_ramp"].at_least or 0.
 """Smallest number of torque reversals on the ramp that counts as the oscillation of the text."""
 
 
-def torque_task_claims(runs: PhasedRuns, proportional: Result, rests_on: tuple[str, ...]) -> list[Claim]:
+def torque_task_claims(
+    pair_errors: Floats, pair_gas: Floats, proportional: Result, rests_on: tuple[str, ...]
+) -> list[Claim]:
     """Return the claims on tracking error and supplied gas, over all phases of the solenoid pair's decisions.
 
-    ``rests_on`` are the assumptions of the task beyond the paper.
+    ``pair_errors`` [N m] and ``pair_gas`` [g] are the result of ``phased_runs``, ``rests_on`` the assumptions of the
+    task beyond the paper.
     """
     error = proportional.metrics["rms_error"].value
     gas = GRAMS_PER_KILOGRAM * proportional.metrics["gas_supplied"].value
-    over = f"Median and range of {runs.errors.size} runs over the unknown phase of the decisions, either valve first."
+    over = f"Median and range of {pair_errors.size} runs over the unknown phase of the decisions, either valve first."
     # Where the pair makes no error, or takes no gas, there is nothing to save from.
     with np.errstate(divide="ignore", invalid="ignore"):
-        better, saved = 100.0 * (1.0 - error / runs.errors), 100.0 * (1.0 - gas / runs.gas)
+        better, saved = 100.0 * (1.0 - error / pair_errors), 100.0 * (1.0 - gas / pair_gas)
     claim = partial(_claim_over_phases, rests_on=rests_on)
     # No decimals of what varies by several percent over the phases.
     return [
         claim("torque_rms_improvement", better, 0, over),
-        claim("co2_solenoid", runs.gas, 1, over),
+        claim("co2_solenoid", pair_gas, 1, over),
         claim("co2_proportional", np.array([gas]), 2, "Decided every millisecond, so that no phase matters."),
         claim("co2_saving", saved, 0, f"{over} It follows from the two amounts: no evidence of its own."),
     ]
@@ -93,16 +96,16 @@ def torque_task_observations(solenoid: Result, proportional: Result) -> list[Obs
     ]
 
 
-def _reversals(result: Result, part: str) -> int | None:
+def _reversals(result: Result, phase: str) -> int | None:
     """Return the number of torque reversals on the ramp or the hold; None if the reference has no such part."""
-    metric = result.metrics.get(f"oscillations_{part}")
+    metric = result.metrics.get(f"oscillations_{phase}")
     return None if metric is None else round(metric.value)
 
 
-def _reversals_text(reversals: int | None, part: str) -> str:
+def _reversals_text(reversals: int | None, phase: str) -> str:
     if reversals is None:
-        return f"this reference has no {part}"
-    return f"{count_of(reversals, 'torque reversal')} on the {part}"
+        return f"this reference has no {phase}"
+    return f"{count_of(reversals, 'torque reversal')} on the {phase}"
 
 
 def _tracks_better_on_ramp(solenoid: Result, proportional: Result) -> Observation:
@@ -151,14 +154,14 @@ FASTER = ("controller.rate=100 Hz", "valve.switching_interval=10 ms")
 _RESTS_ON = ("the torque task as completed here",)
 
 
-def control_claims(solenoid: Result, proportional: Result, runs: PhasedRuns) -> list[Claim]:
+def control_claims(solenoid: Result, proportional: Result, pair_errors: Floats) -> list[Claim]:
     """Return the claims on switching rate, gains, dead zone and improved control, all of them undetermined here.
 
-    ``runs`` are the solenoid pair's runs over the unknown phase of its decisions.
+    ``pair_errors`` are the RMS errors [N m] of the solenoid pair over the unknown phase of its decisions.
     """
     beyond = paper_entries()["beyond_improved_control"]
     return [
-        _limited_by_switching(solenoid, runs),
+        _limited_by_switching(solenoid, pair_errors),
         _undetermined("gains_minimise_error", proportional, TUNED),
         _undetermined("dead_zone_amplifies_delay", solenoid, DEAD_ZONE),
         stated_claim(beyond.id, None, "undetermined", beyond.not_testable),
@@ -168,19 +171,19 @@ def control_claims(solenoid: Result, proportional: Result, runs: PhasedRuns) -> 
 def _error_with(run: Result, overrides: tuple[str, ...]) -> float | str:
     """Return the RMS torque error [N m] of a run's task with overrides, or the error message if the run fails."""
     # Another law takes nothing that was set for this one.
-    kept = [override for override in run.scenario.origin.overrides if not override.startswith("controller.")]
+    remaining = [override for override in run.scenario.origin.overrides if not override.startswith("controller.")]
     try:
-        return simulate(load_scenario(run.scenario.name, [*kept, *overrides])).metrics["rms_error"].value
+        return simulate(load_scenario(run.scenario.name, [*remaining, *overrides])).metrics["rms_error"].value
     except (ParameterError, ScenarioError, SimulationError) as error:
         return str(error)
 
 
-def _limited_by_switching(solenoid: Result, runs: PhasedRuns) -> Claim:
+def _limited_by_switching(solenoid: Result, pair_errors: Floats) -> Claim:
     """Return the claim on the error reduction of the same control law at five times the switching rate."""
     entry, faster = paper_entries()["limited_by_switching"], _error_with(solenoid, FASTER)
     if isinstance(faster, str):
         return stated_claim(entry.id, None, "undetermined", f"{entry.note} {faster}.")
-    less = 100.0 * (1.0 - faster / runs.errors)
+    less = 100.0 * (1.0 - faster / pair_errors)
     median, low, high = float(np.median(less)), float(less.min()), float(less.max())
     sentence = f"{median:.0f} % less error at 100 Hz" + (f" ({low:.0f} to {high:.0f})" if high > low else "")
     claim = stated_claim(entry.id, median, "undetermined", entry.note, _RESTS_ON, None, sentence)
@@ -189,12 +192,13 @@ def _limited_by_switching(solenoid: Result, runs: PhasedRuns) -> Claim:
 
 def _undetermined(identifier: str, run: Result, overrides: tuple[str, ...]) -> Claim:
     """Return a claim that depends on unreported settings, with the error of the task under other settings."""
-    entry, error, other = paper_entries()[identifier], run.metrics["rms_error"].value, _error_with(run, overrides)
-    if isinstance(other, str):
-        return stated_claim(identifier, None, "undetermined", f"{entry.note} {other}.")
-    change = 100.0 * (other / error - 1.0)
+    entry, error = paper_entries()[identifier], run.metrics["rms_error"].value
+    changed_error = _error_with(run, overrides)
+    if isinstance(changed_error, str):
+        return stated_claim(identifier, None, "undetermined", f"{entry.note} {changed_error}.")
+    change = 100.0 * (changed_error / error - 1.0)
     sentence = f"{abs(change):.0f} % {'more' if change > 0.0 else 'less'} error"
-    note = f"{entry.note} In this task {other:.3f} instead of {error:.3f} N m."
+    note = f"{entry.note} In this task {changed_error:.3f} instead of {error:.3f} N m."
     return stated_claim(identifier, change, "undetermined", note, _RESTS_ON, None, sentence)
 
 
@@ -249,7 +253,7 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     step_observed = tuple(step_observations(step.recording, levels, events))
     torque_observed = tuple(torque_task_observations(solenoid, proportional))
     report(Progress(f"simulating {SOLENOID} over the phase of its decisions"))
-    phased, of_tasks = phased_runs(solenoid), _used_by(assumed, SOLENOID, PROPORTIONAL)
+    (pair_errors, pair_gas), task_assumptions = phased_runs(solenoid), _used_by(assumed, SOLENOID, PROPORTIONAL)
     claims = (
         *arithmetic_claims(reported),
         claim_on_text(
@@ -258,14 +262,14 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
             step_observed,
             _used_by(assumed, STEP),
         ),
-        *torque_task_claims(phased, proportional, of_tasks),
+        *torque_task_claims(pair_errors, pair_gas, proportional, task_assumptions),
         claim_on_text(
             "oscillation_words",
             "Statements of the text on the oscillation with both valves.",
             torque_observed,
-            of_tasks,
+            task_assumptions,
         ),
-        *control_claims(solenoid, proportional, phased),
+        *control_claims(solenoid, proportional, pair_errors),
         NOT_PUBLISHED_CLAIM,
     )
     return Reproduction(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.analyses.sensitivity.methods import METHODS
-from ppafo.analyses.sensitivity.solve import Influences, OfMetric
+from ppafo.analyses.sensitivity.solve import Influences, MetricSensitivity
 from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import Kind, of_metric
 from ppafo.report.panels import Mark, Panel
@@ -34,14 +34,16 @@ _CAPTION = (
 def finding_of(influences: Influences) -> Finding[Influences]:
     """Return the sensitivity indices as a finding, with a table and two panels for each metric."""
     settings, method = influences.settings, METHODS[influences.method]
-    said = [
+    sentences = [
         f"{influences.study}: {influences.method}, {settings.samples:,} {method.sizes_label}, {influences.runs:,} runs "
         f"of {len(influences.paths)} uncertain values; bands with {100.0 * settings.confidence:g} % confidence",
         f"{influences.failed:,} runs failed; up to {100.0 * settings.maximum_failed:g} % are allowed, and every "
         f"{method.block_label} with a failed run is left out",
     ]
     if influences.not_following:
-        said.append(f"in {influences.not_following:,} runs the reference is not followed: the indices are of these too")
+        sentences.append(
+            f"in {influences.not_following:,} runs the reference is not followed: the indices are of these too"
+        )
     figure = Section(
         "Indices and their convergence",
         panels=partial(_panels, influences),
@@ -57,7 +59,7 @@ def finding_of(influences: Influences) -> Finding[Influences]:
         name="sensitivity",
         kicker="Sensitivity",
         title=f"What matters in {influences.study}",
-        said=tuple(said),
+        said=tuple(sentences),
         parts=(*(_part(influences, metric) for metric in influences.metrics), figure),
         found=influences,
     )
@@ -68,7 +70,7 @@ def _panels(influences: Influences) -> list[Panel]:
     return [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)]
 
 
-def _part(influences: Influences, metric: OfMetric) -> Section:
+def _part(influences: Influences, metric: MetricSensitivity) -> Section:
     """Return a table with a row for each uncertain value, the most influential first, with remarks."""
     kind, indices = of_metric(metric.metric, "+.3g"), metric.indices
     order = np.argsort(-indices.values[METHODS[influences.method].shown[0]])
@@ -78,8 +80,8 @@ def _part(influences: Influences, metric: OfMetric) -> Section:
         columns.append(Column("band", [f"± {indices.bands[name][row]:.3f}" for row in order]))
     change, band = metric.change_from_5_to_95_percent, metric.band_of_change
     ends = [None if math.isnan(change[row]) else f"± {kind.change_number(band[row], '.2g')}" for row in order]
-    shown = [None if math.isnan(change[row]) else change[row] for row in order]
-    columns += [Column("change, 5 to 95 %", shown, kind, is_change=True), Column("band", ends)]
+    change_cells = [None if math.isnan(change[row]) else change[row] for row in order]
+    columns += [Column("change, 5 to 95 %", change_cells, kind, is_change=True), Column("band", ends)]
     heading = f"{metric.metric}: sd {kind.change(metric.standard_deviation)}"
     if metric.dropped_blocks:
         label = METHODS[influences.method].sizes_label
@@ -87,7 +89,7 @@ def _part(influences: Influences, metric: OfMetric) -> Section:
     return Section(heading, columns, remarks=remarks(influences, metric))
 
 
-def overlapping_pairs(influences: Influences, metric: OfMetric) -> list[tuple[str, str]]:
+def overlapping_pairs(influences: Influences, metric: MetricSensitivity) -> list[tuple[str, str]]:
     """Return pairs of neighbours in the ranking whose confidence bands overlap, so that their order is open.
 
     Values surely below a hundredth of the largest index are left out as negligible.
@@ -104,24 +106,24 @@ def overlapping_pairs(influences: Influences, metric: OfMetric) -> list[tuple[st
     ]
 
 
-def remarks(influences: Influences, metric: OfMetric) -> list[str]:
+def remarks(influences: Influences, metric: MetricSensitivity) -> list[str]:
     """Return remarks on overlapping bands and on the sum of first-order indices.
 
     A difference of the sum from 1 within its error is not attributed to interactions.
     """
-    said = []
+    sentences = []
     unsettled = overlapping_pairs(influences, metric)
     if unsettled:
         pairs = ", ".join(f"{first} and {second}" for first, second in unsettled)
-        said.append(f"not converged at this size, their bands overlap: {pairs}")
+        sentences.append(f"not converged at this size, their bands overlap: {pairs}")
     indices = metric.indices
     if "first" in indices.values:
         alone, error = float(np.sum(indices.values["first"])), float(np.linalg.norm(indices.bands["first"]))
-        rest = ": interactions, if any, are within this error"
+        interactions = ": interactions, if any, are within this error"
         if alone + error < 1.0:
-            rest = "; the rest comes from interactions"
-        said.append(f"first-order indices sum to {alone:.3f} ± {error:.2g}{rest}")
-    return said
+            interactions = "; the rest comes from interactions"
+        sentences.append(f"first-order indices sum to {alone:.3f} ± {error:.2g}{interactions}")
+    return sentences
 
 
 def _colour_of(rank: int) -> str:
@@ -129,7 +131,7 @@ def _colour_of(rank: int) -> str:
     return COLOURS[rank] if rank < _MAXIMUM_LINES else GREY
 
 
-def _bars(influences: Influences, metric: OfMetric) -> Panel:
+def _bars(influences: Influences, metric: MetricSensitivity) -> Panel:
     """Return a panel of the indices with their bands, a row and a colour for each value.
 
     The second index has open markers.
@@ -140,12 +142,12 @@ def _bars(influences: Influences, metric: OfMetric) -> Panel:
     places = np.arange(order.size)[::-1]
     marks = []
     for name, filled, shift in zip(shown, ("full", "none"), (0.14, -0.14), strict=False):
-        look = {"markersize": 5, "elinewidth": 1.4, "fillstyle": filled}
+        base_style = {"markersize": 5, "elinewidth": 1.4, "fillstyle": filled}
         for rank, row in enumerate(order):
             colour = _colour_of(rank)
-            place, style = places[rank] + shift, {**look, "fmt": MARKERS.get(colour, "o")}
+            height, style = places[rank] + shift, {**base_style, "fmt": MARKERS.get(colour, "o")}
             marks.append(
-                Mark("reach", [indices.values[name][row]], [place], [indices.bands[name][row]], "", colour, style)
+                Mark("reach", [indices.values[name][row]], [height], [indices.bands[name][row]], "", colour, style)
             )
 
     def name_values(axes: "Axes") -> None:
@@ -156,7 +158,7 @@ def _bars(influences: Influences, metric: OfMetric) -> Panel:
     return Panel(fraction, Kind(), marks, of_metric(metric.metric).words, legend="", then=name_values)
 
 
-def _course(influences: Influences, metric: OfMetric) -> Panel:
+def _course(influences: Influences, metric: MetricSensitivity) -> Panel:
     """Return a panel of the largest indices for growing parts of the sample."""
     method = METHODS[influences.method]
     name, sizes = method.shown[0], [step.blocks for step in metric.settling]

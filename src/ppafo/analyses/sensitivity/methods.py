@@ -87,14 +87,14 @@ def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
         raise StudyError(f"samples = {blocks}: Sobol indices need a power of 2, such as {1 << blocks.bit_length()}")
     from scipy.stats import qmc
 
-    dimensions, each = len(uncertainty.drawn), blocks // SCRAMBLES
-    design = np.empty((each, SCRAMBLES, dimensions + 2, dimensions))
+    dimensions, points_of_scramble = len(uncertainty.drawn), blocks // SCRAMBLES
+    design = np.empty((points_of_scramble, SCRAMBLES, dimensions + 2, dimensions))
     exchanged = np.arange(dimensions)
     for number in range(SCRAMBLES):
-        own = replicate_seed(seed, number) % 2**32
+        scramble_seed = replicate_seed(seed, number) % 2**32
         # Saltelli (2002): a point A, its copies in which value i comes from B, and B. `seed`, not `rng`: the points of
         # earlier studies.
-        points = qmc.Sobol(2 * dimensions, scramble=True, seed=own).random(each)
+        points = qmc.Sobol(2 * dimensions, scramble=True, seed=scramble_seed).random(points_of_scramble)
         design[:, number] = points[:, None, :dimensions]
         design[:, number, -1] = points[:, dimensions:]
         design[:, number, 1 + exchanged, exchanged] = points[:, dimensions:]
@@ -107,7 +107,7 @@ def _sobol_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
     table = evaluated.values.reshape(evaluated.blocks.size, -1)
     scramble = evaluated.blocks % SCRAMBLES
     parts = [scramble != number for number in np.unique(scramble)]
-    left_out = np.array([_sobol_total_and_first(table[rest]) for rest in parts])
+    left_out = np.array([_sobol_total_and_first(table[members]) for members in parts])
     reach = jackknife_reach(left_out, confidence)
     total, first = _sobol_total_and_first(table)
     return Indices({"total": total, "first": first}, {"total": reach[0], "first": reach[1]})
@@ -184,16 +184,16 @@ def _shapley_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
 
     blocks, count = evaluated.blocks.size, evaluated.fractions.shape[1]
     table = evaluated.values.reshape(blocks, count - 1, _INNER)
-    whole = np.mean((table - np.mean(table)) ** 2, axis=(1, 2))
-    left = np.var(table, axis=2, ddof=1)
-    ends = np.zeros((blocks, 1)), whole[:, None]
-    gains = np.diff(np.concatenate([ends[0], left, ends[1]], axis=1), axis=1)
+    variances = np.mean((table - np.mean(table)) ** 2, axis=(1, 2))
+    conditional = np.var(table, axis=2, ddof=1)
+    ends = np.zeros((blocks, 1)), variances[:, None]
+    gains = np.diff(np.concatenate([ends[0], conditional, ends[1]], axis=1), axis=1)
     orders = _orders(count, int(evaluated.blocks.max()) + 1, evaluated.seed)[evaluated.blocks]
     effects = np.take_along_axis(gains, np.argsort(orders, axis=1), axis=1)
-    variance = float(np.mean(whole))
+    variance = float(np.mean(variances))
     fractions = np.mean(effects, axis=0) / variance
-    away = (effects - fractions * whole[:, None]) / variance
-    reach = float(stdtrit(blocks - 1, 0.5 + 0.5 * confidence)) * np.std(away, axis=0, ddof=1) / math.sqrt(blocks)
+    deviations = (effects - fractions * variances[:, None]) / variance
+    reach = float(stdtrit(blocks - 1, 0.5 + 0.5 * confidence)) * np.std(deviations, axis=0, ddof=1) / math.sqrt(blocks)
     return Indices({"shapley": fractions}, {"shapley": reach})
 
 
@@ -235,11 +235,11 @@ def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floa
     each scramble, and twice the difference from the change with the nearer half of these runs, as the error of the
     parabola.
     """
-    own = np.unique(evaluated.blocks % SCRAMBLES, return_inverse=True)[1]
-    part = np.repeat(own, evaluated.values.size // evaluated.blocks.size)
+    part_of_block = np.unique(evaluated.blocks % SCRAMBLES, return_inverse=True)[1]
+    part = np.repeat(part_of_block, evaluated.values.size // evaluated.blocks.size)
     # About the mean, because the sums of the lines below cancel.
     values = evaluated.values - np.mean(evaluated.values)
-    whole, half = (
+    whole, nearer = (
         np.array(
             [
                 np.subtract(*(_levels(values, inputs, end, part, nearest) for end in ends[::-1]))
@@ -248,12 +248,10 @@ def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floa
         )
         for nearest in (_NEAREST, 0.5 * _NEAREST)
     )
-    reach, of_bend = (
-        jackknife_reach(one[:, 1:].T, level) for one, level in ((whole, confidence), (whole - half, _ONE))
-    )
+    spread, bend_spread = jackknife_reach(whole[:, 1:].T, confidence), jackknife_reach((whole - nearer)[:, 1:].T, _ONE)
     # Of the square of the difference, what is chance on average is no bend.
-    bend = np.sqrt(np.maximum((whole - half)[:, 0] ** 2 - of_bend**2, 0.0))
-    return whole[:, 0], reach + 2.0 * bend
+    bend = np.sqrt(np.maximum((whole - nearer)[:, 0] ** 2 - bend_spread**2, 0.0))
+    return whole[:, 0], spread + 2.0 * bend
 
 
 def _levels(values: Floats, inputs: Floats, end: float, part: NDArray[np.intp], nearest: float) -> Floats:
@@ -264,18 +262,17 @@ def _levels(values: Floats, inputs: Floats, end: float, part: NDArray[np.intp], 
     count = int(part.max()) + 1
     if math.isnan(end):
         return np.full(count + 1, math.nan)
-    away = np.abs(inputs - end)
-    place = int(nearest * away.size)
-    near = away <= np.partition(away, place)[place]
-    along = (inputs[near] - end) / (np.max(away[near]) or 1.0)
-    powers = np.stack([along**power for power in range(5)])
+    distance = np.abs(inputs - end)
+    rank = int(nearest * distance.size)
+    near = distance <= np.partition(distance, rank)[rank]
+    scaled = (inputs[near] - end) / (np.max(distance[near]) or 1.0)
+    powers = np.stack([scaled**power for power in range(5)])
     moments = np.stack([np.bincount(part[near], power, count) for power in powers])
     mixed = np.stack([np.bincount(part[near], power * values[near], count) for power in powers[:3]])
-    moments, mixed = (
-        np.concatenate([whole, whole - sums], axis=1)
-        for sums in (moments, mixed)
-        for whole in (np.sum(sums, axis=1, keepdims=True),)
-    )
+    # All parts, and all but one in turn.
+    total, mixed_total = np.sum(moments, axis=1, keepdims=True), np.sum(mixed, axis=1, keepdims=True)
+    moments = np.concatenate([total, total - moments], axis=1)
+    mixed = np.concatenate([mixed_total, mixed_total - mixed], axis=1)
     # A value of one or two levels needs no parabola: the pseudo-inverse leaves at 0 what they do not tell.
     normal = np.stack([moments[row : row + 3] for row in range(3)]).transpose(2, 0, 1)
     solved = np.linalg.pinv(normal, rcond=1.0e-9, hermitian=True) @ mixed.T[:, :, None]

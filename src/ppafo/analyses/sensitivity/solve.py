@@ -57,7 +57,7 @@ class IndexConvergence:
 
 
 @dataclass(frozen=True, slots=True)
-class OfMetric:
+class MetricSensitivity:
     """Sensitivity of a metric at growing sample sizes.
 
     ``mean``, ``standard_deviation``: over all runs [SI]
@@ -107,7 +107,7 @@ class Influences:
     failed: int
     not_following: int
     policy: str
-    metrics: list[OfMetric]
+    metrics: list[MetricSensitivity]
 
 
 _POLICY = "above the maximum fraction refused; below, every block with a failed run is left out"
@@ -147,15 +147,15 @@ def analyse(
     design = method.design(uncertainty, settings.samples, settings.seed)
     columns = uncertainty.columns(design)
     rows = runs.run(columns)
-    asked = tuple(metrics) or runs.metrics
-    runs.check(rows, settings.maximum_failed, "sensitivity", asked)
+    requested = tuple(metrics) or runs.metrics
+    runs.check(rows, settings.maximum_failed, "sensitivity", requested)
     ends = np.array([number.distribution.values(np.array(_ENDS)) for number in uncertainty.drawn]).T
     # A seed has no order: from its 5 to its 95 % quantile nothing changes.
     ends[:, [path == NOISE for path in uncertainty.paths]] = np.nan
     inputs = np.stack([columns[path] for path in uncertainty.paths], axis=1)
     blocks = np.repeat(np.arange(settings.samples), design.shape[0] // settings.samples)
     # The design of all metrics, without the values of one.
-    whole = EvaluatedBlocks(
+    evaluated = EvaluatedBlocks(
         fractions=design, inputs=inputs, values=np.empty(0), blocks=blocks, ends=ends, seed=settings.seed
     )
     off = 0 if scenario is None else np.count_nonzero(tracking_violation(rows, scenario, columns, uncertainty.gauge))
@@ -168,13 +168,13 @@ def analyse(
         failed=runs.failures,
         not_following=int(off),
         policy=_POLICY,
-        metrics=[_of_metric(name, rows[name], whole, method, settings) for name in asked],
+        metrics=[_metric_sensitivity(name, rows[name], evaluated, method, settings) for name in requested],
     )
 
 
-def _of_metric(
+def _metric_sensitivity(
     name: str, values: Floats, design: EvaluatedBlocks, method: Method, settings: SensitivitySettings
-) -> OfMetric:
+) -> MetricSensitivity:
     """Return the sensitivity of a metric with ``values`` (rows,), for growing parts of the sample.
 
     Raises StudyError if the metric is equal in every run, or if too few blocks are complete.
@@ -189,8 +189,8 @@ def _of_metric(
     halved = {settings.samples >> halvings for halvings in range(_SIZES)}
     sizes = []
     for size in sorted({size for size in halved if size >= method.fewest} | {settings.samples}):
-        kept = values.reshape(settings.samples, -1)[:size][is_whole[:size]]
-        if len(kept) >= _FEWEST_WHOLE and float(np.ptp(kept)) > 0.0:
+        complete = values.reshape(settings.samples, -1)[:size][is_whole[:size]]
+        if len(complete) >= _FEWEST_WHOLE and float(np.ptp(complete)) > 0.0:
             sizes.append(size)
     if settings.samples not in sizes:
         raise StudyError(
@@ -199,15 +199,15 @@ def _of_metric(
         )
     settling = []
     for size in sizes:
-        whole = np.flatnonzero(is_whole[:size])
-        estimated = method.indices(_part_of(design, values, whole), settings.confidence)
+        complete_blocks = np.flatnonzero(is_whole[:size])
+        estimated = method.indices(_part_of(design, values, complete_blocks), settings.confidence)
         indices, bands = (
             {name: numbers.tolist() for name, numbers in by_name.items()}
             for by_name in (estimated.values, estimated.bands)
         )
-        settling.append(IndexConvergence(blocks=size, used=whole.size, indices=indices, bands=bands))
+        settling.append(IndexConvergence(blocks=size, used=complete_blocks.size, indices=indices, bands=bands))
     change, band = changes(_part_of(design, values, np.flatnonzero(is_whole)), settings.confidence)
-    return OfMetric(
+    return MetricSensitivity(
         metric=name,
         mean=float(np.mean(values[known])),
         standard_deviation=float(np.std(values[known], ddof=1)),
@@ -218,9 +218,9 @@ def _of_metric(
     )
 
 
-def _part_of(design: EvaluatedBlocks, values: Floats, kept: NDArray[np.intp]) -> EvaluatedBlocks:
+def _part_of(design: EvaluatedBlocks, values: Floats, blocks: NDArray[np.intp]) -> EvaluatedBlocks:
     """Return the rows of the given blocks of a design, with the values of a metric."""
-    rows = np.flatnonzero(np.isin(design.blocks, kept))
+    rows = np.flatnonzero(np.isin(design.blocks, blocks))
     return replace(
-        design, fractions=design.fractions[rows], inputs=design.inputs[rows], values=values[rows], blocks=kept
+        design, fractions=design.fractions[rows], inputs=design.inputs[rows], values=values[rows], blocks=blocks
     )

@@ -81,8 +81,8 @@ def audit(
     loaded = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
     # An argument, or the key of the set.
     with at_fault("parent"):
-        of_parent = set_or_load(loaded.parent or None if parent is None else parent)
-    return _finding_of([AuditedSet(loaded, of_parent, tuple(findings_of(loaded, of_parent)))], True)
+        parent_set = set_or_load(loaded.parent or None if parent is None else parent)
+    return _finding_of([AuditedSet(loaded, parent_set, tuple(findings_of(loaded, parent_set)))], True)
 
 
 def audited(names: Sequence[str], parent: str | None, is_whole: bool, overrides: Sequence[str]) -> Finding[Any]:
@@ -95,33 +95,34 @@ def audited(names: Sequence[str], parent: str | None, is_whole: bool, overrides:
     for name in names:
         loaded = apply_overrides(load_parameter_set(name), overrides)
         with refused_as(ParameterError, "--parent" if parent else f"{loaded.file}: parent", ParameterError):
-            of_parent = set_or_load(parent or loaded.parent or None)
-        sets.append(AuditedSet(loaded, of_parent, tuple(findings_of(loaded, of_parent)), tuple(overrides)))
+            parent_set = set_or_load(parent or loaded.parent or None)
+        sets.append(AuditedSet(loaded, parent_set, tuple(findings_of(loaded, parent_set)), tuple(overrides)))
     return _finding_of(sets, is_whole)
 
 
 def _finding_of(sets: Sequence[AuditedSet], is_whole: bool) -> Finding[Any]:
-    first, is_one = sets[0], len(sets) == 1
-    if is_one:
+    first, is_single = sets[0], len(sets) == 1
+    if is_single:
         compares = first.parent is not None or bool(first.overrides)
         changed = changed_paths(first.parameter_set, first.parent) if compares and not is_whole else None
         parts = _parts(first, changed)
     else:
         verdicts = [
-            {finding.id: "accepted" if finding.accepted else finding.severity for finding in each} for each in sets
+            {finding.id: "accepted" if finding.accepted else finding.severity for finding in audited_set}
+            for audited_set in sets
         ]
-        head = ["finding", *(each.parameter_set.name for each in sets)]
+        head = ["finding", *(audited_set.parameter_set.name for audited_set in sets)]
         ids = dict.fromkeys(name for verdict in verdicts for name in verdict)
         rows = ([name, *(verdict.get(name) for verdict in verdicts)] for name in ids)
         parts = [Section(columns=columns_of(head, rows))]
     return Finding(
-        name=f"audit-{first.parameter_set.name}" if is_one else "audit",
+        name=f"audit-{first.parameter_set.name}" if is_single else "audit",
         kicker="Audit",
-        title=", ".join(each.parameter_set.name for each in sets),
+        title=", ".join(audited_set.parameter_set.name for audited_set in sets),
         said=(),
         parts=parts,
-        found=first if is_one else {"sets": [each.json_document() for each in sets]},
-        passed=not any(each.counts["error"] for each in sets),
+        found=first if is_single else {"sets": [audited_set.json_document() for audited_set in sets]},
+        passed=not any(audited_set.counts["error"] for audited_set in sets),
         kind="measured",
         command="sets audit",
     )
@@ -140,9 +141,9 @@ def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Sect
             for change in changes(audited_set.parameter_set, parent)
         ]
         count = count_of(len(rows), "value") if rows else "nothing"
-        said = f"{name} changes {count} of its parent {parent.name}"
-        parts.append(Section(said=[said], columns=columns_of(("value", parent.name, name, "origin"), rows), left=4))
-    shown = [
+        sentence = f"{name} changes {count} of its parent {parent.name}"
+        parts.append(Section(said=[sentence], columns=columns_of(("value", parent.name, name, "origin"), rows), left=4))
+    listed = [
         finding
         for finding in findings
         if changed is None
@@ -151,11 +152,11 @@ def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Sect
         or any(value.path in changed for value in finding.values)
     ]
     summary = ", ".join(count_of(count, severity) for severity, count in audited_set.counts.items())
-    left = len(findings) - len(shown)
-    if left:
-        concern = "concerns" if left == 1 else "concern"
-        summary += f"; {left} of them {concern} no changed value: --all"
-    return [*parts, *(Section(said=_lines(finding)) for finding in shown), Section(said=[f"{name}: {summary}"])]
+    hidden = len(findings) - len(listed)
+    if hidden:
+        concern = "concerns" if hidden == 1 else "concern"
+        summary += f"; {hidden} of them {concern} no changed value: --all"
+    return [*parts, *(Section(said=_lines(finding)) for finding in listed), Section(said=[f"{name}: {summary}"])]
 
 
 def _lines(finding: AuditFinding) -> list[str]:
@@ -163,8 +164,7 @@ def _lines(finding: AuditFinding) -> list[str]:
     for value in finding.values:
         text = value.value if isinstance(value.value, str) else f"{value.value:.6g} {value.unit}".rstrip()
         lines.append(f"{_INDENT}{value.path} = {text} ({value.origin})")
-    lines += textwrap.wrap(finding.paragraph, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
-    if finding.accepted:
-        accepted = f"Accepted by the set: {finding.accepted}"
-        lines += textwrap.wrap(accepted, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
+    accepted = [f"Accepted by the set: {finding.accepted}"] if finding.accepted else []
+    for paragraph in (finding.paragraph, *accepted):
+        lines += textwrap.wrap(paragraph, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
     return lines

@@ -213,6 +213,6 @@ def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     # A configuration or a metric in one of the two documents alone would be looked up in vain.
     has_same_names = names == described.configurations.keys() == described.completed_by_configuration.keys()
     metrics = document["metrics"].keys()
-    if not has_same_names or any(own.keys() != metrics for own in described.configurations.values()):
+    if not has_same_names or any(table.keys() != metrics for table in described.configurations.values()):
         raise DataError(f"{whose}: its configurations and metrics differ from {MANIFEST}")
     return finding_of(StudyResults(stored, document, summary))

@@ -48,7 +48,7 @@ _CAPTION = (
 )
 
 
-def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Section:
+def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence[str]) -> Section:
     """Return the figure of a study: panels of the metrics, and bands over time.
 
     A grid of two axes is drawn as maps, two drawn values as coloured points, all else as one panel for each metric.
@@ -59,12 +59,12 @@ def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]
         metric for metric in all_metrics if any(described[metric]["count"] for described in results.metrics.values())
     ]
     metrics = (with_values or all_metrics)[:MOST_METRICS]
-    # As many as colours that can be told apart.
+    # No more configurations than distinguishable colours.
     names = results.configurations[:MOST_CONFIGURATIONS]
-    # The size of a seed says nothing.
+    # The value of a seed has no meaning.
     varied = [path for path in results.varied if path != NOISE]
     grid = [number["path"] for number in study.get("vary", ()) if number["kind"] in _GRIDDED]
-    # Over two paths each metric of a configuration is a panel, a map of a grid or points; else one a metric.
+    # Over two paths each configuration has a panel of each metric, a map or points; else all share one panel.
     is_mapped = 2 in (len(grid), len(varied))
     title = f"{results.name}, {results.summary['completed']:,} runs"
     if not is_mapped and len(varied) > 1:
@@ -73,7 +73,7 @@ def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]
     is_compared = is_mapped and len(names) > 1
     count = len(metrics) + len(study["outputs"].get("bands", ()))
     return Section(
-        said=said,
+        said=sentences,
         remarks=remarks,
         panels=partial(_panels, results, metrics, names, varied, grid),
         name=FIGURE,
@@ -121,20 +121,20 @@ def _kind(results: StudyResults, path: str) -> Kind:
 
 def _histogram(results: StudyResults, metric: str) -> Panel:
     """Return a panel with the histogram of a metric for every configuration."""
-    parts = {name: values[np.isfinite(values)] for name, values in results.thin(metric, MAXIMUM_DRAWN).items()}
-    filled = [values for values in parts.values() if values.size]
-    edges = np.zeros(2)
+    values_by_name = {name: values[np.isfinite(values)] for name, values in results.thin(metric, MAXIMUM_DRAWN).items()}
+    filled = [values for values in values_by_name.values() if values.size]
+    marks = []
     if filled:
-        low, high = min(float(part.min()) for part in filled), max(float(part.max()) for part in filled)
-        is_counted = high - low < _HISTOGRAM_BINS and all(bool(np.all(part == np.round(part))) for part in filled)
-        bins = min(_HISTOGRAM_BINS, max(8, round(sum(part.size for part in filled) ** 0.5)))
-        # A bin for each whole number where values are counts of few kinds: others would be empty now and then.
-        edges = np.arange(low - 0.5, high + 1.0) if is_counted else np.linspace(low, high or low + 1.0, 1 + bins)
-    marks = [
-        Mark("bars", edges, np.histogram(own, edges)[0], label=name, colour=colour)
-        for (name, own), colour in zip(parts.items(), COLOURS, strict=False)
-        if filled
-    ]
+        low, high = min(float(values.min()) for values in filled), max(float(values.max()) for values in filled)
+        are_whole = all(bool(np.all(values == np.round(values))) for values in filled)
+        if are_whole and high - low < _HISTOGRAM_BINS:
+            # A bin for each whole number where values are counts of few kinds: others would be empty now and then.
+            edges = np.arange(low - 0.5, high + 1.0)
+        else:
+            bins = min(_HISTOGRAM_BINS, max(8, round(sum(values.size for values in filled) ** 0.5)))
+            edges = np.linspace(low, high or low + 1.0, 1 + bins)
+        for (name, values), colour in zip(values_by_name.items(), COLOURS, strict=False):
+            marks.append(Mark("bars", edges, np.histogram(values, edges)[0], label=name, colour=colour))
     return Panel(metric_kind(results, metric), Kind(), marks, then=lambda axes: axes.set_yticks([]))
 
 
@@ -243,12 +243,12 @@ def _band(results: StudyResults, channel: str, names: Sequence[str]) -> Panel:
     pairs = [(low, high) for low, high in zip(fractions, reversed(fractions), strict=True) if low < high]
     marks = []
     for name, colour in zip(names, COLOURS, strict=False):
-        own = (table["configuration"] == name) & (table["channel"] == channel)
+        rows = (table["configuration"] == name) & (table["channel"] == channel)
         for pair, opacity in zip(pairs, _OPACITIES, strict=False):
-            ends = np.stack([table[f"q{fraction:g}"][own] for fraction in pair])
-            marks.append(Mark("band", table["time"][own], ends, colour=colour, style={"alpha": opacity}))
+            ends = np.stack([table[f"q{fraction:g}"][rows] for fraction in pair])
+            marks.append(Mark("band", table["time"][rows], ends, colour=colour, style={"alpha": opacity}))
         if _MEDIAN in fractions:
-            marks.append(Mark("line", table["time"][own], table["q0.5"][own], label=name, colour=colour))
+            marks.append(Mark("line", table["time"][rows], table["q0.5"][rows], label=name, colour=colour))
     kind = of_channel(channel, CHANNELS[channel].unit)
     percentages = ", ".join(f"{100.0 * fraction:g}" for fraction in fractions)
     title = f"{percentages} % of runs below"

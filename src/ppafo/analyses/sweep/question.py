@@ -80,21 +80,21 @@ def sweep_into_folder(
         "maximum_failed": maximum_failed,
     }
     # What is not given has the default of ``estimate``.
-    of_statistic = {name: value for name, value in optional.items() if value is not None}
+    options = {name: value for name, value in optional.items() if value is not None}
     if statistic is None:
-        unused = [*(["metric"] if metric is not None else []), *of_statistic]
+        unused = [*(["metric"] if metric is not None else []), *options]
         if unused:
             raise StudyError(f"{unused[0]}: needs a statistic, for example --statistic mean --metric rms_error")
         from ppafo.analyses.sweep.answer import write_report
         from ppafo.analyses.sweep.solve import INTERRUPTED, INTERRUPTED_AT_ONCE, is_begun, sweep
 
         chosen = study_of(study, overrides, draws, seed)
-        place = out or Path("out") / chosen.name
+        target = out or Path("out") / chosen.name
         try:
-            swept = sweep(chosen, threads=threads, out=place, agreed=agreed, progress=progress)
+            swept = sweep(chosen, threads=threads, out=target, agreed=agreed, progress=progress)
             write_report(swept.found)
         except KeyboardInterrupt:
-            raise KeyboardInterrupt(INTERRUPTED if is_begun(chosen, place) else INTERRUPTED_AT_ONCE) from None
+            raise KeyboardInterrupt(INTERRUPTED if is_begun(chosen, target) else INTERRUPTED_AT_ONCE) from None
         return swept
     if metric is None:
         raise StudyError(f"statistic '{statistic}': needs a metric, for example --metric rms_error")
@@ -106,8 +106,8 @@ def sweep_into_folder(
     # Before anything is drawn: a folder of something else must cost no time.
     check_owned_folder(folder, marked_folder("sweep"))
     if draws is not None:
-        of_statistic["draws"] = draws
-    of_statistic |= {"seed": seed, "threads": threads, "progress": progress}
-    estimated = estimate(chosen, metric=metric, statistic=statistic, **of_statistic)
+        options["draws"] = draws
+    options |= {"seed": seed, "threads": threads, "progress": progress}
+    estimated = estimate(chosen, metric=metric, statistic=statistic, **options)
     estimated.save(folder)
     return replace(estimated, found=replace(estimated.found, folder=str(folder)))

@@ -95,10 +95,10 @@ class StudyResults:
     def trajectories(self, channel: str) -> np.ndarray[Any, Any]:
         """Return a stored channel of all runs, shape (runs, samples), nan for failed runs and after a fall."""
         outputs = self.document["study"]["outputs"]
-        kept = list(dict.fromkeys([*outputs.get("trajectories", ()), *outputs.get("bands", ())]))
-        if channel not in kept:
+        stored = list(dict.fromkeys([*outputs.get("trajectories", ()), *outputs.get("bands", ())]))
+        if channel not in stored:
             raise StudyError(
-                f"no trajectories of '{channel}' were kept{nearest_name(channel, kept)}; available: {kept}"
+                f"no trajectories of '{channel}' were kept{nearest_name(channel, stored)}; available: {stored}"
             )
         column = trace_column(channel)
         return np.concatenate([matrix_of(part.column(column)) for part in self.chunks([column])])
@@ -123,10 +123,10 @@ class StudyResults:
         step = -(-int(self.document["runs"]) // maximum) | 1
         thinned = {}
         for name in self.configurations:
-            parts, first = [], 0
+            parts, start = [], 0
             for table in self.chunks([column], name):
-                parts.append(table.column(column).to_numpy()[first::step])
-                first = (first - table.num_rows) % step
+                parts.append(table.column(column).to_numpy()[start::step])
+                start = (start - table.num_rows) % step
             thinned[name] = np.concatenate(parts)
         return thinned
 
@@ -141,9 +141,9 @@ class StudyResults:
         # No chunk holds runs of two configurations, and each configuration has the same number of them.
         numbers = range(self.document["chunks"])
         if configuration is not None:
-            own = len(numbers) // len(self.configurations)
-            start = own * self.configurations.index(configuration)
-            numbers = numbers[start : start + own]
+            chunks_of_each = len(numbers) // len(self.configurations)
+            start = chunks_of_each * self.configurations.index(configuration)
+            numbers = numbers[start : start + chunks_of_each]
         return stored_rows(self.folder, numbers, columns)
 
     def json_document(self) -> dict[str, Any]:

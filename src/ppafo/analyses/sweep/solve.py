@@ -11,7 +11,7 @@ import math
 import os
 import platform
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -152,9 +152,9 @@ def _band(
     """
     column, at_once = trace_column(channel), max(1, MAXIMUM_IN_MEMORY // study.runs_of_configuration)
     counts, levels = [], []
-    for first in range(0, samples, at_once):
+    for start in range(0, samples, at_once):
         parts = results.chunks([column], configuration)
-        values = np.concatenate([matrix_of(part.column(column))[:, first : first + at_once] for part in parts])
+        values = np.concatenate([matrix_of(part.column(column))[:, start : start + at_once] for part in parts])
         counts.append(np.count_nonzero(np.isfinite(values), axis=0))
         levels.append(sorted_quantiles(np.sort(values, axis=0), counts[-1], study.outputs.quantiles))
     return np.concatenate(counts), np.concatenate(levels, axis=1)
@@ -247,7 +247,7 @@ def sweep(
     folder = study_folder(kept.name if kept is not None else str(out))
     warn_of_coarse_pairs(configuration.scenario for configuration in chosen.configurations)
     store = StudyStore.claim(chosen, folder, agreed, threads)
-    _work(store, threads, progress)
+    _compute_missing_chunks(store, threads, progress)
     results = StudyResults(folder, read_manifest(folder), {}, kept)
     summary = _summary(chosen, results)
     if chosen.outputs.bands:
@@ -269,29 +269,39 @@ def studies_of_the_package() -> list[dict[str, Any]]:
     return [{"name": study.name, "runs": study.runs, "description": study.description} for study in studies]
 
 
-def _work(store: StudyStore, threads: int | None, progress: Report | None) -> None:
+def _compute_missing_chunks(store: StudyStore, threads: int | None, progress: Report | None) -> None:
     """Compute the missing chunks, and add a line on this process to the log."""
     study, folder, started = store.study, store.folder, time.monotonic()
     known = store.finished()
-    earlier, missing = sum(block.runs for block in known), set(range(chunk_count(study)))
-    missing -= {block.number for block in known}
-    tally = RunCounter(study.runs, progress, earlier, sum(block.failed for block in known))
-
-    def count(finished: FinishedChunk) -> None:
-        tally.add(finished.runs, finished.failed)
-
+    earlier = sum(chunk.runs for chunk in known)
+    counter = RunCounter(study.runs, progress, earlier, sum(chunk.failed for chunk in known))
+    missing = sorted(set(range(chunk_count(study))) - {chunk.number for chunk in known})
     # Rows change below: an old summary would pass for a finished study meanwhile.
     if missing and SUMMARY in folder.names():
         folder.remove(SUMMARY)
-    _compute(store, sorted(missing), threads, count)
+
+    def count(writing: Future[FinishedChunk]) -> None:
+        chunk = writing.result()
+        counter.add(chunk.runs, chunk.failed)
+
+    # Each chunk is written while the next one is computed.
+    with ThreadPoolExecutor(1, "ppafo-writing") as writer:
+        writing: Future[FinishedChunk] | None = None
+        for number in missing:
+            computed = compute_chunk(study, number, threads)
+            if writing is not None:
+                count(writing)
+            writing = writer.submit(store.write, *computed)
+        if writing is not None:
+            count(writing)
     line = {
         "ended": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         "machine": platform.platform(),
         "processors": os.cpu_count(),
         "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
         "threads": threads,
-        "runs": tally.done - earlier,
-        "failed": tally.failed,
+        "runs": counter.done - earlier,
+        "failed": counter.failed,
         "seconds": round(time.monotonic() - started, 3),
     }
     try:
@@ -300,18 +310,3 @@ def _work(store: StudyStore, threads: int | None, progress: Report | None) -> No
     except OSError:
         before = b""
     folder.write(LOG, before + f"{json.dumps(line)}\n".encode())
-
-
-def _compute(
-    store: StudyStore, numbers: Iterable[int], threads: int | None, finish: Callable[[FinishedChunk], None]
-) -> None:
-    """Compute chunks one after the other, writing each while the next is computed."""
-    with ThreadPoolExecutor(1, "ppafo-writing") as writer:
-        writing: Future[FinishedChunk] | None = None
-        for number in numbers:
-            computed = compute_chunk(store.study, number, threads)
-            if writing is not None:
-                finish(writing.result())
-            writing = writer.submit(store.write, *computed)
-        if writing is not None:
-            finish(writing.result())

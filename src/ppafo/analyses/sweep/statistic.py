@@ -12,7 +12,7 @@ import numpy as np
 
 from ppafo.analyses.sweep.statistic_answer import finding_of, kind_of, remarks_on
 from ppafo.analyses.sweep.statistic_kind import FEWEST_SEEN, Statistic, parse_statistic
-from ppafo.analyses.sweep.stopping import InterimEstimate, OfMean, StatisticEstimate, StoppingRule, stopping_rule
+from ppafo.analyses.sweep.stopping import InterimEstimate, MetricMean, StatisticEstimate, StoppingRule, target_width
 from ppafo.arguments import Confidence, Count, MaximumFailed, Name, Overrides, Seed, Threads, checked
 from ppafo.documents.json_text import plain
 from ppafo.errors import at_fault
@@ -95,16 +95,17 @@ def estimate(
     check_metrics((metric,), base.scenario)
     with at_fault("also"):
         check_metrics(also, base.scenario)
-    wanted = tuple(dict.fromkeys((metric, *also)))
-    what = parse_statistic(statistic, metric, atmosphere_of(base.scenario, {*uncertainty.paths, *uncertainty.same}))
+    metrics = tuple(dict.fromkeys((metric, *also)))
+    parsed = parse_statistic(statistic, metric, atmosphere_of(base.scenario, {*uncertainty.paths, *uncertainty.same}))
     # A probability may be 0, of which a fraction says nothing: its width is a difference.
-    asked = width or (PROBABILITY_WIDTH if what.threshold is not None else DEFAULT_WIDTH)
-    rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
+    width_text = width or (PROBABILITY_WIDTH if parsed.threshold is not None else DEFAULT_WIDTH)
+    target = target_width(parsed, metric, width_text)
+    rule = StoppingRule(*target, first_draws, draws, confidence, maximum_failed)
     warn_of_coarse_pairs([base.scenario])
-    runs = scenario_runs(base.scenario, wanted, RunCounter(rule.first, progress), uncertainty.gauge, threads)
+    runs = scenario_runs(base.scenario, metrics, RunCounter(rule.first, progress), uncertainty.gauge, threads)
     with shown_in(chosen.shown_for(base.scenario)):
-        first = chosen.sample.seed if seed is None else seed
-        return draw_until(runs, uncertainty, metric, what, rule, first, wanted[1:])
+        seed = chosen.sample.seed if seed is None else seed
+        return draw_until(runs, uncertainty, metric, parsed, rule, seed, metrics[1:])
 
 
 def draw_until(
@@ -158,7 +159,7 @@ def draw_until(
     further = {}
     for name in also:
         mean = floored_interval(rows[name], REPLICATES, rule.confidence_of_look)
-        further[name] = OfMean(int(np.count_nonzero(np.isfinite(rows[name]))), mean.value, mean.low, mean.high)
+        further[name] = MetricMean(int(np.count_nonzero(np.isfinite(rows[name]))), mean.value, mean.low, mean.high)
     estimated = StatisticEstimate(
         metric=metric,
         statistic=statistic.label,

@@ -32,16 +32,16 @@ def remarks_on(
     last: InterimEstimate, values: Floats, statistic: Statistic, kind: Kind, noise: ConfidenceInterval | None
 ) -> list[str]:
     """Return remarks on estimates that few draws dominate, on values not drawn, and on sensor noise."""
-    said = []
+    sentences = []
     are_equal = values.size > 0 and float(np.ptp(values)) == 0.0
     known = last.draws - last.missing
     if not last.is_carried and are_equal:
-        said.append(
+        sentences.append(
             f"do not trust this interval: all {known:,} values are equal, so the distance of a rare one is unknown; "
             f"draw at least {FEWEST_SEEN:,}"
         )
     elif not last.is_carried:
-        said.append(
+        sentences.append(
             f"do not trust this interval: the mean has an effective sample size of {last.effective_size:.3g} of "
             f"{known:,} draws, so that the true value lies outside more often than stated; request a quantile or a "
             "probability"
@@ -54,13 +54,13 @@ def remarks_on(
         )
         if are_equal:
             moved = f"it would shift the mean by up to {share:.2g} times its distance from it"
-        said.append(
+        sentences.append(
             f"an outcome of fewer than {100.0 * share:.2g} % of the runs may be missing from these draws (95 %): "
             f"{moved}"
         )
     if noise is not None:
-        said.append(f"sensor noise causes {fraction_text(noise)} of the variance over the draws")
-    return said
+        sentences.append(f"sensor noise causes {fraction_text(noise)} of the variance over the draws")
+    return sentences
 
 
 def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: StoppingRule) -> Finding[StatisticEstimate]:
@@ -142,8 +142,8 @@ def _panels(estimated: StatisticEstimate, kind: Kind, rule: StoppingRule, thresh
     )
     bins = min(_MAXIMUM_BINS, max(10, int(np.sqrt(estimated.values.size))))
     counts, edges = np.histogram(estimated.values, bins)
-    at = last if threshold is None else threshold
-    histogram = (Mark("bars", edges, counts), Mark("at", at, colour=VERMILION, style={"linewidth": 1.4}))
+    mark = last if threshold is None else threshold
+    histogram = (Mark("bars", edges, counts), Mark("at", mark, colour=VERMILION, style={"linewidth": 1.4}))
     return [
         Panel(Kind("Draws"), kind, trace, label, then=lambda axes: axes.set_xscale("log", base=2)),
         Panel(of_metric(estimated.metric), Kind("Draws"), histogram, f"{estimated.values.size:,} values"),

@@ -6,7 +6,7 @@ the stated confidence all intervals of the trace hold at the same time, includin
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from ppafo.analyses.sweep.statistic_kind import Statistic
@@ -71,18 +71,18 @@ class StoppingRule:
         return look.interval.width + look.unseen <= allowed
 
 
-def stopping_rule(statistic: Statistic, metric: str, width: str, like: StoppingRule) -> StoppingRule:
-    """Return a stopping rule with the target width of a text, and all other fields from ``like``."""
+def target_width(statistic: Statistic, metric: str, width: str) -> tuple[float, bool]:
+    """Return the target width of an interval from its text: number, and True if it is a fraction of the value."""
     text = width.strip()
     if statistic.threshold is not None:
         try:
-            return replace(like, width=float(number_text(text)), is_relative=False)
+            return float(number_text(text)), False
         except ValueError as error:
             raise StudyError(f"width = '{text}': for a probability give a plain number, such as 0.01") from error
     if not text.endswith("%"):
-        return replace(like, width=difference_of(text, metric, f"width = '{width}'"), is_relative=False)
+        return difference_of(text, metric, f"width = '{width}'"), False
     with refused_as(StudyError, f"width = '{text}'", UnitError):
-        return replace(like, width=parse_quantity(text, ""), is_relative=True)
+        return parse_quantity(text, ""), True
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ class InterimEstimate:
 
 
 @dataclass(frozen=True, slots=True)
-class OfMean:
+class MetricMean:
     """Mean of an additional metric [SI] over the same draws, with interval and number of draws with a value."""
 
     draws: int
@@ -137,7 +137,7 @@ class StatisticEstimate:
     failed: int
     interval: ConfidenceInterval
     remarks: list[str]
-    also: dict[str, OfMean]
+    also: dict[str, MetricMean]
     share_of_noise: ConfidenceInterval | None
     seed: int
     rule: dict[str, float | str]

@@ -242,6 +242,10 @@ class Problem:
         """Values of the gains before tuning [SI]."""
         return {gain.path: gain.before for gain in self.searched}
 
+    def bad_end(self, values: Floats, is_high: bool) -> Floats:
+        """Return the unfavourable end of values (candidates, draws) [SI], high or low, as an array (candidates,)."""
+        return values[:, 0] if self.spread is None else self.spread.bad_end(values, is_high)
+
     @property
     def gauge(self) -> frozenset[str]:
         """Searched and drawn paths whose values are gauge pressures, relative to the atmosphere of their run."""

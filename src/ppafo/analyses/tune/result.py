@@ -46,8 +46,8 @@ def agreement(starts: Sequence[SearchStart]) -> float:
     """
     best = starts[0]
     # Of an infeasible cost only what the violation adds is compared: a hundredth of the offset would take in all.
-    beyond = best.cost - INFEASIBLE if best.cost >= INFEASIBLE else best.cost
-    as_good = [start for start in starts if start.cost <= best.cost + _AS_GOOD * abs(beyond)]
+    scale = best.cost - INFEASIBLE if best.cost >= INFEASIBLE else best.cost
+    as_good = [start for start in starts if start.cost <= best.cost + _AS_GOOD * abs(scale)]
     return max(float(np.max(np.abs(np.subtract(start.fractions, best.fractions)))) for start in as_good)
 
 

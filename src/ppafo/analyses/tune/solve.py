@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.analyses.tune.answer import remarks_of, verdict
-from ppafo.analyses.tune.problem import Gains, Problem, SearchEffort, Spread
+from ppafo.analyses.tune.problem import Gains, Problem, SearchEffort
 from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, GainResult, SearchStart, Tuned, UnreachableDraws
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
@@ -102,9 +102,9 @@ def _largest_runs(problem: Problem) -> int:
     """Return the number of runs of a tuning in which no start converges early."""
     effort, gains, spread = problem.effort, len(problem.searched), problem.spread
     # The first candidates are a generation of their own.
-    of_start = gains * (effort.candidates_per_gain * (effort.generations + 1) + _REFINEMENTS)
+    runs_of_start = gains * (effort.candidates_per_gain * (effort.generations + 1) + _REFINEMENTS)
     # Beside the candidates, the gains before run for the scales and for their result, and the gains found once.
-    in_search = effort.starts * of_start + 3
+    in_search = effort.starts * runs_of_start + 3
     if spread is None:
         return in_search
     # Both results run over fresh draws too, and the first of these again with other noise.
@@ -158,26 +158,21 @@ class _CandidateScores:
         return np.where(self.without_value > 0.0, UNUSABLE * (1.0 + self.without_value), usual)
 
 
-def bad_ends(values: Floats, spread: Spread | None, is_high: bool) -> Floats:
-    """Return the value of a metric (candidates,) that judges each candidate, from (candidates, draws) [SI]."""
-    return values[:, 0] if spread is None else spread.bad_end(values, is_high)
-
-
 def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float]) -> _CandidateScores:
     """Return objective and violation of candidates; ``scales`` are the scales of the goals by metric [SI]."""
     failing = runs.without_value
     # Candidates with failed runs are ranked by how many fail: 0 keeps nan out of the sums meanwhile.
     known = {name: np.where(failing[:, None] > 0.0, 0.0, values) for name, values in runs.judged.items()}
-    objective, violation, spread = np.zeros(failing.size), np.zeros(failing.size), problem.spread
+    objective, violation = np.zeros(failing.size), np.zeros(failing.size)
     for goal in problem.goals:
-        objective += goal.weight * bad_ends(known[goal.metric], spread, goal.weight > 0.0) / scales[goal.metric]
+        objective += goal.weight * problem.bad_end(known[goal.metric], goal.weight > 0.0) / scales[goal.metric]
     for constraint in problem.constraints:
-        reached = bad_ends(known[constraint.metric], spread, constraint.is_most)
-        beyond = reached - constraint.limit if constraint.is_most else constraint.limit - reached
+        reached = problem.bad_end(known[constraint.metric], constraint.is_most)
+        excess = reached - constraint.limit if constraint.is_most else constraint.limit - reached
         # As a fraction of the limit, so that constraints in different units add up; a limit of 0 has no fractions.
-        violation += np.maximum(0.0, beyond) / (abs(constraint.limit) or 1.0)
+        violation += np.maximum(0.0, excess) / (abs(constraint.limit) or 1.0)
     # A loop that does not follow its reference violates a constraint that holds in every tuning.
-    off = np.maximum(0.0, bad_ends(runs.off, spread, True))
+    off = np.maximum(0.0, problem.bad_end(runs.off, True))
     return _CandidateScores(objective=objective, violation=violation, off=off, without_value=failing)
 
 
@@ -258,8 +253,8 @@ def _is_settled(costs: Floats) -> bool:
     if most >= UNUSABLE or least < INFEASIBLE <= most:
         return False
     # Where all break a constraint, what counts is by how much they break it.
-    beyond = costs - INFEASIBLE if least >= INFEASIBLE else costs
-    return float(np.std(beyond)) <= _TOLERANCE * abs(float(np.mean(beyond)))
+    excess = costs - INFEASIBLE if least >= INFEASIBLE else costs
+    return float(np.std(excess)) <= _TOLERANCE * abs(float(np.mean(excess)))
 
 
 def _metrics_of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> CandidateMetrics:
@@ -299,7 +294,7 @@ def _scales(problem: Problem, before: CandidateMetrics) -> dict[str, float]:
     for goal in problem.goals:
         scale = goal.scale
         if scale is None:
-            scale = abs(float(bad_ends(before.judged[goal.metric], problem.spread, goal.weight > 0.0)[0]))
+            scale = abs(float(problem.bad_end(before.judged[goal.metric], goal.weight > 0.0)[0]))
         if not np.isfinite(scale) or scale == 0.0:
             raise StudyError(
                 f"tuning '{problem.name}': objective '{goal.metric}' is {scale:g} before tuning, which cannot be "
@@ -362,15 +357,21 @@ def _unreachable_draws(
     for constraint in problem.constraints:
         values, is_most = runs.judged[constraint.metric], constraint.is_most
         follows = bool(METRICS[constraint.metric].of_reference)
-        if not follows or constraint.is_kept(float(bad_ends(values, spread, is_most)[0])):
+        if not follows or constraint.is_kept(float(problem.bad_end(values, is_most)[0])):
             continue
         # An error is never below what the supply lacks: where that alone is too much, no gains can keep the limit.
         is_mean = spread is None or spread.fraction is None
-        least = np.mean(lacking, axis=1) if is_mean else bad_ends(lacking, spread, True)
-        is_out_of_reach = constraint.metric in MINIMUM_ERRORS and is_most and not constraint.is_kept(float(least[0]))
+        smallest_error = np.mean(lacking, axis=1) if is_mean else problem.bad_end(lacking, True)
+        is_out_of_reach = (
+            constraint.metric in MINIMUM_ERRORS and is_most and not constraint.is_kept(float(smallest_error[0]))
+        )
         # Else the draws that lack nothing must keep it alone; a standard deviation needs two of them.
-        rest = values[:, lacking[0] == 0.0]
-        if is_out_of_reach or rest.shape[1] < 2 or constraint.is_kept(float(bad_ends(rest, spread, is_most)[0])):
+        within_reach = values[:, lacking[0] == 0.0]
+        if (
+            is_out_of_reach
+            or within_reach.shape[1] < 2
+            or constraint.is_kept(float(problem.bad_end(within_reach, is_most)[0]))
+        ):
             explained.append(constraint.metric)
     return UnreachableDraws(float(np.mean(lacking > 0.0)), tuple(explained) if lacking.any() else ())
 
@@ -392,4 +393,4 @@ def _values(metrics: Mapping[str, Floats], problem: Problem) -> dict[str, float]
     less |= {
         constraint.metric: constraint.is_most for constraint in problem.constraints if constraint.metric not in less
     }
-    return {name: float(bad_ends(metrics[name], problem.spread, less[name])[0]) for name in problem.metrics}
+    return {name: float(problem.bad_end(metrics[name], less[name])[0]) for name in problem.metrics}

@@ -1,6 +1,7 @@
 """Report of a validation: verdict, table of errors and panels for each recording, replayed recordings."""
 
 import re
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -20,8 +21,6 @@ from ppafo.validation.agreement import RecordingAgreement, measured_values
 from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2
 from ppafo.wording import count_of
 
-# Panels of a validation: each channel of a recording with the model, and its residual below.
-
 KIND_WORDS = {"measured": "measured", "synthetic": "synthetic measurement", "simulated": "simulated, not measured"}
 """Names of the kinds of recordings in the report: output of a model must not pass for a measurement."""
 MILLISECONDS = 1.0e3
@@ -32,6 +31,13 @@ _NEAR_LIMIT = 0.25
 _SHORT = 3.0
 """Duration [s] below which the time axis is in milliseconds."""
 
+_HEAD = ("channel", "RMS error", "in noise", "variation", "of range", "limit", "bias", "largest", "at", "verdict")
+"""Column heads of the table of errors, in the order of ``channel_cells``."""
+_UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
+"""Characters replaced in file names."""
+_WRITTEN_AS_ZERO = 5.0e-4
+"""Absolute value below which a number is written as 0."""
+
 
 def panels_across(agreement: RecordingAgreement) -> int:
     """Return the number of channels side by side in a figure: 2, or 1 if there is only one channel."""
@@ -39,13 +45,22 @@ def panels_across(agreement: RecordingAgreement) -> int:
 
 
 def agreement_panels(agreement: RecordingAgreement) -> list[Panel]:
-    """Return two panels for each channel of a recording."""
-    pairs = [_channel_panels(agreement, channel) for channel in agreement.channels]
+    """Return the panels of a recording in rows: samples with the model, and their residuals below."""
+    samples, residuals = [], []
+    for channel in agreement.channels:
+        upper, lower = _channel_panels(agreement, channel)
+        samples.append(upper)
+        residuals.append(lower)
     across = panels_across(agreement)
-    rows = [pairs[first : first + across] for first in range(0, len(pairs), across)]
-    empty = (Panel(TIME, TIME, ()), Panel(TIME, TIME, (), tall=0.5))
-    filled = [[*row, *[empty] * (across - len(row))] for row in rows]
-    return [panel for row in filled for line in zip(*row, strict=True) for panel in line]
+    # An odd number of channels leaves one place in the last row empty.
+    if len(samples) % across:
+        samples.append(Panel(TIME, TIME, ()))
+        residuals.append(Panel(TIME, TIME, (), tall=0.5))
+    panels: list[Panel] = []
+    for start in range(0, len(samples), across):
+        row = slice(start, start + across)
+        panels += [*samples[row], *residuals[row]]
+    return panels
 
 
 def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement) -> list[Panel]:
@@ -55,12 +70,12 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement) ->
     assert measurement is not None, "a channel that is compared was measured"
     is_short, is_chamber = measured.duration < _SHORT, name in (PRESSURE_1, PRESSURE_2)
     time, scale = (Kind("Time", "ms"), MILLISECONDS) if is_short else (TIME, 1.0)
-    shown, limit = COMPARED[name], channel.limit * channel.full_range
+    quantity, limit = COMPARED[name], channel.limit * channel.full_range
     is_first = channel is agreement.channels[0]
-    course = FittedCurve(
+    curve = FittedCurve(
         time=time,
-        level=Kind(shown.title, "", "pressure" if is_chamber else shown.quantity),
-        change=Kind(f"Measured - model, RMS {100 * channel.fraction:.2g} %", "", shown.quantity),
+        level=Kind(quantity.title, "", "pressure" if is_chamber else quantity.quantity),
+        change=Kind(f"Measured - model, RMS {100 * channel.fraction:.2g} %", "", quantity.quantity),
         times=scale * measured.time,
         samples=measurement,
         # The measurement is late by the delay, so the model is read that much earlier.
@@ -68,44 +83,31 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement) ->
         names=(KIND_WORDS[measured.kind], "model on the recorded inputs") if is_first else ("", ""),
         colour=_LOOKS.get(name, ACTUAL).colour,
     )
-    is_near = float(np.abs(course.model - measurement).max()) >= _NEAR_LIMIT * limit
-    return course_panels(course, "dots", "figure" if is_first else "", (-limit, limit) if is_near else ())
-
-
-_HEAD = ("channel", "RMS error", "in noise", "variation", "of range", "limit", "bias", "largest", "at", "verdict")
-"""Column heads of the table of errors, in the order of ``channel_cells``."""
-_UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
-"""Characters replaced in file names."""
-_WRITTEN_AS_ZERO = 5.0e-4
-"""Absolute value below which a number is written as 0."""
+    is_near = float(np.abs(curve.model - measurement).max()) >= _NEAR_LIMIT * limit
+    return course_panels(curve, "dots", "figure" if is_first else "", (-limit, limit) if is_near else ())
 
 
 @in_units(lambda validation: validation.device.shown)
 def finding_of(validation: Validation) -> Finding[Validation]:
     """Return a validation as a finding; passed if every error is within its limit."""
-    stems = [
-        _UNUSUAL.sub("-", Path(agreement.file).stem).strip("-.") or "recording" for agreement in validation.recordings
-    ]
-    names = [
-        f"{stem}-{1 + stems[:index].count(stem)}" if stems.count(stem) > 1 else stem for index, stem in enumerate(stems)
-    ]
+    names = _file_stems([agreement.file for agreement in validation.recordings])
     kinds = {agreement.measured.kind for agreement in validation.recordings}
     pairs = list(zip(names, validation.recordings, strict=True))
-    said, unmeasured = [verdict(validation)], sorted(kinds - {"measured"})
+    sentences, unmeasured = [verdict(validation)], sorted(kinds - {"measured"})
     # The verdict must not be read without these.
     if unmeasured:
-        said.append(
+        sentences.append(
             f"Not everything here was measured: {', '.join(KIND_WORDS[kind] for kind in unmeasured)}. Agreement with "
             "such a recording shows how well two models agree, not how well the model agrees with a device."
         )
     if validation.overrides:
-        said.append(f"values changed: {', '.join(validation.overrides)}")
+        sentences.append(f"values changed: {', '.join(validation.overrides)}")
     hashes = [(recording.file, f"sha256 {recording.sha256}") for recording in validation.recordings if recording.sha256]
     return Finding(
         name="validate",
         kicker="Validation of a parameter set",
         title=f"{validation.device.name} against {count_of(len(validation.recordings), 'recording')}",
-        said=said,
+        said=sentences,
         parts=(
             Section(said=[_method(validation)], is_detail=True),
             *(_part(name, agreement) for name, agreement in pairs),
@@ -121,6 +123,15 @@ def finding_of(validation: Validation) -> Finding[Validation]:
     )
 
 
+def _file_stems(files: Sequence[str]) -> list[str]:
+    """Return the stems of the written files of recordings, numbered if recordings have one name."""
+    stems: list[str] = []
+    names = [_UNUSUAL.sub("-", Path(file).stem).strip("-.") or "recording" for file in files]
+    for index, name in enumerate(names):
+        stems.append(f"{name}-{1 + names[:index].count(name)}" if names.count(name) > 1 else name)
+    return stems
+
+
 def _method(validation: Validation) -> str:
     """Return a text on the computation of the errors."""
     return (
@@ -134,10 +145,10 @@ def _method(validation: Validation) -> str:
 def _part(name: str, agreement: RecordingAgreement) -> Section:
     """Return the section of one recording: table of errors, and panels. ``name`` is the stem of its files."""
     measured, kind = agreement.measured, KIND_WORDS[agreement.measured.kind]
-    late = f"{MILLISECONDS * agreement.delay.correction:.3g} ms" if agreement.delay.correction else "none found"
+    delay = f"{MILLISECONDS * agreement.delay.correction:.3g} ms" if agreement.delay.correction else "none found"
     replayed = (
         f"{len(measured)} samples over {measured.duration:.4g} s; inputs from the recording: "
-        f"{', '.join(agreement.inputs)}; delay of the measurement: {late}"
+        f"{', '.join(agreement.inputs)}; delay of the measurement: {delay}"
     )
     across = panels_across(agreement)
     return Section(

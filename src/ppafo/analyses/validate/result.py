@@ -75,10 +75,14 @@ def verdict(validation: Validation) -> str:
         if not channel.passes
     )
     why = _why(validation.causes, worst.in_noise, validation.passes)
-    rest = "nothing but noise is left" if validation.causes.is_noise else "; ".join([size, *([why] if why else [])])
+    explanation = (
+        "nothing but noise is left" if validation.causes.is_noise else "; ".join([size, *([why] if why else [])])
+    )
     if not validation.passes:
-        return f"{name} does not agree: {failed}; {rest}"
-    return f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {rest}"
+        return f"{name} does not agree: {failed}; {explanation}"
+    return (
+        f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {explanation}"
+    )
 
 
 def _why(causes: Diagnosis, without: float, passes: bool) -> str:
@@ -99,8 +103,8 @@ def _why(causes: Diagnosis, without: float, passes: bool) -> str:
     explains = nearest is not None and (nearest.is_of_samples or nearest.left <= _EXPLAINS * without)
     if nearest is None or not explains:
         return "no single change explains it"
-    left = _times(nearest.left)
-    return f"no single change explains it; nearest: {in_words(nearest)}, which leaves {left} times the noise"
+    residual = _times(nearest.left)
+    return f"no single change explains it; nearest: {in_words(nearest)}, which leaves {residual} times the noise"
 
 
 def _times(size: float) -> str:
@@ -116,8 +120,8 @@ def in_words(cause: ResidualCause) -> str:
     # An atmosphere in gauge pressure says nothing.
     absolute = unit == "Pa_a"
     quantity = "pressure change" if absolute else quantity_of_unit(unit)
-    shown = Kind("", "" if unit == "-" else unit, quantity).text(value)
-    return f"{cause.in_words} ({shown})"
+    text = Kind("", "" if unit == "-" else unit, quantity).text(value)
+    return f"{cause.in_words} ({text})"
 
 
 def _cause_data(cause: ResidualCause | None) -> dict[str, Any] | None:

@@ -44,8 +44,6 @@ from ppafo.walking.safety_events import event_lines, failure_times
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import WalkComparison
 
-# What is said of a walk's safety: what is fitted, pressures far above the supply, less help over time.
-
 _OVER_TIME = (
     "Gas, toes and phases over the whole walk. The strip at the bottom shows where the controller helps, only lifts "
     "the foot, pauses or has stopped. A solid line is where there is less help, a dashed one where something fails."
@@ -71,21 +69,23 @@ def safety_remarks(worn: WalkResult) -> list[str]:
     limit = settings.get("largest_torque", math.inf)
     cut = [f"controller.{name} = {_TORQUE.text(settings[name])}" for name in PEAKS if settings.get(name, 0.0) > limit]
     if cut:
-        shown = _TORQUE.text(limit)
+        limit_text = _TORQUE.text(limit)
         # The default limit is the largest torque of the device.
         is_given = "controller.largest_torque" not in scenario.links
         advice = "raise that too" if is_given else "the actuator gives no more at this supply"
-        remarks.append(f"{', '.join(cut)}: the request is limited by controller.largest_torque = {shown}; {advice}")
+        remarks.append(
+            f"{', '.join(cut)}: the request is limited by controller.largest_torque = {limit_text}; {advice}"
+        )
     # Where the foot drives the vane to its end, it compresses a chamber far above its supply.
-    for channel, words, given in (
+    for channel, words, set_pressure in (
         ("pressure_1", "chamber 1", supply.pressure),
         ("pressure_2", "chamber 2", supply.dorsiflexion_pressure),
     ):
         largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
-        if largest > _FAR_ABOVE * given:
-            reached, fed = (quantity_text(value, "pressure") for value in (largest, given))
+        if largest > _FAR_ABOVE * set_pressure:
+            reached, supply_text = (quantity_text(value, "pressure") for value in (largest, set_pressure))
             remarks.append(
-                f"the pressure in {words} reaches {reached}, and its supply is set to {fed}: "
+                f"the pressure in {words} reaches {reached}, and its supply is set to {supply_text}: "
                 "actuator, valves and tubing must withstand that"
             )
     if not worn.events:
@@ -95,7 +95,7 @@ def safety_remarks(worn: WalkResult) -> list[str]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WalkPair:
+class _WalkPair:
     """Result of a walk with the device and of the same walk without it, as printed and saved.
 
     ``tracking`` is the verdict on a torque that does not follow the controller's request, with the remedies tried; None
@@ -123,28 +123,22 @@ class WalkPair:
 SCHEMA_VERSION = 1
 REVERSALS_PER_STRIDE, LARGEST_TORQUE = "reversals_per_stride", "largest_torque"
 _NUMBERS = (
-    ShownNumber(name="body_mass", title="Body mass of the wearer", quantity="mass", digits=1),
-    ShownNumber(name="gas", title="Gas per stride", quantity="gas mass", digits=3),
-    ShownNumber(name="total_gas", title="Gas of the whole walk", quantity="gas mass", digits=2),
-    ShownNumber(
-        name="positive_push_off_work", title="Positive work on the wearer in push-off", quantity="energy", digits=2
-    ),
-    ShownNumber(name="push_off_share", title="... of the healthy ankle's positive work", quantity="fraction", digits=1),
-    ShownNumber(name="net_push_off_work", title="Net work on the wearer in push-off", quantity="energy", digits=2),
-    ShownNumber(name="torque_error", title="Torque error where one is requested, RMS", quantity="torque", digits=2),
-    ShownNumber(name="requested_torque", title="... requested torque, RMS", quantity="torque", digits=2),
-    ShownNumber(name="peak_torque", title="Peak torque", quantity="torque", digits=1),
-    ShownNumber(name=LARGEST_TORQUE, title="... limit of the controller", quantity="torque", digits=1),
-    ShownNumber(name=REVERSALS_PER_STRIDE, title="Command reversals per stride", quantity="", digits=1),
-    ShownNumber(name="lowest_toes", title="Lowest toes over the ground in mid-swing", quantity="body length", digits=1),
-    ShownNumber(name="toe_landing", title="Strides that begin on the toes", quantity="fraction", digits=0),
-    ShownNumber(
-        name="dorsiflexor_moment", title="Moment of the wearer's dorsiflexors, mean", quantity="torque", digits=2
-    ),
-    ShownNumber(
-        name="angle_difference", title="Ankle against healthy, RMS over the stride", quantity="angle", digits=1
-    ),
-    ShownNumber(name="counted_strides", title="Strides with these means", quantity="", digits=0),
+    ShownNumber("body_mass", "Body mass of the wearer", "mass", 1),
+    ShownNumber("gas", "Gas per stride", "gas mass", 3),
+    ShownNumber("total_gas", "Gas of the whole walk", "gas mass", 2),
+    ShownNumber("positive_push_off_work", "Positive work on the wearer in push-off", "energy", 2),
+    ShownNumber("push_off_share", "... of the healthy ankle's positive work", "fraction", 1),
+    ShownNumber("net_push_off_work", "Net work on the wearer in push-off", "energy", 2),
+    ShownNumber("torque_error", "Torque error where one is requested, RMS", "torque", 2),
+    ShownNumber("requested_torque", "... requested torque, RMS", "torque", 2),
+    ShownNumber("peak_torque", "Peak torque", "torque", 1),
+    ShownNumber(LARGEST_TORQUE, "... limit of the controller", "torque", 1),
+    ShownNumber(REVERSALS_PER_STRIDE, "Command reversals per stride", "", 1),
+    ShownNumber("lowest_toes", "Lowest toes over the ground in mid-swing", "body length", 1),
+    ShownNumber("toe_landing", "Strides that begin on the toes", "fraction", 0),
+    ShownNumber("dorsiflexor_moment", "Moment of the wearer's dorsiflexors, mean", "torque", 2),
+    ShownNumber("angle_difference", "Ankle against healthy, RMS over the stride", "angle", 1),
+    ShownNumber("counted_strides", "Strides with these means", "", 0),
 )
 """Metrics in the table of a walk."""
 _EXPLAINED = (
@@ -171,7 +165,7 @@ _LIMITS = (
 
 
 @in_units(lambda comparison: comparison.with_device.scenario.device.shown)
-def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
+def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
     """Return the report of a walk with and without the device.
 
     A walk that diverged has numbers but no figures, and the report has not passed.
@@ -210,7 +204,7 @@ def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
                 "What is assumed" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True
             ),
         ),
-        found=WalkPair(comparison, verdict),
+        found=_WalkPair(comparison, verdict),
         passed=comparison.is_completed and worn.is_helped,
         files={
             "recording.nc": partial(netcdf_bytes, worn.recording, None),
@@ -253,22 +247,21 @@ def _pictures(comparison: WalkComparison) -> Sequence[Section]:
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is not None:
         return task_sequence_pictures(comparison)
-    figures: list[tuple[str, str, str, Callable[[], Any]]] = []
+    figures: list[Section] = []
+
+    def add(heading: str, name: str, caption: str, draw: Callable[[], Any]) -> None:
+        figures.append(Section(heading, name=name, caption=caption, draw=draw, is_detail=True))
+
     # A figure of an even walk over time shows nothing that the mean stride does not.
     if worn.events or failure_times(worn.scenario):
-        figures.append(("The walk over time", "over-time", _OVER_TIME, partial(whole_walk_figure, worn)))
-    walks = {"with the device": worn, "without": bare}
-    of_mean_stride = (
-        ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
-        ("", "legs-moving", _MOVING, partial(animation, comparison)),
-        ("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn)),
-        ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
-    )
-    figures += of_mean_stride if worn.averages and bare.averages else ()
-    return [
-        Section(heading, name=name, caption=caption, draw=draw, is_detail=True)
-        for heading, name, caption, draw in figures
-    ]
+        add("The walk over time", "over-time", _OVER_TIME, partial(whole_walk_figure, worn))
+    if worn.averages and bare.averages:
+        walks = {"with the device": worn, "without": bare}
+        add("The leg", "legs", _LEGS, partial(frames_figure, comparison))
+        add("", "legs-moving", _MOVING, partial(animation, comparison))
+        add("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn))
+        add("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks))
+    return figures
 
 
 def comparison_table(comparison: WalkComparison) -> list[Column]:

@@ -57,9 +57,9 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
     values, motion, peaks = supply.values, walk_of(worn.scenario), worn.peak_torques
     end = {name: float(series[-1]) for name, series in values.items()}
     filled = f"{_GAS.text(supply.supply.mass)} at {_WARMTH.text(supply.supply.temperature)}"
-    left = _GAS.text(end["bottle_mass"])
+    remaining = _GAS.text(end["bottle_mass"])
     if "liquid_mass" in values:
-        left += f", {_GAS.text(end['liquid_mass'])} of it liquid"
+        remaining += f", {_GAS.text(end['liquid_mass'])} of it liquid"
     walked = f"after {worn.helped.size} whole strides"
     # Strides are counted by time, as ``ppafo bottle`` counts them.
     if motion.task_sequence is None:
@@ -69,7 +69,7 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
         ("bottle", f"{supply.supply.bottle.title}, with {filled}"),
         ("what ended it", supply.ending.message),
         ("when", f"{_DURATION.text(supply.ending.time)}, {walked}"),
-        ("gas used", f"{_GAS.text(supply.balance.left_bottle)}, left {left}"),
+        ("gas used", f"{_GAS.text(supply.balance.left_bottle)}, left {remaining}"),
         ("bottle at the end", f"{_WARMTH.text(end['bottle_temperature'])}, {_PRESSURE.text(end['bottle_pressure'])}"),
         ("coldest gas behind the regulator", _WARMTH.text(float(values["outlet_temperature"].min()))),
         ("coldest gas at the device", _WARMTH.text(float(values["gas_temperature"].min()))),

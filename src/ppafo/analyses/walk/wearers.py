@@ -1,7 +1,6 @@
 """Report of a walk of many wearers: quantiles of outcomes and traits, as text, table and figure."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -34,51 +33,15 @@ _WEARERS_CAPTION = (
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Wearers:
-    """Result of a walk of many wearers, as printed and saved."""
-
-    population: Population
-
-    def json_document(self) -> dict[str, Any]:
-        """Return the quantiles of outcomes and traits over the wearers as plain data in SI units."""
-        population = self.population
-        return {
-            "format": WEARERS_FORMAT,
-            "schema_version": WEARERS_SCHEMA_VERSION,
-            "units": UNITS,
-            "status": {"kind": "diverged" if population.diverged else "completed", "message": population.message},
-            "wearers": population.count,
-            "diverged": population.diverged,
-            "vented": population.vented,
-            "paused": population.paused,
-            "minutes": population.minutes,
-            "seed": population.seed,
-            "varied": {
-                "body_mass": MASS_VARIATION,
-                "stature": STATURE_VARIATION,
-                "correlation": CORRELATION,
-                "thresholds": THRESHOLD_VARIATION,
-                "push_off_start": START_VARIATION,
-                "gait": "stride time, stance share and series coefficients by the deviations of the gait",
-                "most_deviations": MAXIMUM_DEVIATIONS,
-            },
-            "outcomes": quantiles(population.outcomes, OUTCOMES),
-            "traits": quantiles(population.traits, TRAITS),
-            "versions": versions(),
-            "configuration": walk_document(population.scenario),
-        }
-
-
 @in_units(lambda population: population.scenario.device.shown)
-def wearers_finding(population: Population) -> Finding[Wearers]:
+def wearers_finding(population: Population) -> Finding[dict[str, Any]]:
     """Return the report of the walks of many wearers; it has no figure if all walks diverged."""
     configuration = population.scenario
     tables = {**population.outcomes, **population.traits}
     rows = []
     for name, (title, quantity, digits) in SHOWN.items():
         values = np.quantile(tables[name], QUANTILES).tolist() if tables[name].size else [None] * len(QUANTILES)
-        rows.append(number_texts(ShownNumber(name=name, title=title, quantity=quantity, digits=digits), values))
+        rows.append(number_texts(ShownNumber(name, title, quantity, digits), values))
     remarks = [*person_remarks(configuration)]
     if population.vented:
         remarks.append(f"safe state: the controllers of {population.vented} wearers vented both chambers permanently")
@@ -104,7 +67,7 @@ def wearers_finding(population: Population) -> Finding[Wearers]:
             ),
             *([figure] if population.count else []),
         ),
-        found=Wearers(population),
+        found=wearers_data(population),
         passed=not population.diverged,
         files={"wearers.csv": partial(csv_of, columns)},
         command="walk",
@@ -123,4 +86,33 @@ def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, tuple[str, str]
             else {},
         }
         for name, (unit, summary) in numbers.items()
+    }
+
+
+def wearers_data(population: Population) -> dict[str, Any]:
+    """Return the quantiles of outcomes and traits over the wearers as plain data in SI units."""
+    return {
+        "format": WEARERS_FORMAT,
+        "schema_version": WEARERS_SCHEMA_VERSION,
+        "units": UNITS,
+        "status": {"kind": "diverged" if population.diverged else "completed", "message": population.message},
+        "wearers": population.count,
+        "diverged": population.diverged,
+        "vented": population.vented,
+        "paused": population.paused,
+        "minutes": population.minutes,
+        "seed": population.seed,
+        "varied": {
+            "body_mass": MASS_VARIATION,
+            "stature": STATURE_VARIATION,
+            "correlation": CORRELATION,
+            "thresholds": THRESHOLD_VARIATION,
+            "push_off_start": START_VARIATION,
+            "gait": "stride time, stance share and series coefficients by the deviations of the gait",
+            "most_deviations": MAXIMUM_DEVIATIONS,
+        },
+        "outcomes": quantiles(population.outcomes, OUTCOMES),
+        "traits": quantiles(population.traits, TRAITS),
+        "versions": versions(),
+        "configuration": walk_document(population.scenario),
     }

@@ -43,11 +43,12 @@ def rig_simulate(
     find_experiment(experiment)
     with blame_out_option():
         check_rig_folder(out, experiment)
-    made = record(experiment, preset, seed, device, overrides, valve)
-    files = write_rig_recording(out, made)
-    counted = f"{len(made.recording)} samples of {', '.join(made.recording.names)}"
-    text = f"{experiment}: {NOTICE}\n{counted}\nwritten: {out} ({', '.join(files)})"
-    return CommandOutput(text, {"folder": str(out), "files": list(files), **made.truth})
+    rig_recording = record(experiment, preset, seed, device, overrides, valve)
+    files = write_rig_recording(out, rig_recording)
+    recording = rig_recording.recording
+    samples = f"{len(recording)} samples of {', '.join(recording.names)}"
+    text = f"{experiment}: {NOTICE}\n{samples}\nwritten: {out} ({', '.join(files)})"
+    return CommandOutput(text, {"folder": str(out), "files": list(files), **rig_recording.truth})
 
 
 def rig_record(
@@ -86,19 +87,20 @@ def rig_record(
     from ppafo.interrupts import stop_by_interrupt
     from ppafo.storage.comma_separated import write_csv
 
-    wire = open_port(port, baud, listens=True)
+    link = open_port(port, baud, listens=True)
     try:
         output.tell(f"listening at {port}")
         with stop_by_interrupt() as is_stopped, kept_aside(out) as keep:
-            found = record(wire, out.stem, duration, patience, is_stopped, keep=keep)
-            write_csv(out, found.recording)
-        is_broken = bool(wire.failure)
+            collected = record(link, out.stem, duration, patience, is_stopped, keep=keep)
+            write_csv(out, collected.recording)
+        is_broken = bool(link.failure)
     finally:
-        wire.close()
-    code = output.EXIT_INTERRUPTED if found.is_stopped else output.EXIT_CHECK_FAILED if is_broken else output.EXIT_GOOD
-    aside = f"stopped; {out} is whole" if found.is_stopped else ""
-    document = {"file": str(out), **found.document()}
-    return output.CommandOutput(f"{found.text()}\nwritten: {out}", document, exit_code=code, aside=aside)
+        link.close()
+    code, aside = output.EXIT_CHECK_FAILED if is_broken else output.EXIT_GOOD, ""
+    if collected.is_stopped:
+        code, aside = output.EXIT_INTERRUPTED, f"stopped; {out} is whole"
+    document = {"file": str(out), **collected.document()}
+    return output.CommandOutput(f"{collected.text()}\nwritten: {out}", document, exit_code=code, aside=aside)
 
 
 def list_rig() -> CommandOutput:

@@ -34,7 +34,7 @@ NO_STRIDE = StrideSample(**dict.fromkeys(StrideSample._fields, 0.0))
 
 
 def make_sample(parts: Program, lane: Lane, elapsed: float, index: int, interval: float) -> None:
-    """Set ``lane.sample`` to the present values of a run."""
+    """Store the present values of a run as its sample."""
     pressure_1, pressure_2 = present_pressures(parts, lane)
     torque = parts.actuator.torque(lane.plant, lane.state.angle, pressure_1, pressure_2)
     time = elapsed * lane.timing.step
@@ -164,7 +164,7 @@ def search_final_hold(parts: Program, lane: Lane, interval: float, index: int) -
 
 
 def sample_with_summary(parts: Program, lane: Lane, elapsed: float, index: int, interval: float) -> None:
-    """Set ``lane.sample``, and extend the summary of a monotone reference, whose hold is found during the run."""
+    """Store the sample, and extend the summary of a monotone reference, whose hold is found during the run."""
     make_sample(parts, lane, elapsed, index, interval)
     if parts.follows_reference and parts.reference.is_monotone:
         lane.course = advance_course(lane.course, lane.sample)

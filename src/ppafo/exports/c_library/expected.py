@@ -20,8 +20,7 @@ def expected_csv(scenario: Scenario, channels: Iterable[str], metrics: Iterable[
     names = [name for name in channels if name in recording.names]
     columns = [recording.time, *(recording[name] for name in names)]
     last = len(recording) - 1
-    chosen = [*range(0, last, math.ceil(last / MOST_ROWS) or 1), last]
-    rows = (",".join(f"{column[row]:.17g}" for column in columns) for row in chosen)
-    found = [name for name in metrics if name in result.metrics]
-    said = (f"# {name} = {result.metrics[name].value:.17g}" for name in found)
-    return "\n".join([",".join(["time", *names]), *rows, *said, ""]).encode()
+    samples = [*range(0, last, math.ceil(last / MOST_ROWS) or 1), last]
+    rows = (",".join(f"{column[sample]:.17g}" for column in columns) for sample in samples)
+    values = (f"# {name} = {result.metrics[name].value:.17g}" for name in metrics if name in result.metrics)
+    return "\n".join([",".join(["time", *names]), *rows, *values, ""]).encode()

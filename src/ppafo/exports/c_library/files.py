@@ -96,7 +96,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "description": "\n * ".join(textwrap.wrap(in_comment(library.description), 110)),
         "about": in_markdown(library.description),
         "version": __version__,
-        "settings": _members((setting.name, setting.quantity.unit, _said(setting.quantity)) for setting in settings),
+        "settings": _members((setting.name, setting.quantity.unit, _meaning(setting.quantity)) for setting in settings),
         "outputs": _members(
             (("time", "s", "since the start"), *((output, *OUTPUTS[output]) for output in program.outputs))
         ),
@@ -137,13 +137,13 @@ def _returning(conditions: Iterable[tuple[str, str]]) -> str:
 def _members(items: Iterable[tuple[str, str, str]]) -> str:
     """C declarations of struct members, each with unit and meaning as a comment."""
     lines = []
-    for name, unit, said in items:
-        comment = in_comment(f"{UNITS.get(unit, unit) or '-'}: {said}")
+    for name, unit, meaning in items:
+        comment = in_comment(f"{UNITS.get(unit, unit) or '-'}: {meaning}")
         lines.append(f"    double {name}; /* {comment} */")
     return "\n".join(lines)
 
 
-def _said(quantity: Quantity) -> str:
+def _meaning(quantity: Quantity) -> str:
     """Meaning and range of a parameter as text."""
     low, high = (limit if abs(limit) < math.inf else None for limit in (quantity.minimum, quantity.maximum))
     beyond = "from" if quantity.minimum_allowed else "above"

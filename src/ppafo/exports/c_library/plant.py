@@ -46,7 +46,7 @@ Assignment = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class _Drive:
     """External drive of a plant: its command, its other inputs, and the motion of its joint within a step.
 
     ``motion`` describes the motion in words. ``settings`` assigns the first inputs to settings of the run.
@@ -62,7 +62,7 @@ class Drive:
 
 
 @dataclass(frozen=True, slots=True)
-class PlantAlone:
+class _PlantAlone:
     """Plant driven from outside: its library, its drive, and the input interval ``step`` [s].
 
     ``clock`` is the path of the setting for this interval: the engine step, or the controller period if parts of the
@@ -70,7 +70,7 @@ class PlantAlone:
     """
 
     library: Library
-    drive: Drive
+    drive: _Drive
     hidden: frozenset[str]
     step: float
     clock: str
@@ -90,7 +90,7 @@ _PATH = "motion.profile."
 """Prefixes of the paths replaced by inputs: in any plant, and in a plant with an ankle driven by inputs."""
 
 
-def plant_of(scenario: Scenario) -> PlantAlone:
+def plant_of(scenario: Scenario) -> _PlantAlone:
     """Return the plant of a scenario; inputs are a torque for a free joint, angle and rate for a locked joint.
 
     A joint on a path defined by the scenario and a device on a walking leg take only the command.
@@ -103,18 +103,19 @@ def plant_of(scenario: Scenario) -> PlantAlone:
         plant = replace(plant, motion=PrescribedMotion(ProfileChoice("ramp_hold", settings)))
     library = library_of(plant)
     drive = _drive_of(scenario.motion, {setting.path: setting for setting in library.settings})
-    taken = {variable.name for variable in (drive.command, *drive.inputs)}
+    input_names = {variable.name for variable in (drive.command, *drive.inputs)}
     references = {kind.reference for kind in CONTROLLED.values()}
-    outputs = tuple(name for name in library.program.outputs if name not in taken | references)
+    outputs = tuple(name for name in library.program.outputs if name not in input_names | references)
     # Metrics need a whole run, which only the caller sees.
-    whole = replace(library.program.program, meters=(), traced=outputs)
+    program = replace(library.program.program, meters=(), traced=outputs)
     # Where a locked joint may take its steps whole, this one does as long as it stands still.
-    rests = "angle" in taken and whole.feed is None and not whole.actuator.gives
-    program = replace(whole, rests_whole=rests)
-    beginnings = (*_REPLACED, _PATH) if "angle" in taken else _REPLACED
+    is_turned = "angle" in input_names
+    rests_whole = is_turned and program.feed is None and not program.actuator.gives
+    program = replace(program, rests_whole=rests_whole)
+    beginnings = (*_REPLACED, _PATH) if is_turned else _REPLACED
     replaced = {setting.path for setting in library.settings if setting.path.startswith(beginnings)}
     clock = SAMPLES if plant.controller.period > plant.run.step else STEPS
-    return PlantAlone(
+    return _PlantAlone(
         library=replace(library, program=ExportedProgram(program, ()), rules=()),
         drive=drive,
         hidden=frozenset(replaced.union(_WITHOUT_EFFECT, {SAMPLES} - {clock})),
@@ -124,9 +125,9 @@ def plant_of(scenario: Scenario) -> PlantAlone:
 
 
 @singledispatch
-def _drive_of(motion: Motion, _settings: Mapping[str, ExportParameter]) -> Drive:
+def _drive_of(motion: Motion, _settings: Mapping[str, ExportParameter]) -> _Drive:
     """Return the external drive of a plant with this motion, within the ranges of its settings: here a walk."""
-    walks = Drive(motion="The leg walks on by its gait.", command=WALKING_COMMAND)
+    walks = _Drive(motion="The leg walks on by its gait.", command=WALKING_COMMAND)
     if not (isinstance(motion, WalkMotion) and motion.shut_off):
         return walks
     safe_state = ("controller.safe_state", "{safe_state}")
@@ -138,16 +139,16 @@ _FIRST_RAMP = 0.0078125
 
 
 @_drive_of.register
-def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParameter]) -> Drive:
+def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParameter]) -> _Drive:
     """Return the drive of a prescribed joint: inputs angle and rate if locked, no input if on a path."""
     if motion.locked_angle is None:
-        return Drive(motion="The ankle goes along the path that the scenario has.")
+        return _Drive(motion="The ankle goes along the path that the scenario has.")
     stop_1, stop_2 = settings["actuator.angle_min"].value, settings["actuator.angle_max"].value
     # So fast that the short ramp of the first angle still ends within what a level may be.
     fastest = (settings["motion.profile.level"].quantity.maximum - max(abs(stop_1), abs(stop_2))) / _FIRST_RAMP
     start = motion.locked_angle
     summary = "angle of the ankle, 90 deg neutral, growing in plantarflexion"
-    return Drive(
+    return _Drive(
         motion=(
             "From there on the angle goes on with the angular velocity that is given; the next step begins at the next "
             "angle."
@@ -172,7 +173,7 @@ def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParamete
 
 
 @_drive_of.register
-def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -> Drive:
+def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -> _Drive:
     """Return the drive of a free joint: T_ex on a vane without leg, or T_2, opposed to T_ex, on the ankle of a leg."""
     name, summary, load = "external_torque", "T_ex, above 0 against plantarflexion", ""
     start = motion.external_torque
@@ -181,7 +182,7 @@ def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -
         start = motion.leg.ankle_torque
     limits = settings[f"motion.{name}"].quantity
     torque = Input(name, "N m", f"torque on the ankle, {summary}", start, limits.minimum, limits.maximum)
-    return Drive(
+    return _Drive(
         motion="The torque is constant until the next one.",
         inputs=(torque,),
         settings=((c_identifier(f"motion.{name}"), f"{{{name}}}"),),
@@ -207,7 +208,7 @@ def half_open(scenario: Scenario) -> Scenario:
     return replace(plant, controller=command, run=replace(plant.run, duration=duration))
 
 
-def with_api(alone: PlantAlone) -> PlantAlone:
+def with_api(alone: _PlantAlone) -> _PlantAlone:
     """Return the plant with a library API that takes its inputs at each step."""
     names = [variable.name for variable in alone.inputs]
     by_name = {name: name for name in names}
@@ -249,12 +250,12 @@ def with_api(alone: PlantAlone) -> PlantAlone:
     return replace(alone, library=replace(alone.library, api=api))
 
 
-def _as_clock(alone: PlantAlone) -> tuple[str, ...]:
+def _as_clock(alone: _PlantAlone) -> tuple[str, ...]:
     """Names of the other time settings that must equal the input interval: controller period and output interval."""
     return tuple(c_identifier(path) for path in (SAMPLES, "run.output_interval") if path != alone.clock)
 
 
-def follow_lines(alone: PlantAlone, settings: str, inputs: Mapping[str, str]) -> str:
+def follow_lines(alone: _PlantAlone, settings: str, inputs: Mapping[str, str]) -> str:
     """Return C lines that assign the ``inputs``, C expressions by name, to the struct at pointer ``settings``."""
     return "\n".join(
         f"    {settings}->{field} = {expression.format(settings=settings, **inputs)};"

@@ -19,8 +19,7 @@ from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, HANDED
 from ppafo.engine.linking import link_program
 from ppafo.engine.loop_text import LOOP_ARRAYS, LOOP_NUMBERS, lane_loop, run_loop
 from ppafo.engine.program import Program
-from ppafo.engine.replacements import Replacements
-from ppafo.engine.source_text import SourceCollector, composed_lines
+from ppafo.engine.source_text import Replacements, SourceCollector, composed_lines
 from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_of, struct_of_numbers
 from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, Further, places_of
 from ppafo.metrics.metric import ReadAt, Readings
@@ -91,7 +90,8 @@ def c_text_of_run(
     ``name`` is the prefix of the structs of settings and metrics, which the enclosing file declares. ``further`` may
     add functions that take ``settings``.
     """
-    from ppafo.translation.c99 import ReadableUnit, c_source, documents_of, is_free
+    from ppafo.translation.c99 import ReadableUnit, c_source, documents_of
+    from ppafo.translation.c_terms import is_free
     from ppafo.translation.walk import walk_module
 
     collector = _collector()

@@ -57,13 +57,13 @@ def words_of_walk(walk: Scenario, links: Graph, failing: "Mapping[str, FaultSett
 
     faults = [f"{sensor} `{fault.kind}`" for sensor, fault in failing.items()]
     gait, sequence = walk_of(walk).gait, walk_of(walk).task_sequence
-    way = "stride after equal stride"
+    strides = "stride after equal stride"
     if sequence is not None:
-        way = f"the task sequence `{sequence.name}`, which stays as it is"
+        strides = f"the task sequence `{sequence.name}`, which stays as it is"
     fixed = [
         f"the gait, `{gait.name}`: its series, its events and its stride of {gait.stride_time:.4g} s are numbers in "
         f"the source",
-        f"how it is walked: {way}",
+        f"how it is walked: {strides}",
         f"the valve, `{walk.device.valve.kind}`, and the controller, `{walk.controller.kind}`",
         *_fixed_of_device(walk),
         f"which sensors fail, and how: {', '.join(faults) or 'none'}; and whether one is late",
@@ -79,11 +79,11 @@ def words_of_walk(walk: Scenario, links: Graph, failing: "Mapping[str, FaultSett
 
 def _followers(links: Graph) -> str:
     """Return the README line on parameters that follow others."""
-    said = []
+    followers = []
     for path, follows in links.items():
         sources = dict.fromkeys(f"`{c_identifier(source)}`" for link in follows for source in link.sources)
-        said.append(f"`{c_identifier(path)}` ({', '.join(sources)})")
-    return _FOLLOWS.format(followers=", ".join(said) or "none")
+        followers.append(f"`{c_identifier(path)}` ({', '.join(sources)})")
+    return _FOLLOWS.format(followers=", ".join(followers) or "none")
 
 
 def _fixed_of_device(scenario: Scenario) -> list[str]:
@@ -95,7 +95,7 @@ def _fixed_of_device(scenario: Scenario) -> list[str]:
     lines = "with lines behind the regulators" if scenario.supply_lines is not None else "constant supply pressures"
     effects = ", ".join(f"`{effect.name}`" for effect in effects_of(device) if effect.switch)
     gas = "thermal" if scenario.gas_model is not None else "isothermal"
-    let = "let" if device.supply.takes_back else "do not let"
+    verb = "let" if device.supply.takes_back else "do not let"
     return [
         *(
             f"the form of the {name}, `sonic_conductance, critical_ratio`"
@@ -103,7 +103,7 @@ def _fixed_of_device(scenario: Scenario) -> list[str]:
             else f"the form of the {name}, `area, discharge_coefficient`"
             for name, orifice in forms.items()
         ),
-        f"the gas, `{gas}`; {lines}, which {let} gas back in from a chamber above them",
+        f"the gas, `{gas}`; {lines}, which {verb} gas back in from a chamber above them",
         *([f"the effects, {effects}, none of which can be switched off"] if effects else []),
     ]
 
@@ -112,8 +112,8 @@ def _at_zero(device: Device, flaws: Sequence[float]) -> str:
     """Return the README text on parameters that select functions and are 0."""
     zero = [f"`valve_{name}`" for name in choosing(device) if not device.valve.settings[name] > 0.0]
     flawless = [] if any(flaws) else ["what makes a sensor of `sensors_` less than ideal"]
-    here = ", ".join([*zero, *flawless]) or "none"
-    return f"which of the settings of the valve and of the sensors are 0: here 0 are {here}"
+    names = ", ".join([*zero, *flawless]) or "none"
+    return f"which of the settings of the valve and of the sensors are 0: here 0 are {names}"
 
 
 def _listed(items: Sequence[str]) -> str:

@@ -18,7 +18,7 @@ from ppafo.simulation.profiles import TOLERANCE
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import parse_quantity
 
-SAID = {
+_DESCRIPTIONS = {
     "run.step": "longest step of the engine",
     "run.output_interval": "time from one sample to the next",
     "controller.period": "time between two decisions of the controller",
@@ -55,7 +55,7 @@ def export_parameters(
         ExportParameter(
             c_identifier(path),
             path,
-            replace(quantity, summary=SAID.get(path, quantity.summary)),
+            replace(quantity, summary=_DESCRIPTIONS.get(path, quantity.summary)),
             times[path] if path in times else number_at(scenario, path),
         )
         for path, quantity in declared.items()
@@ -71,10 +71,10 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
         ("sensors.delay", "at most", "run.duration", 0.0),
     ]
     # A vane that stays at an angle, or starts there.
-    stays = path_of_locked_angle(scenario) or LOCKED_ANGLE
-    if stays in declared_settings(scenario):
-        rules.append((stays, "at least", "actuator.angle_min", TOLERANCE))
-        rules.append((stays, "at most", "actuator.angle_max", TOLERANCE))
+    start_angle = path_of_locked_angle(scenario) or LOCKED_ANGLE
+    if start_angle in declared_settings(scenario):
+        rules.append((start_angle, "at least", "actuator.angle_min", TOLERANCE))
+        rules.append((start_angle, "at most", "actuator.angle_max", TOLERANCE))
     if scenario.supply_lines is not None:
         rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure", 0.0))
     rules = [rule for rule in rules if c_identifier(rule[0]) not in second_chamber(scenario)]

@@ -16,28 +16,28 @@ FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trappi
 """Compiler flags for results bit-identical to the package."""
 HIDDEN = ("-shared", "-fPIC", "-fvisibility=hidden")
 """Compiler flags of a shared library that exports only the functions of FMI."""
-_ANOTHER = "install gcc, clang or 'pip install ppafo[native]' anew"
+_REMEDY = "install gcc, clang or 'pip install ppafo[native]' anew"
 """Remedy in messages if a compiler cannot be run."""
 
 
 @dataclass(frozen=True, slots=True)
-class Platform:
+class _Platform:
     """Platform: its folder in a unit of FMI 2 (None: unsupported) and of FMI 3, compiler target and file suffix.
 
-    ``tried`` names the systems on which the authors ran the binary of this platform.
+    ``trial`` tells how the authors ran the binary of this platform.
     """
 
     folder_2: str | None
     folder_3: str
     target: str
     suffix: str
-    tried: str
+    trial: str
 
 
 PLATFORMS = {
-    "linux64": Platform("linux64", "x86_64-linux", "x86_64-linux-gnu.2.17", ".so", "run in the tests"),
-    "win64": Platform("win64", "x86_64-windows", "x86_64-windows-gnu", ".dll", "run under Wine"),
-    "linux-aarch64": Platform(None, "aarch64-linux", "aarch64-linux-gnu.2.17", ".so", "run under qemu"),
+    "linux64": _Platform("linux64", "x86_64-linux", "x86_64-linux-gnu.2.17", ".so", "run in the tests"),
+    "win64": _Platform("win64", "x86_64-windows", "x86_64-windows-gnu", ".dll", "run under Wine"),
+    "linux-aarch64": _Platform(None, "aarch64-linux", "aarch64-linux-gnu.2.17", ".so", "run under qemu"),
 }
 """Platforms by name."""
 
@@ -63,11 +63,11 @@ def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
         library = Path(folder) / f"unit{PLATFORMS[name].suffix}"
         # Windows has the mathematics in its C library.
         mathematics = [] if name == "win64" else ["-lm"]
-        done = asked([*command, main, "-o", library.name, *mathematics], _ANOTHER, folder, Path(folder))
+        done = asked([*command, main, "-o", library.name, *mathematics], _REMEDY, folder, Path(folder))
         if done.returncode != 0:
             raise ProgramError(f"{command[0]} does not build the library for {name}: {complaint(done)}")
         if not library.is_file():
-            raise ProgramError(f"{command[0]} returned 0 but made no library for {name}; {_ANOTHER}")
+            raise ProgramError(f"{command[0]} returned 0 but made no library for {name}; {_REMEDY}")
         return library.read_bytes()
 
 

@@ -27,29 +27,29 @@ class _Fmi2:
         self.library = library
         library.fmi2Instantiate.restype = c_void_p
         words = (c_char_p(_NAME), c_int(_CO_SIMULATION), c_char_p(token.encode()), c_char_p(None))
-        self.own = c_void_p(library.fmi2Instantiate(*words, c_void_p(None), c_int(0), c_int(0)))
+        self.instance = c_void_p(library.fmi2Instantiate(*words, c_void_p(None), c_int(0), c_int(0)))
 
     def begin(self, numbers: Any, values: Any) -> int:
         """Set the inputs and initialise up to the first sample; return the status."""
         experiment = (c_int(0), c_double(0.0), c_double(0.0), c_int(0), c_double(0.0))
         return int(
-            self.library.fmi2SetupExperiment(self.own, *experiment)
-            or self.library.fmi2EnterInitializationMode(self.own)
-            or self.library.fmi2SetReal(self.own, numbers, c_size_t(len(numbers)), values)
-            or self.library.fmi2ExitInitializationMode(self.own)
+            self.library.fmi2SetupExperiment(self.instance, *experiment)
+            or self.library.fmi2EnterInitializationMode(self.instance)
+            or self.library.fmi2SetReal(self.instance, numbers, c_size_t(len(numbers)), values)
+            or self.library.fmi2ExitInitializationMode(self.instance)
         )
 
     def advance(self, time: float, length: float) -> int:
         """Perform one communication step of ``length`` [s] from ``time`` [s]; return the status."""
-        return int(self.library.fmi2DoStep(self.own, c_double(time), c_double(length), c_int(1)))
+        return int(self.library.fmi2DoStep(self.instance, c_double(time), c_double(length), c_int(1)))
 
     def read(self, numbers: Any, values: Any) -> int:
         """Read outputs into ``values``; return the status."""
-        return int(self.library.fmi2GetReal(self.own, numbers, c_size_t(len(numbers)), values))
+        return int(self.library.fmi2GetReal(self.instance, numbers, c_size_t(len(numbers)), values))
 
     def close(self) -> None:
         """Free the instance."""
-        self.library.fmi2FreeInstance(self.own)
+        self.library.fmi2FreeInstance(self.instance)
 
 
 @final
@@ -62,31 +62,31 @@ class _Fmi3:
         flags = (c_bool(False),) * 4
         nothing = (c_void_p(None), c_size_t(0), c_void_p(None), c_void_p(None), c_void_p(None))
         words = (c_char_p(_NAME), c_char_p(token.encode()), c_char_p(None))
-        self.own = c_void_p(library.fmi3InstantiateCoSimulation(*words, *flags, *nothing))
+        self.instance = c_void_p(library.fmi3InstantiateCoSimulation(*words, *flags, *nothing))
 
     def begin(self, numbers: Any, values: Any) -> int:
         """Set the inputs and initialise up to the first sample; return the status."""
         count = c_size_t(len(numbers))
         experiment = (c_bool(False), c_double(0.0), c_double(0.0), c_bool(False), c_double(0.0))
         return int(
-            self.library.fmi3EnterInitializationMode(self.own, *experiment)
-            or self.library.fmi3SetFloat64(self.own, numbers, count, values, count)
-            or self.library.fmi3ExitInitializationMode(self.own)
+            self.library.fmi3EnterInitializationMode(self.instance, *experiment)
+            or self.library.fmi3SetFloat64(self.instance, numbers, count, values, count)
+            or self.library.fmi3ExitInitializationMode(self.instance)
         )
 
     def advance(self, time: float, length: float) -> int:
         """Perform one communication step of ``length`` [s] from ``time`` [s]; return the status."""
         flags, last = [ctypes.byref(c_bool()) for _ in range(3)], ctypes.byref(c_double())
-        return int(self.library.fmi3DoStep(self.own, c_double(time), c_double(length), c_bool(True), *flags, last))
+        return int(self.library.fmi3DoStep(self.instance, c_double(time), c_double(length), c_bool(True), *flags, last))
 
     def read(self, numbers: Any, values: Any) -> int:
         """Read outputs into ``values``; return the status."""
         count = c_size_t(len(numbers))
-        return int(self.library.fmi3GetFloat64(self.own, numbers, count, values, count))
+        return int(self.library.fmi3GetFloat64(self.instance, numbers, count, values, count))
 
     def close(self) -> None:
         """Free the instance."""
-        self.library.fmi3FreeInstance(self.own)
+        self.library.fmi3FreeInstance(self.instance)
 
 
 def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> None:
@@ -101,22 +101,27 @@ def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> No
     inputs = {item.name: EXAMPLE if item.name == "command" else item.start for item in interface.inputs}
     with temporary_folder("ppafo-unit", {"unit": library}) as folder:
         try:
-            loaded = ctypes.CDLL(str(Path(folder, "unit")))
+            functions = ctypes.CDLL(str(Path(folder, "unit")))
         except OSError as error:
             raise ProgramError(
                 f"{interface.library.title}: the FMU was built but cannot be loaded here: {error}"
             ) from error
-        instance: _Fmi2 | _Fmi3 = _Fmi2(loaded, token) if fmi == 2 else _Fmi3(loaded, token)
+        instance: _Fmi2 | _Fmi3 = _Fmi2(functions, token) if fmi == 2 else _Fmi3(functions, token)
         with closing(instance):
-            given = _array(c_uint, [numbers[name] for name in inputs]), _array(c_double, list(inputs.values()))
-            shown, found = _array(c_uint, [numbers[name] for name in outputs]), (c_double * len(outputs))()
-            status, before = instance.begin(*given), 0.0
+            output_numbers = _array(c_uint, [numbers[name] for name in outputs])
+            values = (c_double * len(outputs))()
+            status = instance.begin(
+                _array(c_uint, [numbers[name] for name in inputs]), _array(c_double, list(inputs.values()))
+            )
+            previous_time = 0.0
             for time, *expected in rows:
-                status = status or (instance.advance(before, time - before) if time > 0.0 else 0)
-                status, before = status or instance.read(shown, found), time
-                for name, value, wanted in zip(outputs, found, expected, strict=True):
-                    if status or value != wanted:
-                        problem = f"{name} is {value!r}, Python has {wanted!r}" if not status else "a call fails"
+                if time > 0.0:
+                    status = status or instance.advance(previous_time, time - previous_time)
+                status = status or instance.read(output_numbers, values)
+                previous_time = time
+                for name, value, python_value in zip(outputs, values, expected, strict=True):
+                    if status or value != python_value:
+                        problem = f"{name} is {value!r}, Python has {python_value!r}" if not status else "a call fails"
                         raise ProgramError(
                             f"{interface.library.title}: the FMU differs from the Python run at {time:g} s: {problem}; "
                             f"nothing is written"

@@ -50,14 +50,14 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     # The token is the hash of the sources before it stands in them.
     sources = {name: content.replace(b"@token@", token.encode()) for name, content in sources.items()}
     main = f"fmi{fmi}.c"
-    tried = "".join(f"<tr><td>{name}</td><td>{platform.tried}</td></tr>" for name, platform in chosen.items())
+    trials = "".join(f"<tr><td>{name}</td><td>{platform.trial}</td></tr>" for name, platform in chosen.items())
     words = {
         "title": html.escape(interface.library.title),
         "description": html.escape(interface.library.description),
         "version": __version__,
         "time": interface.time,
         "tuning": interface.tuning,
-        "binaries": tried or "<tr><td>none</td><td></td></tr>",
+        "binaries": trials or "<tr><td>none</td><td></td></tr>",
         "main": main,
         "flags": " ".join(FLAGS),
     }

@@ -78,9 +78,9 @@ def variables_of(interface: Interface) -> tuple[FmuVariable, ...]:
         if tuning != "hidden":
             ends = (quantity.minimum, quantity.maximum)
             limits = (limit if abs(limit) < _LARGEST_LIMIT else None for limit in ends)
-            said = quantity.summary or quantity.name
+            meaning = quantity.summary or quantity.name
             variables.append(
-                FmuVariable(setting.path, number, quantity.unit, said, "parameter", tuning, setting.value, *limits)
+                FmuVariable(setting.path, number, quantity.unit, meaning, "parameter", tuning, setting.value, *limits)
             )
     first_output = len(library.settings)
     for number, name in enumerate(program.outputs, start=first_output):
@@ -90,7 +90,7 @@ def variables_of(interface: Interface) -> tuple[FmuVariable, ...]:
         variables.append(
             FmuVariable(f"metrics.{metric.name}", number, metric.unit, metric.summary, "local", "continuous")
         )
-    for number, given in enumerate(interface.inputs, start=first_metric + len(program.metrics)):
-        taken = given.start, given.minimum, given.maximum
-        variables.append(FmuVariable(given.name, number, given.unit, given.summary, "input", "continuous", *taken))
+    for number, item in enumerate(interface.inputs, start=first_metric + len(program.metrics)):
+        values = item.start, item.minimum, item.maximum
+        variables.append(FmuVariable(item.name, number, item.unit, item.summary, "input", "continuous", *values))
     return tuple(variables)

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.errors import DataError, raise_noted
-from ppafo.gait.gait import HARMONICS, FitError
+from ppafo.gait.gait import HARMONICS, FitError, fit_curve
 from ppafo.gait.recorded.footfalls import Stride
 from ppafo.gait.recorded.mapping import setting_text
-from ppafo.gait.recorded.walk import Signal, acceleration_of
+from ppafo.gait.recorded.signal import Signal
 from ppafo.signals.recording import Floats
 
 SAMPLES = 101
@@ -115,3 +115,14 @@ def scatter_remarks(curves: Mapping[str, CurveStatistics], errors: Mapping[str, 
     """Return a remark on each curve with unusual scatter between strides or an unusual misfit of its series."""
     scatters = _scatters(curves, errors, REMARKED_SPREAD, REMARKED_MISFIT)
     return [f"{said}: that is noise, or the walk is not steady; {_remedy()}" for _, said in scatters]
+
+
+def acceleration_of(position: Floats, harmonics: int, stride_time: float) -> Floats:
+    """Return the acceleration [m/s^2] of a position [m] over one stride with this stride time [s], at the same phases.
+
+    The mean speed is subtracted, a Fourier series is fitted, and the series is differentiated twice.
+    """
+    phase = np.linspace(0.0, 1.0, position.size)
+    # A straight line through both ends leaves a periodic rest, which a series can follow.
+    curve, _ = fit_curve(position - (position[-1] - position[0]) * phase, harmonics)
+    return curve.derivative(stride_time).derivative(stride_time).values_at(phase)

@@ -1,7 +1,6 @@
 """Detection of the strides of a recording: from force, events in the file, the shank, or one repeated cycle.
 
-Force plates do not identify the foot: each contact belongs to the foot whose shank leans over it. A record slightly
-longer than a stride, starting anywhere in it, is treated as one periodic cycle.
+A record slightly longer than a stride, starting anywhere in it, is treated as one periodic cycle.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,21 +10,23 @@ from itertools import pairwise
 
 import numpy as np
 
-from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.plausible_angles import SHANK_RANGE, check_angle_range
-from ppafo.gait.recorded.mapping import Side
+from ppafo.gait.recorded.columns import LOADS
+from ppafo.gait.recorded.contacts import UNLOADED, Contact, contacts_of
+from ppafo.gait.recorded.cycle import wrap_cycle
+from ppafo.gait.recorded.mapping import (
+    Side,
+)
+from ppafo.gait.recorded.signal import Signal, low_pass
 from ppafo.gait.recorded.table import OFF, STRIKE, MotionTable
-from ppafo.gait.recorded.walk import LOADS, CurveColumns, Signal, low_pass, with_absence
 from ppafo.wording import count_of
 
-LOADED, UNLOADED = 0.05, 0.03
-"""Thresholds of the force [body weights]: the foot is on the ground above the first, and off it below the second."""
-
-SHORTEST_CONTACT = 0.1
-"""Duration [s] below which a contact, or a time off the ground, is noise of the force plate."""
-
+FORCE, SHANK, FILE = "vertical_force", "shank_angle", "events of the file"
+"""Sources of strides."""
+LEAST_STRIDES = 2
+"""Default of the least number of strides; it is 1 for a walk past a plate and for one cycle."""
 _SMOOTH = 6.0
 """Cut-off frequency [Hz] of the low pass for the shank angle before events are searched."""
 _SHORTEST_STRIDE = 0.5
@@ -34,6 +35,14 @@ _TOP = 0.35
 """Heel strikes lie in this upper fraction of the range of the shank angle."""
 _DEEPEST = np.radians(-15.0)
 """Shank angle [rad] that the backward lean before the swing must exceed."""
+_NEAR = 0.15
+"""Largest time difference [s] between an event found from the shank and the same event on a plate."""
+_ABOUT_STANCE = 0.05
+"""Interval at both ends of the stance [strides] that a load need not cover."""
+_COVERED = 0.9
+"""Fraction of the remaining stance that must be on the plate for a load to count in a stride."""
+_LEAST_OF_CYCLE = 0.75
+"""Shortest stride in a cycle, relative to the period of the cycle [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +64,107 @@ class Stride:
         return (self.toe_off - self.start) / self.time
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Footfalls:
+    """Strides of a walk.
+
+    ``walk`` holds the signals by name, ``events`` names the source of the strides. ``is_overground`` is True if some
+    strides are off the plates, ``is_one_cycle`` if the record is one cycle that was repeated.
+    """
+
+    walk: Mapping[str, Signal]
+    strides: list[Stride]
+    events: str
+    remarks: tuple[str, ...] = ()
+    is_overground: bool = False
+    is_one_cycle: bool = False
+
+
+def find_footfalls(
+    walk: Mapping[str, Signal],
+    tables: Sequence[MotionTable],
+    side: Side,
+    given_least: int | None,
+) -> Footfalls:
+    """Return the strides of a walk: from the force if it shows enough, otherwise from the source with more strides."""
+    least = given_least or LEAST_STRIDES
+    footfalls = _of_walk(walk, tables, side, least)
+    usable = usable_strides(walk, footfalls.strides)
+    if len(usable) >= (1 if footfalls.is_overground else least) or least > LEAST_STRIDES:
+        return footfalls
+    # A cycle must not wrap around what was bridged.
+    cycle = None if any(signal.lost is not None for signal in walk.values()) else wrap_cycle(walk)
+    if cycle is None:
+        return footfalls
+    # Three cycles in a row have one whole stride in the middle, wherever the record begins.
+    again = _of_walk(cycle.walk, (), side, 1)
+    whole = usable_strides(cycle.walk, again.strides)
+    # A record of two strides wraps around too, as one cycle that is twice as long.
+    if not whole or whole[0].time < _LEAST_OF_CYCLE * cycle.period:
+        return footfalls
+    span = walk[SHANK].time[-1] - walk[SHANK].time[0]
+    remark = (
+        f"one cycle that wraps around: {span:.3g} s of data around a stride of {cycle.period:.4g} s, whose start and "
+        f"end differ by {100.0 * cycle.misfit:.1f} % of the ranges; how much strides differ is not known"
+    )
+    return replace(again, walk=cycle.walk, strides=whole[:1], remarks=(*again.remarks, remark), is_one_cycle=True)
+
+
+def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, least: int) -> Footfalls:
+    """Return the strides from the force, if it has the ``least`` number, or from the source with more strides."""
+    recorded = _strides_of_file(tables, side)
+    if FORCE not in walk:
+        if recorded:
+            return Footfalls(walk, recorded, FILE, is_overground=True)
+        return Footfalls(walk, strides_from_shank(walk[SHANK]), SHANK)
+    forced = strides_from_force(walk[FORCE])
+    if len(usable_strides(walk, forced)) >= least:
+        return Footfalls(walk, forced, FORCE)
+    contacts = [ends for ends in contacts_of(walk[FORCE]) if ends != (None, None)]
+    if recorded and contacts and len(usable_strides(walk, recorded)) > len(usable_strides(walk, forced)):
+        return Footfalls(walk, recorded, FILE, is_overground=True)
+    leaning: list[Stride] = []
+    # The force has a stride or none, and its message says more than the shank's.
+    with suppress(DataError):
+        leaning = strides_from_shank(walk[SHANK]) if contacts else []
+    if len(usable_strides(walk, leaning)) <= len(usable_strides(walk, forced)):
+        return Footfalls(walk, forced, FORCE)
+    corrected, remark = _by_contacts(leaning, contacts)
+    return Footfalls(walk, corrected, SHANK, (remark,), is_overground=True)
+
+
+def _strides_of_file(tables: Sequence[MotionTable], side: Side) -> list[Stride]:
+    """Return the strides between the events of a foot in a C3D file; each stride needs exactly one toe-off."""
+    trials = [table.trial for table in tables if table.trial is not None]
+    # Events of two trials have two clocks.
+    if len(trials) != 1:
+        return []
+    strikes, offs = (trials[0].events.get((side, kind), []) for kind in (STRIKE, OFF))
+    between = {(start, end): [time for time in offs if start < time < end] for start, end in pairwise(strikes)}
+    # Two toe-offs between two strikes are a missed strike: such a stride is none.
+    return [Stride(start, times[0], end) for (start, end), times in between.items() if len(times) == 1]
+
+
+def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[list[Stride], str]:
+    """Return strides from the shank, with events shifted to match the contacts on plates, and a remark."""
+    shifts = [
+        (start - stride.start, end - stride.toe_off)
+        for stride in strides
+        for start, end in contacts
+        if start is not None and end is not None
+        if abs(start - stride.start) < _NEAR and abs(end - stride.toe_off) < _NEAR
+    ]
+    if not shifts:
+        return strides, "strides from the shank, which no plate corrects: heel strikes and toe-offs are less exact"
+    # Strikes and toe-offs of the shank are early or late by one time for a person, which the plates show.
+    strike, off = (float(np.mean(values)) for values in zip(*shifts, strict=True))
+    moved = [Stride(stride.start + strike, stride.toe_off + off, stride.end + strike) for stride in strides]
+    return moved, (
+        f"few contacts on plates: strides from the shank, its strikes moved by {1000.0 * strike:.0f} ms and its "
+        f"toe-offs by {1000.0 * off:.0f} ms as {count_of(len(shifts), 'contact')} on plates show"
+    )
+
+
 def strides_from_force(force: Signal) -> list[Stride]:
     """Return the whole strides in a vertical force [body weights]; thresholds with hysteresis, interpolated in time."""
     return [
@@ -62,45 +172,6 @@ def strides_from_force(force: Signal) -> list[Stride]:
         for (start, toe_off), (following, _) in pairwise(contacts_of(force))
         if start is not None and toe_off is not None and following is not None
     ]
-
-
-Contact = tuple[float | None, float | None]
-
-
-def contacts_of(force: Signal) -> list[Contact]:
-    """Return heel strike and toe-off of every contact [s]; None for an end that is outside the record."""
-    # Between both thresholds the foot is as it was before.
-    decided = np.where(force.values > LOADED, 1, np.where(force.values < UNLOADED, 0, -1))
-    known = np.flatnonzero(decided >= 0)
-    before = np.maximum.accumulate(np.where(decided >= 0, np.arange(decided.size), known[0] if known.size else 0))
-    loaded = decided[before] == 1
-    edges = [0, *(np.flatnonzero(np.diff(loaded.astype(int))) + 1).tolist(), loaded.size]
-    stretches = list(pairwise(edges))
-    time, size = force.time, loaded.size
-    # Short breaks are closed first: a contact in pieces would otherwise be dropped piece by piece.
-    joined: list[tuple[int, int]] = []
-    for first, last in stretches:
-        if not loaded[first]:
-            continue
-        if joined and time[first] - time[joined[-1][1]] < SHORTEST_CONTACT:
-            joined[-1] = joined[-1][0], last
-        else:
-            joined.append((first, last))
-    return [
-        (
-            None if first == 0 else _crossing(force, first, LOADED),
-            None if last == size else _crossing(force, last, UNLOADED),
-        )
-        for first, last in joined
-        if first == 0 or last == size or time[last] - time[first] >= SHORTEST_CONTACT
-    ]
-
-
-def _crossing(signal: Signal, index: int, level: float) -> float:
-    """Return the time [s] at which the line between the samples before and at ``index`` crosses a level."""
-    before, after = signal.values[index - 1], signal.values[index]
-    fraction = 0.5 if after == before else float(np.clip((level - before) / (after - before), 0.0, 1.0))
-    return float(signal.time[index - 1] + fraction * (signal.time[index] - signal.time[index - 1]))
 
 
 def strides_from_shank(shank: Signal) -> list[Stride]:
@@ -148,138 +219,9 @@ def heel_strikes(events: str, walk: Mapping[str, Signal]) -> list[float]:
     return [float(smooth.time[peak]) for peak in _ends_of_swings(smooth)]
 
 
-_LEAST_LEAN = 0.5
-"""Least decrease of the shank angle over a contact of the same foot, relative to its range [-]; over a contact of the
-other foot the angle increases."""
-_LEAST_LEAN_OF_PART = 0.1
-"""Least decrease of the shank angle, relative to its range [-], over a contact cut by an end of the record."""
-
-
-def force_of_plates(
-    tables: Sequence[MotionTable], names: Sequence[str], shank: Signal, body_mass: float
-) -> tuple[Signal | None, list[str]]:
-    """Return the vertical force [body weights] of one foot, summed over its contacts on force plates, and remarks."""
-    total: Signal | None = None
-    chosen = []
-    for table in tables:
-        for name in [column for column in names if column in table.columns]:
-            values, _ = CurveColumns("vertical_force.unit", table, ((1.0, name),), True).in_unit(None, ("N",))
-            plate = with_absence(Signal(table.file, table.time, values / (body_mass * STANDARD_GRAVITY)))
-            own = [(start, end) for start, end in contacts_of(plate) if _is_own(start, end, plate, shank)]
-            if own:
-                step = 1.0 / plate.rate
-                starts = [-np.inf if start is None else start - step for start, _ in own]
-                ends = [np.inf if end is None else end + step for _, end in own]
-                spans = zip(starts, ends, strict=True)
-                inside = np.any([(plate.time >= low) & (plate.time <= high) for low, high in spans], axis=0)
-                # Only over this foot's contacts: the same plate may carry the other foot before or after.
-                force = np.where(inside, plate.values, 0.0)
-                other = 0.0 if total is None else np.interp(plate.time, total.time, total.values)
-                total = Signal(table.file, table.time, force + other)
-                chosen.append(f"'{name}' ({len(own)})")
-    if total is None:
-        return None, ["vertical force: no plate carries this foot, by the lean of its shank"] if names else []
-    return total, [
-        f"vertical force: the contacts of this foot, by the lean of its shank, summed over {', '.join(chosen)}"
-    ]
-
-
-def _is_own(start: float | None, end: float | None, plate: Signal, shank: Signal) -> bool:
-    least = _LEAST_LEAN_OF_PART if start is None or end is None else _LEAST_LEAN
-    first = max(float(plate.time[0] if start is None else start), float(shank.time[0]))
-    last = min(float(plate.time[-1] if end is None else end), float(shank.time[-1]))
-    if last <= first:
-        return False
-    # Over its own contact the shank leans forward, so that its angle falls.
-    before, after = np.interp([first, last], shank.time, shank.values)
-    return bool(before - after > least * np.ptp(shank.values))
-
-
-_RATE = 200.0
-"""Sampling rate [Hz] for the comparison of the ends of a cycle."""
-_SHORTEST = 0.5
-"""Shortest stride [s]."""
-
-LONGEST = 1.5
-"""Largest length of a record of one cycle [strides]; strides are counted in a longer record."""
-
-_MISFIT = 0.06
-"""Largest RMS difference between start and end in their overlap, of values and rates relative to their ranges [-]; two
-strides of one healthy walk differ by 0.03."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Cycle:
-    """Cycle repeated three times, its ``period`` [s], and the misfit of its ends relative to the ranges [-]."""
-
-    walk: Mapping[str, Signal]
-    period: float
-    misfit: float
-
-
-def wrap_cycle(walk: Mapping[str, Signal]) -> _Cycle | None:
-    """Return the record of one cycle repeated three times, or None if its start and end are not the same motion."""
-    start = max(walk[name].time[0] for name in REQUIRED)
-    end = min(walk[name].time[-1] for name in REQUIRED)
-    # One even clock for both curves, whatever the rates of their files.
-    time = np.arange(start, end, 1.0 / _RATE)
-    shortest = max(_SHORTEST, (end - start) / LONGEST)
-    first = int(np.ceil(shortest * _RATE))
-    if time.size <= max(first, 3):
-        return None
-    curves = np.array(
-        [np.interp(time, walk[name].time, walk[name].values) / np.ptp(walk[name].values) for name in REQUIRED]
-    )
-    rates = np.gradient(curves, axis=1)
-    features = np.concatenate([curves, rates / np.ptp(rates, axis=1, keepdims=True)])
-    # Every length of a cycle that leaves an overlap is tried; the best overlap is the period.
-    shifts = np.arange(first, time.size)
-    misfits = np.array(
-        [np.sqrt(np.mean((features[:, shift:] - features[:, : time.size - shift]) ** 2)) for shift in shifts]
-    )
-    best = int(np.argmin(misfits))
-    # Start and end are not the same motion: the record is no whole cycle, or the walk is not steady.
-    if misfits[best] > _MISFIT:
-        return None
-    period = float(shifts[best]) / _RATE
-    wrapped = {}
-    for name, signal in walk.items():
-        slack = 1.0 / signal.rate
-        if signal.time[0] <= start + slack and signal.time[-1] >= start + period - slack:
-            wrapped[name] = _repeat(signal, (start, float(end)), period, name in LOADS)
-    return _Cycle(wrapped, period, float(misfits[best]))
-
-
-def _repeat(signal: Signal, span: tuple[float, float], period: float, is_load: bool) -> Signal:
-    """Return three periods of the signal within a span [s]; where start and end overlap, they are blended.
-
-    For a load, the overlap uses the value of larger magnitude, because the other may be off the plate. A position
-    advances by the distance walked in each cycle.
-    """
-    start, end = span
-    count = max(2, round(period * signal.rate))
-    instants = start + period * np.arange(count) / count
-    values, later = (np.interp(instants + shift, signal.time, signal.values) for shift in (0.0, period))
-    overlap = min(end, float(signal.time[-1])) - start - period
-    inside = instants <= start + max(overlap, 0.0)
-    # A position goes on by the distance walked in a cycle.
-    way = float(np.mean((later - values)[inside])) if signal.is_position else 0.0
-    weight = np.clip((instants - start) / overlap, 0.0, 1.0) if overlap > 0.0 else np.ones(count)
-    blend = weight * values + (1.0 - weight) * (later - way)
-    if is_load:
-        blend = np.where(np.abs(later) > np.abs(values), later, values)
-    turns = np.arange(3)
-    time = (turns[:, None] * period + instants[None, :]).ravel()
-    whole = (turns[:, None] * way + np.where(inside, blend, values)[None, :]).ravel()
-    return replace(signal, time=time, values=np.asarray(whole, dtype=np.float64), columns=(), absent=None)
-
-
-_NEAR = 0.15
-"""Largest time difference [s] between an event found from the shank and the same event on a plate."""
-_ABOUT_STANCE = 0.05
-"""Interval at both ends of the stance [strides] that a load need not cover."""
-_COVERED = 0.9
-"""Fraction of the remaining stance that must be on the plate for a load to count in a stride."""
+def usable_strides(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> list[Stride]:
+    """Return the strides over which both angles were recorded."""
+    return [stride for stride in strides if all(strides_within(walk[name], [stride]) for name in REQUIRED)]
 
 
 def strides_within(signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
@@ -300,119 +242,6 @@ def lost_in(signal: Signal, stride: Stride) -> int:
     return int(np.count_nonzero(signal.lost & (signal.time >= stride.start) & (signal.time <= stride.end)))
 
 
-_LEAST_OF_CYCLE = 0.75
-"""Shortest stride in a cycle, relative to the period of the cycle [-]."""
-LEAST_STRIDES = 2
-"""Default of the least number of strides; it is 1 for a walk past a plate and for one cycle."""
-
-FORCE, SHANK, FILE = "vertical_force", "shank_angle", "events of the file"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Footfalls:
-    """Strides of a walk.
-
-    ``walk`` holds the signals by name, ``events`` names the source of the strides. ``is_overground`` is True if some
-    strides are off the plates, ``is_one_cycle`` if the record is one cycle that was repeated.
-    """
-
-    walk: Mapping[str, Signal]
-    strides: list[Stride]
-    events: str
-    remarks: tuple[str, ...] = ()
-    is_overground: bool = False
-    is_one_cycle: bool = False
-
-
-def find_footfalls(
-    walk: Mapping[str, Signal],
-    tables: Sequence[MotionTable],
-    side: Side,
-    given_least: int | None,
-) -> Footfalls:
-    """Return the strides of a walk: from the force if it shows enough, otherwise from the source with more strides."""
-    least = given_least or LEAST_STRIDES
-    footfalls = _of_walk(walk, tables, side, least)
-    usable = usable_strides(walk, footfalls.strides)
-    if len(usable) >= (1 if footfalls.is_overground else least) or least > LEAST_STRIDES:
-        return footfalls
-    # A cycle must not wrap around what was bridged.
-    cycle = None if any(signal.lost is not None for signal in walk.values()) else wrap_cycle(walk)
-    if cycle is None:
-        return footfalls
-    # Three cycles in a row have one whole stride in the middle, wherever the record begins.
-    again = _of_walk(cycle.walk, (), side, 1)
-    whole = usable_strides(cycle.walk, again.strides)
-    # A record of two strides wraps around too, as one cycle that is twice as long.
-    if not whole or whole[0].time < _LEAST_OF_CYCLE * cycle.period:
-        return footfalls
-    span = walk[SHANK].time[-1] - walk[SHANK].time[0]
-    said = (
-        f"one cycle that wraps around: {span:.3g} s of data around a stride of {cycle.period:.4g} s, whose start and "
-        f"end differ by {100.0 * cycle.misfit:.1f} % of the ranges; how much strides differ is not known"
-    )
-    return replace(again, walk=cycle.walk, strides=whole[:1], remarks=(*again.remarks, said), is_one_cycle=True)
-
-
-def usable_strides(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> list[Stride]:
-    """Return the strides over which both angles were recorded."""
-    return [stride for stride in strides if all(strides_within(walk[name], [stride]) for name in REQUIRED)]
-
-
-def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, least: int) -> Footfalls:
-    recorded = _strides_of_file(tables, side)
-    if FORCE not in walk:
-        if recorded:
-            return Footfalls(walk, recorded, FILE, is_overground=True)
-        return Footfalls(walk, strides_from_shank(walk[SHANK]), SHANK)
-    forced = strides_from_force(walk[FORCE])
-    if len(usable_strides(walk, forced)) >= least:
-        return Footfalls(walk, forced, FORCE)
-    contacts = [(a, b) for a, b in contacts_of(walk[FORCE]) if a is not None or b is not None]
-    if recorded and contacts and len(usable_strides(walk, recorded)) > len(usable_strides(walk, forced)):
-        return Footfalls(walk, recorded, FILE, is_overground=True)
-    moved: list[Stride] = []
-    # The force has a stride or none, and its message says more than the shank's.
-    with suppress(DataError):
-        moved = strides_from_shank(walk[SHANK]) if contacts else []
-    if len(usable_strides(walk, moved)) <= len(usable_strides(walk, forced)):
-        return Footfalls(walk, forced, FORCE)
-    shifted, said = _by_contacts(moved, contacts)
-    return Footfalls(walk, shifted, SHANK, (said,), is_overground=True)
-
-
-def _strides_of_file(tables: Sequence[MotionTable], side: Side) -> list[Stride]:
-    """Return the strides between the events of a foot in a C3D file; each stride needs exactly one toe-off."""
-    trials = [table.trial for table in tables if table.trial is not None]
-    # Events of two trials have two clocks.
-    if len(trials) != 1:
-        return []
-    strikes, offs = (trials[0].events.get((side, kind), []) for kind in (STRIKE, OFF))
-    between = {(start, end): [time for time in offs if start < time < end] for start, end in pairwise(strikes)}
-    # Two toe-offs between two strikes are a missed strike: such a stride is none.
-    return [Stride(start, times[0], end) for (start, end), times in between.items() if len(times) == 1]
-
-
-def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[list[Stride], str]:
-    """Return strides from the shank, with events shifted to match the contacts on plates, and a remark."""
-    early = [
-        (start - stride.start, end - stride.toe_off)
-        for stride in strides
-        for start, end in contacts
-        if start is not None and end is not None
-        if abs(start - stride.start) < _NEAR and abs(end - stride.toe_off) < _NEAR
-    ]
-    if not early:
-        return strides, "strides from the shank, which no plate corrects: heel strikes and toe-offs are less exact"
-    # Strikes and toe-offs of the shank are early or late by one time for a person, which the plates show.
-    strike, off = (float(np.mean(values)) for values in zip(*early, strict=True))
-    moved = [Stride(stride.start + strike, stride.toe_off + off, stride.end + strike) for stride in strides]
-    return moved, (
-        f"few contacts on plates: strides from the shank, its strikes moved by {1000.0 * strike:.0f} ms and its "
-        f"toe-offs by {1000.0 * off:.0f} ms as {count_of(len(early), 'contact')} on plates show"
-    )
-
-
 def strides_of_curve(footfalls: Footfalls, name: str, signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
     """Return the strides that a curve covers: within its record, and for a load with the stance measured."""
     inside = strides_within(signal, strides)
@@ -425,8 +254,8 @@ def strides_of_curve(footfalls: Footfalls, name: str, signal: Signal, strides: S
         if not stance.any() or (signal.absent is not None and bool(signal.absent[stance].any())):
             continue
         values = signal.values[stance]
-        there = values > UNLOADED if name == FORCE else values != 0.0
+        is_on_plate = values > UNLOADED if name == FORCE else values != 0.0
         # Overground the foot may have been on the plate for a part of the stance only.
-        if not footfalls.is_overground or float(np.mean(there)) >= _COVERED:
+        if not footfalls.is_overground or float(np.mean(is_on_plate)) >= _COVERED:
             covered.append(stride)
     return covered

@@ -16,6 +16,8 @@ from ppafo.gait.mean_stride import MeanStride
 from ppafo.gait.plausible import check_force_scale, check_plausible, force_remarks, moment_remarks
 from ppafo.gait.plausible_angles import sign_remarks, standing_tilt, zero_remarks
 from ppafo.gait.plausible_knee import turning_remarks
+from ppafo.gait.recorded.columns import LOADS
+from ppafo.gait.recorded.contacts import contacts_of
 from ppafo.gait.recorded.curves import CurveStatistics, check_scatter, over_strides, scatter_remarks, statistics
 from ppafo.gait.recorded.footfalls import (
     FORCE,
@@ -23,7 +25,6 @@ from ppafo.gait.recorded.footfalls import (
     SHANK,
     Footfalls,
     Stride,
-    contacts_of,
     find_footfalls,
     heel_strikes,
     lost_in,
@@ -31,11 +32,12 @@ from ppafo.gait.recorded.footfalls import (
     strides_within,
     usable_strides,
 )
+from ppafo.gait.recorded.knee import check_direction, knee_remarks
 from ppafo.gait.recorded.mapping import ImportSettings, check_settings, setting_text
+from ppafo.gait.recorded.signal import Signal, low_pass
 from ppafo.gait.recorded.source import GaitSource, of_largest_one, read_source
 from ppafo.gait.recorded.strides import StrideSelection, of_usual_time, without_drop_outs, without_odd_shapes
 from ppafo.gait.recorded.table import LONGEST_FILLED, MotionTable
-from ppafo.gait.recorded.walk import LOADS, Signal, check_way, knee_remarks, low_pass
 from ppafo.wording import count_of
 
 
@@ -181,7 +183,7 @@ def _finish(
         check_side(mean_stride, load_gait())
         check_plausible(mean_stride)
     with noted_in(wrong):
-        check_way(walk, signs_from)
+        check_direction(walk, signs_from)
     raise_noted(wrong)
     gait = _gait(settings, source.tables, taken, {name: curve for name, (curve, _) in fitted.items()}, footfalls.events)
     said = [*remarks, *_remarks(curves, strides, footfalls.events)]

@@ -8,12 +8,15 @@ import numpy as np
 
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.mean_stride import SignSource
-from ppafo.gait.recorded.footfalls import FORCE, force_of_plates
+from ppafo.gait.recorded.columns import LOADS
+from ppafo.gait.recorded.contacts import force_of_plates
+from ppafo.gait.recorded.footfalls import FORCE
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.markers import convention_of_map
 from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, Side, column_names, setting_text
+from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.table import MotionTable, cut_table, fill_gaps, without_lost_markers
-from ppafo.gait.recorded.walk import LOADS, Signal, walk_signals
+from ppafo.gait.recorded.walk import walk_signals
 from ppafo.kinds import Kinds
 from ppafo.storage.frames import written_as_csv
 from ppafo.units import format_quantity

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.errors import DataError, PpafoError, noted_in
+from ppafo.gait.recorded.columns import LOADS
 from ppafo.gait.recorded.curves import CurveStatistics
 from ppafo.gait.recorded.footfalls import Stride
+from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.table import MotionTable
-from ppafo.gait.recorded.walk import LOADS, Signal
 from ppafo.signals.recording import Floats
 
 LARGEST_STRIDE_CHANGE = 0.25

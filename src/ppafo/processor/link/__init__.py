@@ -16,7 +16,7 @@ _TEMPLATES = ("Makefile", "README.md", "host.c", "link.c", "link.h", "plant.h")
 def example_controller(scenario: Scenario) -> dict[str, bytes]:
     """Files of a controller for the link, by name. Raises ScenarioError if it has no integer form."""
     fixed = fixed_point_controller(scenario)
-    written = firmware(scenario)
+    of_firmware = firmware(scenario)
     period = round(scenario.controller.period * MICROSECONDS)
     if abs(period / MICROSECONDS - scenario.controller.period) > 1.0e-9 * scenario.controller.period:
         raise ScenarioError(
@@ -35,5 +35,5 @@ def example_controller(scenario: Scenario) -> dict[str, bytes]:
         "middle": repr(fixed.limits.middle),
         "next": shlex.join(["ppafo", "hil", source, *settings, "--port", "udp:127.0.0.1:5000", "--out", "out/hil"]),
     }
-    own = {name: filled(template(__name__, name), words).encode() for name in _TEMPLATES}
-    return dict(sorted({**own, **{name: written[name] for name in _OF_FIRMWARE}}.items()))
+    files = {name: filled(template(__name__, name), words).encode() for name in _TEMPLATES}
+    return dict(sorted({**files, **{name: of_firmware[name] for name in _OF_FIRMWARE}}.items()))

@@ -46,23 +46,23 @@ def _shut_valve(case: Case) -> TrackingCause | None:
     scenario, settled = case.scenario, case.settled
     command, band = np.abs(case.recording["command"][settled.samples]), dead_band(scenario)
     # A loop that rests at the edge of the band is a little beyond it now and then.
-    asked = float(np.max(command)) if np.mean(command <= _EDGE * band) < _MOSTLY else float(np.median(command))
-    if asked <= SHUT and case.failure != "overshoots":
+    typical = float(np.max(command)) if np.mean(command <= _EDGE * band) < _MOSTLY else float(np.median(command))
+    if typical <= SHUT and case.failure != "overshoots":
         return TrackingCause("its law asks for nothing: its gains are 0, or its dead zone is wider than the error")
-    if asked > _EDGE * band or settled.turns or case.failure == "overshoots":
+    if typical > _EDGE * band or settled.turns or case.failure == "overshoots":
         return None
-    believed = float(scenario.controller.settings.get("dead_band", 0.0))
-    if believed >= band and _is_settling(case):
+    known_band = float(scenario.controller.settings.get("dead_band", 0.0))
+    if known_band >= band and _is_settling(case):
         return None
-    remedies = [remedy(scenario, {"controller.dead_band": band})] if believed < band else []
+    remedies = [remedy(scenario, {"controller.dead_band": band})] if known_band < band else []
     # A law that knows the band asks for more openings than it gets, and errs by what its gain lacks.
-    lacking = band / asked if believed < band else settled.error / (LARGEST_SHARE * settled.wanted)
-    remedies += larger_gains(scenario, case.law, (1.5 * lacking, 3.0 * lacking))
+    gain_factor = band / typical if known_band < band else settled.error / (LARGEST_SHARE * settled.wanted)
+    remedies += larger_gains(scenario, case.law, (1.5 * gain_factor, 3.0 * gain_factor))
     remedies += integral_of_device(scenario, case.law)
     if torque_asked(scenario, case.law, settled.error) is not None:
         remedies += stiffer_laws(scenario, float(scenario.device.friction.static_torque), settled)
-    opens = "stays within" if believed < band else "hardly opens the valve beyond"
-    text = f"its command of {asked:.2g} {opens} `valve.dead_band = {band:.2g}`"
+    relation = "stays within" if known_band < band else "hardly opens the valve beyond"
+    text = f"its command of {typical:.2g} {relation} `valve.dead_band = {band:.2g}`"
     return TrackingCause(text, tuple(remedies), "give a larger gain")
 
 
@@ -83,11 +83,11 @@ def oscillation(case: Case) -> TrackingCause | None:
     if not names:
         return TrackingCause("its law is too fast for what is late", (), "give its law smaller gains, or a slower one")
     sensors = scenario.sensors
-    why = "look for what delays it (sensors, lines)"
+    reason = "look for what delays it (sensors, lines)"
     if sensors.angle_noise or sensors.pressure_noise:
         noise = f"{change_text(ANGLE, sensors.angle_noise)} and {change_text('pressure_1', sensors.pressure_noise)}"
-        why = f"the noise of its sensors ({noise}) turns the command"
-    slower = TrackingCause(f"`{names[0]}` is this device's: {why}", slower_loops(scenario, law, (2.0, 4.0)))
+        reason = f"the noise of its sensors ({noise}) turns the command"
+    slower = TrackingCause(f"`{names[0]}` is this device's: {reason}", slower_loops(scenario, law, (2.0, 4.0)))
     if quicker > _QUICKER:
         text = (
             f"at {level_text('rad', angle)} the chambers are so small that it changes {quicker:.2g} times "
@@ -115,29 +115,30 @@ def _static_friction(case: Case) -> TrackingCause | None:
     """Cause: static friction, with the valve's dead band, holds the joint at rest off its reference."""
     scenario, settled = case.scenario, case.settled
     settings, holding = scenario.controller.settings, float(scenario.device.friction.static_torque)
-    asked = torque_asked(scenario, case.law, settled.error)
+    requested = torque_asked(scenario, case.law, settled.error)
     gain = float(settings.get("torque_gain", 0.0))
-    if (
-        asked is None
-        or gain == 0.0
-        or case.failure == "overshoots"
-        or (settled.rests and settled.swing > abs(settled.missing))
-    ):
+    if requested is None or gain == 0.0:
+        return None
+    # Friction holds a joint still: it neither overshoots nor swings.
+    if case.failure == "overshoots" or (settled.rests and settled.swing > abs(settled.missing)):
         return None
     # A torque that creeps up while the joint rests is asked for beside the stiffness.
-    believed = float(settings.get("static_torque", 0.0))
-    asked += believed
+    known_friction = float(settings.get("static_torque", 0.0))
+    requested += known_friction
     # The law believes in a dead band, and jumps over that.
     band = max(dead_band(scenario) - float(settings.get("dead_band", 0.0)), 0.0)
     lost = band / gain
-    if asked > holding + lost:
+    if requested > holding + lost:
         return None
-    held, wanted = level_text("N m", holding), level_text("N m", asked)
-    kept = f" and `valve.dead_band` keeps {level_text('N m', lost)} from it" if asked > holding else ""
-    text = f"static friction holds the joint with {held}{kept}, and the law asks for {wanted} at this error"
-    remedies = [] if believed >= holding else [remedy(scenario, {"controller.static_torque": holding})]
-    if "static_torque" not in settings:
-        remedies.clear()
+    holding_text, requested_text = level_text("N m", holding), level_text("N m", requested)
+    band_text = f" and `valve.dead_band` keeps {level_text('N m', lost)} from it" if requested > holding else ""
+    text = (
+        f"static friction holds the joint with {holding_text}{band_text}, and the law asks for {requested_text} at "
+        "this error"
+    )
+    remedies = []
+    if "static_torque" in settings and known_friction < holding:
+        remedies.append(remedy(scenario, {"controller.static_torque": holding}))
     advice = "a larger `angle_stiffness` moves it"
     return TrackingCause(text, (*remedies, *stiffer_laws(scenario, holding, settled)), advice)
 
@@ -169,10 +170,10 @@ def _lag(case: Case) -> TrackingCause | None:
     squares = float(np.mean(slope**2))
     if squares == 0.0 or case.settled.rests or case.only_switches:
         return None
-    late = float(np.mean(slope * error)) / squares
+    delay = float(np.mean(slope * error)) / squares
     text = "its reference moves more quickly than the loop follows"
-    if late > 0.0 and late**2 * squares >= _EXPLAINED * case.settled.error**2:
-        text = f"it is {1.0e3 * late:.3g} ms behind its reference"
+    if delay > 0.0 and delay**2 * squares >= _EXPLAINED * case.settled.error**2:
+        text = f"it is {1.0e3 * delay:.3g} ms behind its reference"
     remedies = [*stiffened(scenario, (2.0, 4.0)), *larger_gains(scenario, case.law, (2.0, 4.0))]
     frequency = float(scenario.reference.settings.get("frequency", 0.0))
     remedies += [remedy(scenario, {"reference.frequency": share * frequency}) for share in (0.7, 0.4, 0.2) if frequency]
@@ -181,12 +182,12 @@ def _lag(case: Case) -> TrackingCause | None:
 
 def gains_of_another_device(case: Case) -> TrackingCause | None:
     """Cause: a gain differs from the default gain of the device."""
-    right = gain_of_device(case.scenario, case.law)
-    if right is None:
+    default_gain = gain_of_device(case.scenario, case.law)
+    if default_gain is None:
         return None
     # Without its integral a loop rests beside its reference with any gain.
     others = () if case.oscillates else integral_of_device(case.scenario, case.law)
-    return TrackingCause("its gains are not this device's", (right, *others))
+    return TrackingCause("its gains are not this device's", (default_gain, *others))
 
 
 def _is_settling(case: Case) -> bool:

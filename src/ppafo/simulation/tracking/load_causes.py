@@ -30,18 +30,18 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
     if scenario.controlled != TORQUE or case.oscillates:
         return None
     reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
-    place = int(np.argmax(np.abs(reference)))
-    wanted, there = float(reference[place]), float(angle[place])
-    lowest, highest = torque_reach(scenario.device, there)
+    worst = int(np.argmax(np.abs(reference)))
+    wanted, wanted_at = float(reference[worst]), float(angle[worst])
+    lowest, highest = torque_reach(scenario.device, wanted_at)
     if lowest <= wanted <= highest:
         return None
     reach, supply = highest if wanted > highest else lowest, supply_that_moves(scenario.device, wanted > highest)
     text = (
-        f"at {level_text('rad', there)} and {level_text('Pa', number_at(scenario, supply))} the "
+        f"at {level_text('rad', wanted_at)} and {level_text('Pa', number_at(scenario, supply))} the "
         f"actuator gives {level_text('N m', reach)} at most"
     )
     remedies = []
-    needed = supply_for(scenario.device, there, 1.05 * wanted)
+    needed = supply_for(scenario.device, wanted_at, 1.05 * wanted)
     if needed is not None:
         remedies.append(remedy(scenario, {supply: needed}))
     if "level" in scenario.reference.settings and not scenario.reference.kind.startswith("sine"):
@@ -106,22 +106,22 @@ def flung_at_start(case: Case) -> TrackingCause | None:
     reference, angle = followed(case.recording)
     start = float(angle[0])
     load = float(motion.outside_torque) + float(gravity_torque(start, device.foot_plate.gravity_torque))
-    own = static_torque(device)
-    lacking = load - own(start, float(initial.pressure_1), float(initial.pressure_2))
+    torque_at = static_torque(device)
+    lacking = load - torque_at(start, float(initial.pressure_1), float(initial.pressure_2))
     # A lack of torque turns the joint to smaller angles.
-    flung = float(np.max((reference - angle) * np.sign(lacking)))
-    if abs(lacking) <= float(device.friction.static_torque) or flung <= _FLUNG * case.settled.wanted:
+    deviation = float(np.max((reference - angle) * np.sign(lacking)))
+    if abs(lacking) <= float(device.friction.static_torque) or deviation <= _FLUNG * case.settled.wanted:
         return None
-    room = float(device.supply.atmospheric_pressure)
+    atmosphere = float(device.supply.atmospheric_pressure)
     needed = supply_for(device, start, load)
     text = (
         f"at the start its chambers give {level_text('N m', load - lacking)} for a load of "
-        f"{level_text('N m', load)}: the joint is flung {change_text(ANGLE, flung)} away before "
+        f"{level_text('N m', load)}: the joint is flung {change_text(ANGLE, deviation)} away before "
         "they are filled"
     )
-    pressures = {"initial.pressure_1": room, "initial.pressure_2": room}
+    pressures = {"initial.pressure_1": atmosphere, "initial.pressure_2": atmosphere}
     if needed is not None:
-        is_first = supply_that_moves(device, load > own(start, room, room)) == PRESSURE_PATH
+        is_first = supply_that_moves(device, load > torque_at(start, atmosphere, atmosphere)) == PRESSURE_PATH
         pressures["initial.pressure_1" if is_first else "initial.pressure_2"] = needed
     remedies = [] if needed is None else [remedy(scenario, pressures)]
     return TrackingCause(text, tuple(remedies), "begin with pressures in [initial] that carry the load")

@@ -92,11 +92,11 @@ def gain_of_device(scenario: Scenario, law: ControllerKind | None) -> Remedy | N
         return None
     terms, settings = terms_of(scenario, law), scenario.controller.settings
     for term, quantity in speed_settings(scenario, law).items():
-        right = float(terms[term].number(lambda path: number_at(scenario, path)))
-        if abs(float(settings[quantity.name]) - right) <= _SAME_GAIN * right:
+        default = float(terms[term].number(lambda path: number_at(scenario, path)))
+        if abs(float(settings[quantity.name]) - default) <= _SAME_GAIN * default:
             continue
         slopes = {f"controller.{name}": 0.0 for name in _SLOPES if settings.get(name, 0.0) > 0.0}
-        return remedy(scenario, {f"controller.{quantity.name}": right, **slopes})
+        return remedy(scenario, {f"controller.{quantity.name}": default, **slopes})
     return None
 
 
@@ -106,26 +106,28 @@ def integral_of_device(scenario: Scenario, law: ControllerKind | None) -> list[R
         return []
     terms, settings = terms_of(scenario, law), scenario.controller.settings
     names = [item.name for item in settings_of(scenario, law) if torque_loop.INTEGRAL_GAIN in item.follows]
-    right = float(terms[torque_loop.INTEGRAL_GAIN].number(lambda path: number_at(scenario, path))) if names else 0.0
-    return [remedy(scenario, {f"controller.{name}": right}) for name in names if settings.get(name) == 0.0 < right]
+    default = float(terms[torque_loop.INTEGRAL_GAIN].number(lambda path: number_at(scenario, path))) if names else 0.0
+    return [remedy(scenario, {f"controller.{name}": default}) for name in names if settings.get(name) == 0.0 < default]
 
 
 def slower_loops(scenario: Scenario, law: ControllerKind, factors: Iterable[float]) -> tuple[Remedy, ...]:
     """Remedies that slow down the innermost loop by each of some factors; empty if its speed cannot be set."""
-    first = speed_settings(scenario, law)
-    if not first:
+    speeds = speed_settings(scenario, law)
+    if not speeds:
         return ()
-    term, quantity = next(iter(first.items()))
-    path, own = f"controller.{quantity.name}", float(scenario.controller.settings[quantity.name])
-    return tuple(remedy(scenario, {path: own * factor if term in SLOWER_ABOVE else own / factor}) for factor in factors)
+    term, quantity = next(iter(speeds.items()))
+    path, value = f"controller.{quantity.name}", float(scenario.controller.settings[quantity.name])
+    return tuple(
+        remedy(scenario, {path: value * factor if term in SLOWER_ABOVE else value / factor}) for factor in factors
+    )
 
 
 def larger_gains(scenario: Scenario, law: ControllerKind | None, factors: Iterable[float]) -> list[Remedy]:
     """Remedies that speed up the innermost loop by each of some factors."""
-    first = list(speed_settings(scenario, law).values())[:1]
+    innermost = list(speed_settings(scenario, law).values())[:1]
     return [
         remedy(scenario, {f"controller.{item.name}": float(scenario.controller.settings[item.name]) * factor})
-        for item in first
+        for item in innermost
         for factor in factors
     ]
 
@@ -134,12 +136,12 @@ def sized_valves(scenario: Scenario, factors: Iterable[float]) -> tuple[Remedy, 
     """Remedies that multiply the valve's orifice by each of some factors, in the form in which it is given."""
     orifice = scenario.device.valve.orifice
     if isinstance(orifice, SonicOrifice):
-        size, kept = ("sonic_conductance", orifice.sonic_conductance), ("critical_ratio", orifice.critical_ratio)
+        size, unchanged = "sonic_conductance", "critical_ratio"
     else:
-        size, kept = ("area", orifice.area), ("discharge_coefficient", orifice.discharge_coefficient)
+        size, unchanged = "area", "discharge_coefficient"
+    number, other = float(getattr(orifice, size)), float(getattr(orifice, unchanged))
     return tuple(
-        remedy(scenario, {f"valve.{size[0]}": float(size[1]) * factor, f"valve.{kept[0]}": float(kept[1])})
-        for factor in factors
+        remedy(scenario, {f"valve.{size}": number * factor, f"valve.{unchanged}": other}) for factor in factors
     )
 
 
@@ -167,21 +169,21 @@ def stiffer_laws(
     with a torque gain that opens the valve beyond the band.
     """
     settings = scenario.controller.settings
-    own, limit = float(settings["angle_stiffness"]), float(settings["error_limit"])
+    present, limit = float(settings["angle_stiffness"]), float(settings["error_limit"])
     damping, band = float(settings.get("angle_damping", 0.0)), dead_band(scenario)
     allowed = LARGEST_SHARE * settled.wanted
-    enough = (_TORQUE_OVER_FRICTION * holding / limit, 3.0 * holding / limit, holding / (0.8 * allowed))
-    found: list[dict[str, float]] = []
-    for stiffness in sorted(value for value in enough if value > own > 0.0):
-        given = {**(others or {}), "controller.angle_stiffness": stiffness}
-        found += [given, {**given, "controller.angle_damping": damping * math.sqrt(stiffness / own)}]
+    sufficient = (_TORQUE_OVER_FRICTION * holding / limit, 3.0 * holding / limit, holding / (0.8 * allowed))
+    changes: list[dict[str, float]] = []
+    for stiffness in sorted(value for value in sufficient if value > present > 0.0):
+        stiffer = {**(others or {}), "controller.angle_stiffness": stiffness}
+        changes += [stiffer, {**stiffer, "controller.angle_damping": damping * math.sqrt(stiffness / present)}]
     gain = float(settings.get("torque_gain", 0.0))
     if band > 0.0 and gain > 0.0:
-        for numbers in found[-2:]:
+        for numbers in changes[-2:]:
             needed = band / max(numbers["controller.angle_stiffness"] * allowed, 1.0e-9)
             larger = (times * needed for times in (1.0, 2.0) if times * needed > gain)
-            found += [{**numbers, "controller.torque_gain": number} for number in larger]
-    return [remedy(scenario, numbers) for numbers in found]
+            changes += [{**numbers, "controller.torque_gain": number} for number in larger]
+    return [remedy(scenario, numbers) for numbers in changes]
 
 
 def stiffened(scenario: Scenario, factors: Iterable[float]) -> list[Remedy]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.kind import ControllerKind
-from ppafo.metrics.command import asked_samples, command_reversals
+from ppafo.metrics.command import command_reversals, requested_samples
 from ppafo.metrics.metric import Floats, controlled_in, extent, followed, hold_start
 from ppafo.metrics.settled import is_long_enough
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
@@ -147,7 +147,7 @@ def settled_walk(recording: Recording, limit: float) -> SettledPart | None:
         return (
             SettledPart(samples=slice(None), wanted=limit, peak=peak, rests=False, **numbers) if limit > 0.0 else None
         )
-    asked = asked_samples(recording)
+    asked = requested_samples(recording)
     reference, value = (series[asked] for series in followed(recording))
     wanted = float(np.sqrt(np.mean(reference**2))) if reference.size else 0.0
     if wanted == 0.0:

@@ -16,7 +16,7 @@ import ppafo
 from ppafo.errors import StudyError
 from ppafo.model.sensors import Measurement
 from ppafo.studies.study import Study
-from ppafo.study.manifest import controller_document
+from ppafo.study.controller_document import controller_document
 
 LAW = """
 class Law:

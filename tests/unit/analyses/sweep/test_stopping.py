@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.analyses.sweep.statistic import draw_until, estimate
 from ppafo.analyses.sweep.statistic_kind import Statistic, mean_of, parse_statistic, probability_of, quantile_of
-from ppafo.analyses.sweep.stopping import StatisticEstimate, StoppingRule, stopping_rule
+from ppafo.analyses.sweep.stopping import StatisticEstimate, StoppingRule, target_width
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, UniformBetween
 from ppafo.studies.draws import REPLICATES, Uncertainty
@@ -238,11 +238,9 @@ def test_failed_draws_are_left_out_and_counted_or_refused() -> None:
         (lambda: parse_statistic("median", METRIC, None), "statistic 'median' is not known"),
         (lambda: parse_statistic("quantile 1.5", METRIC, None), "a fraction above 0 and below 1"),
         (lambda: parse_statistic("probability above 3 g", METRIC, None), "statistic 'probability above 3 g'"),
-        (lambda: stopping_rule(mean_of("N m"), METRIC, "3 g", StoppingRule(1.0, False)), "width = '3 g'"),
+        (lambda: target_width(mean_of("N m"), METRIC, "3 g"), "width = '3 g'"),
         (
-            lambda: stopping_rule(
-                parse_statistic("probability above 1 N m", METRIC, None), METRIC, "1 %", StoppingRule(1.0, False)
-            ),
+            lambda: target_width(parse_statistic("probability above 1 N m", METRIC, None), METRIC, "1 %"),
             "plain number, such as 0.01",
         ),
     ],
@@ -255,11 +253,9 @@ def test_rules_and_words_that_make_no_sense_are_one_line(make: Callable[[], obje
 
 
 def test_widths_are_read_in_the_unit_of_the_metric() -> None:
-    like = StoppingRule(1.0, False)
-    assert stopping_rule(mean_of("kg"), "gas_supplied", "2 g", like).width == pytest.approx(0.002)
-    assert stopping_rule(mean_of("Pa"), "largest_pressure", "1 psi_d", like).width == pytest.approx(6894.757)
-    relative = stopping_rule(mean_of("kg"), "gas_supplied", "5 %", like)
-    assert (relative.width, relative.is_relative) == (pytest.approx(0.05), True)
+    assert target_width(mean_of("kg"), "gas_supplied", "2 g") == (pytest.approx(0.002), False)
+    assert target_width(mean_of("Pa"), "largest_pressure", "1 psi_d") == (pytest.approx(6894.757), False)
+    assert target_width(mean_of("kg"), "gas_supplied", "5 %") == (pytest.approx(0.05), True)
 
 
 def test_a_scenario_is_drawn_until_its_error_is_known() -> None:

@@ -116,7 +116,7 @@ def test_an_interruption_says_that_the_command_goes_on(
     def interrupted(*words: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(solve_module, "_compute", interrupted)
+    monkeypatch.setattr(solve_module, "compute_chunk", interrupted)
     assert swept(study, tmp_path / "out") == 130
     assert capsys.readouterr().err.endswith("interrupted; nothing was kept yet, and the same command begins anew\n")
     monkeypatch.undo()

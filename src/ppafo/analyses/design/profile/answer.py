@@ -30,6 +30,43 @@ _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9", BLACK, GREY)
 """Colours of the valves, in their order."""
 _RING = {"linestyle": "", "marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4}
 """Ring around the suggested device."""
+PRESSURE = Kind("Supply pressure", "Pa_a", "pressure", ".3g")
+_TORQUE = Kind("Torque", "N m", "torque", ".3g")
+_GAS = Kind("Gas per repetition", "kg", "gas mass", ".3g")
+_MASS = Kind("Mass", "kg", "part mass")
+_MAXIMUM_OF_LIMIT = 4.0
+"""Top of the error axis divided by the error limit; larger errors are not resolved."""
+_DOTTED = {"marker": ".", "markersize": 4}
+_HEAD = (
+    "valve",
+    ("pressure", PRESSURE),
+    ("lowest", PRESSURE),
+    ("RMS error", _TORQUE),
+    ("gas per repetition", _GAS),
+    ("total gas", _GAS),
+    "bottle",
+    ("mass", _MASS),
+    "limited by",
+)
+_MARGINS = ("error", "torque", "flow", "gas")
+_ORIGINS = {
+    "typed": "typed, not measured",
+    "measured": "measured",
+    "simulated": "simulated, not measured",
+    "synthetic": "synthetic, not measured",
+}
+_CAPTION = (
+    "Every valve over supply pressure, each dot with the gains that use least gas within the limit; rings are the "
+    "chosen pressures."
+)
+_READING = (
+    "The pressure is the one with the lightest bottle, of these the lowest; the lowest pressure that keeps the "
+    "error limit stands beside it.",
+    "Error margin: how much smaller the RMS error is than its limit. Torque margin: how much more torque the "
+    "pressure can hold than the profile requires; below 0 the peak is cut off, as far as the error limit allows. "
+    "Flow margin: how much smaller the opening might be if the gauge pressure were a tenth higher. Gas margin: how "
+    "much more the bottle has than is used, the reserve included.",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,8 +148,8 @@ class Sizing:
         parts = [sized.valve for sized in self.valves] + [
             sized.bottle for sized in self.valves if sized.bottle is not None
         ]
-        once = {(part.group, part.name): part for part in (*parts, *self.problem.carried)}.values()
-        return tuple((part, name) for part in once for name in part.doubtful)
+        unique = {(part.group, part.name): part for part in (*parts, *self.problem.carried)}.values()
+        return tuple((part, name) for part in unique for name in part.doubtful)
 
     def json_document(self) -> dict[str, Any]:
         """Return the valves and the suggestion as plain data in SI."""
@@ -166,15 +203,6 @@ class Sizing:
         }
 
 
-PRESSURE = Kind("Supply pressure", "Pa_a", "pressure", ".3g")
-_TORQUE = Kind("Torque", "N m", "torque", ".3g")
-_GAS = Kind("Gas per repetition", "kg", "gas mass", ".3g")
-_MASS = Kind("Mass", "kg", "part mass")
-_MAXIMUM_OF_LIMIT = 4.0
-"""Top of the error axis divided by the error limit; larger errors are not resolved."""
-_DOTTED = {"marker": ".", "markersize": 4}
-
-
 def pressure_panels(sizing: Sizing) -> list[Panel]:
     """Return panels of error and gas over supply pressure, with a ring at the pressure chosen for each valve."""
     limit = sizing.problem.largest_error
@@ -188,8 +216,8 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
             errors.append(Mark("line", [sized.pressure], [sized.error], colour=colour, style=_RING))
             gases.append(Mark("line", [sized.pressure], [sized.gas], colour=colour, style=_RING))
 
-    torque_kind = replace(_TORQUE, words="RMS error")
-    highest = float(torque_kind.values(_MAXIMUM_OF_LIMIT * limit))
+    error_kind = replace(_TORQUE, words="RMS error")
+    highest = float(error_kind.values(_MAXIMUM_OF_LIMIT * limit))
 
     def set_gas(axes: "Axes") -> None:
         # Valves differ by some per cent: an axis from 0 would lay their curves on each other.
@@ -200,7 +228,7 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
     return [
         Panel(
             PRESSURE,
-            torque_kind,
+            error_kind,
             errors,
             "RMS error, limit dashed",
             legend="figure",
@@ -208,38 +236,6 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
         ),
         Panel(PRESSURE, _GAS, gases, "Gas, within the limit", then=set_gas),
     ]
-
-
-_HEAD = (
-    "valve",
-    ("pressure", PRESSURE),
-    ("lowest", PRESSURE),
-    ("RMS error", _TORQUE),
-    ("gas per repetition", _GAS),
-    ("total gas", _GAS),
-    "bottle",
-    ("mass", _MASS),
-    "limited by",
-)
-_MARGINS = ("error", "torque", "flow", "gas")
-_ORIGINS = {
-    "typed": "typed, not measured",
-    "measured": "measured",
-    "simulated": "simulated, not measured",
-    "synthetic": "synthetic, not measured",
-}
-_CAPTION = (
-    "Every valve over supply pressure, each dot with the gains that use least gas within the limit; rings are the "
-    "chosen pressures."
-)
-_READING = (
-    "The pressure is the one with the lightest bottle, of these the lowest; the lowest pressure that keeps the "
-    "error limit stands beside it.",
-    "Error margin: how much smaller the RMS error is than its limit. Torque margin: how much more torque the "
-    "pressure can hold than the profile requires; below 0 the peak is cut off, as far as the error limit allows. "
-    "Flow margin: how much smaller the opening might be if the gauge pressure were a tenth higher. Gas margin: how "
-    "much more the bottle has than is used, the reserve included.",
-)
 
 
 @in_units(lambda sizing: sizing.problem.scenario.device.shown)
@@ -250,7 +246,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
         name="design",
         kicker="Sizing study",
         title=problem.name,
-        said=(*([problem.description] if problem.description else []), _wanted(sizing)),
+        said=(*([problem.description] if problem.description else []), _requirements(sizing)),
         parts=(
             *_tables(sizing),
             finding.Section(remarks=_remarks(sizing)),
@@ -281,14 +277,14 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
     )
 
 
-def _wanted(sizing: Sizing) -> str:
+def _requirements(sizing: Sizing) -> str:
     """Return a sentence on the requirements: profile, repetitions, error limit and reserve."""
     problem, profile = sizing.problem, sizing.problem.profile
     table_error = profile.table_error
-    near = f", {profile.knot_times.size} knots, to {_TORQUE.text(table_error)}" if table_error else ""
+    knots = f", {profile.knot_times.size} knots, to {_TORQUE.text(table_error)}" if table_error else ""
     return (
         f"profile of {TIME.text(profile.period, '.3g')} with up to {_TORQUE.text(profile.largest)} "
-        f"({_ORIGINS[profile.kind]}{near}); {problem.repetitions:.0f} repetitions ({problem.hours:.2g} h), RMS error "
+        f"({_ORIGINS[profile.kind]}{knots}); {problem.repetitions:.0f} repetitions ({problem.hours:.2g} h), RMS error "
         f"at most {_TORQUE.text(problem.largest_error)}, {100 * problem.reserve:.0f} % of the gas as reserve"
     )
 
@@ -311,9 +307,9 @@ def _remarks(sizing: Sizing) -> tuple[str, ...]:
 
 def _method(problem: SizingProblem) -> tuple[str, ...]:
     """Return sentences on the method of the sizing study."""
-    others = f" with {', '.join(part.title for part in problem.carried)}" if problem.carried else ""
+    carried = f" with {', '.join(part.title for part in problem.carried)}" if problem.carried else ""
     return (
-        f"The mass counts valve and full bottle{others}.",
+        f"The mass counts valve and full bottle{carried}.",
         f"{problem.simulated} repetitions of the profile were simulated from the initial state of the scenario; "
         "error and gas cover all of them, including the first filling of the chambers. Friction, leak, dead volumes "
         "and sensors are the scenario's; what the data sheet of a valve does not state is taken as ideal.",
@@ -355,14 +351,14 @@ def _tables(sizing: Sizing) -> tuple[finding.Section, finding.Section]:
         )
         if sized is sizing.choice:
             marked.append(len(margins))
-        of_each = [None if sized.margins is None else getattr(sized.margins, margin) for margin in _MARGINS]
-        margins.append((name, *of_each, ", ".join(gains) or "none to choose"))
+        fractions = [None if sized.margins is None else getattr(sized.margins, margin) for margin in _MARGINS]
+        margins.append((name, *fractions, ", ".join(gains) or "none to choose"))
     fraction = Kind(quantity="fraction", form=".0f")
     head: list[str | tuple[str, Kind]] = ["valve", *((f"{name} margin", fraction) for name in _MARGINS), "gains"]
     chosen = () if sizing.suggested is None else (sizing.suggested,)
     return (
         finding.Section("Valves", columns_of(_HEAD, rows), marked=chosen),
-        finding.Section("SizingMargins" if margins else "", columns_of(head, margins), marked=marked),
+        finding.Section("Margins" if margins else "", columns_of(head, margins), marked=marked),
     )
 
 

@@ -262,8 +262,8 @@ class SizingProblem:
     @property
     def torque_constant(self) -> float:
         """Torque constant of the actuator [m^3]."""
-        own = self.scenario.device.actuator.torque_constant
-        return own if self.actuator is None else self.actuator.values["torque_constant"]
+        constant = self.scenario.device.actuator.torque_constant
+        return constant if self.actuator is None else self.actuator.values["torque_constant"]
 
     @property
     def carried(self) -> tuple[Part, ...]:

@@ -100,19 +100,19 @@ class Trials:
         error, gas = np.empty((2, streams, count))
         chunk = max(1, _AT_ONCE // streams)
         for start in range(0, count, chunk):
-            part = slice(start, start + chunk)
-            tiled = {path: np.tile(values[part], streams) for path, values in columns.items()}
+            rows = slice(start, start + chunk)
+            tiled = {path: np.tile(values[rows], streams) for path, values in columns.items()}
             if self.seeds.size:
-                tiled[NOISE] = np.repeat(self.seeds, pressure[part].size)
-            # How far a loop may lag is the limit of the design, so that no other number of tracking is asked for.
+                tiled[NOISE] = np.repeat(self.seeds, pressure[rows].size)
+            # The error limit of the design judges the tracking: no other tracking metric is needed.
             result = run_ensemble(scenario, tiled, (ERROR, GAS, REVERSALS), threads=self._threads)
             # A loop that oscillates is no design, whatever its error is.
-            turns = oscillating(result.metrics, scenario)
-            error[:, part] = np.where(turns, np.nan, result.metrics[ERROR]).reshape(streams, -1)
-            gas[:, part] = np.where(turns, np.nan, result.metrics[GAS]).reshape(streams, -1)
-            self.runs += turns.size
+            oscillates = oscillating(result.metrics, scenario)
+            error[:, rows] = np.where(oscillates, np.nan, result.metrics[ERROR]).reshape(streams, -1)
+            gas[:, rows] = np.where(oscillates, np.nan, result.metrics[GAS]).reshape(streams, -1)
+            self.runs += oscillates.size
             self.failures.update(result.reasons.values())
-            self.failures += Counter({OSCILLATES: int(np.count_nonzero(turns))})
+            self.failures += Counter({OSCILLATES: int(np.count_nonzero(oscillates))})
         trial = np.empty(count, TRIAL)
         trial["pressure"], trial["gains"] = pressure, gains
         trial["error"], trial["gas"] = error.max(axis=0), gas.mean(axis=0) / self.problem.simulated
@@ -148,12 +148,12 @@ class Trials:
                 columns[f"actuator.{name}"] = np.full(count, problem.actuator.values[name])
         columns |= {"supply.pressure": pressure, "supply.dorsiflexion_pressure": pressure}
         settings = problem.scenario.controller.settings
-        follows = self.right_gain(columns) / self.right_gain({}) if problem.gains else 1.0
+        gain_ratio = self.rule_gain(columns) / self.rule_gain({}) if problem.gains else 1.0
         for index, path in enumerate(problem.gains):
-            columns[path] = self.gain_sets[gains, index] * settings[path.rpartition(".")[2]] * follows
+            columns[path] = self.gain_sets[gains, index] * settings[path.rpartition(".")[2]] * gain_ratio
         return columns
 
-    def right_gain(self, columns: Mapping[str, Floats]) -> Any:
+    def rule_gain(self, columns: Mapping[str, Floats]) -> Any:
         """Return the proportional gain [1/(N m)] of the tuning rules.
 
         ``columns`` replace numbers of the device by path.
@@ -175,8 +175,8 @@ def try_pressures(trials: Trials, valve: Part) -> Trial:
     if np.isnan(tried["error"]).all():
         reason = next(iter(trials.failures), "no reason was given")
         raise StudyError(f"{problem.file}: every run with '{valve.name}' failed; the first: {reason}")
-    while first := first_of(works_in(problem, tried)):
-        lower, upper = tried["pressure"][first - 1 : first + 1]
+    while lowest := first_of(works_in(problem, tried)):
+        lower, upper = tried["pressure"][lowest - 1 : lowest + 1]
         if upper - lower <= FINENESS:
             break
         # Without both ends, which were tried before.
@@ -205,16 +205,18 @@ def limit_of(trials: Trials, valve: Part, tried: Trial) -> Limit:
     """
     problem = trials.problem
     first = first_of(works_in(problem, tried))
-    # The lowest of all that were tried.
+    # No lower pressure was tried.
     if first == 0:
         return "pressure"
-    atmosphere, alone = problem.atmosphere, ceiling_pressure(problem)
-    reached = float(tried["pressure"][-1 if first is None else first])
-    if reached - atmosphere <= NEAR_CEILING * (alone - atmosphere):
+    atmosphere, ceiling_limit = problem.atmosphere, ceiling_pressure(problem)
+    lowest = float(tried["pressure"][-1 if first is None else first])
+    if lowest - atmosphere <= NEAR_CEILING * (ceiling_limit - atmosphere):
         return "torque"
-    pressure = np.array([0.5 * (reached + alone)])
-    would_do = any(trials.best(valve, pressure, wider)["error"][0] <= problem.largest_error for wider in WIDER)
-    return "flow" if would_do else "control"
+    pressure = np.array([0.5 * (lowest + ceiling_limit)])
+    is_limited_by_flow = any(
+        trials.best(valve, pressure, wider)["error"][0] <= problem.largest_error for wider in WIDER
+    )
+    return "flow" if is_limited_by_flow else "control"
 
 
 def ceiling_pressure(problem: SizingProblem) -> float:
@@ -222,13 +224,13 @@ def ceiling_pressure(problem: SizingProblem) -> float:
     from scipy.optimize import brentq
 
     atmosphere = problem.atmosphere
-    whole = atmosphere + problem.profile.largest / problem.torque_constant
-    least = peak_pressure(problem)
-    # No root is there to be found where the limit is kept without any torque: brentq needs a change of sign.
+    uncut = atmosphere + problem.profile.largest / problem.torque_constant
+    for_peak = peak_pressure(problem)
+    # A limit that is kept without any torque has no root: brentq needs a change of sign.
     if cut_error(problem, atmosphere) <= problem.largest_error:
-        return least
-    cut = float(brentq(lambda pressure: cut_error(problem, pressure) - problem.largest_error, atmosphere, whole))
-    return max(cut, least)
+        return for_peak
+    root = float(brentq(lambda pressure: cut_error(problem, pressure) - problem.largest_error, atmosphere, uncut))
+    return max(root, for_peak)
 
 
 def peak_pressure(problem: SizingProblem) -> float:
@@ -241,9 +243,8 @@ def cut_error(problem: SizingProblem, pressure: float) -> float:
     # The end of a period is its start again and must count once.
     # Two thousand points: the crest of a push-off, a tenth of a stride, still has two hundred.
     time = np.linspace(0.0, problem.profile.period, 2001)[:-1]
-    wanted = problem.profile.at(time)
-    most = ceiling(problem, pressure)
-    return float(np.sqrt(np.mean((wanted - np.clip(wanted, -most, most)) ** 2)))
+    torque, largest = problem.profile.at(time), ceiling(problem, pressure)
+    return float(np.sqrt(np.mean((torque - np.clip(torque, -largest, largest)) ** 2)))
 
 
 def ceiling(problem: SizingProblem, pressure: float) -> float:

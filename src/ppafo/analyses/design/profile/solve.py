@@ -35,16 +35,16 @@ def size_for_profile(problem: SizingProblem, threads: int | None = None, report:
 
     Raises StudyError if all runs fail.
     """
-    begun = time.perf_counter()
+    started = time.perf_counter()
     trials = Trials(problem, threads)
     sized = []
-    for count, part in enumerate(problem.valves):
-        passed = time.perf_counter() - begun
-        report(Progress(f"trying {part.name}", count, len(problem.valves), 0, 0, passed, "valves"))
-        sized.append(_size_valve(trials, part))
-    good = [row for row, valve in enumerate(sized) if valve.works and valve.mass is not None]
+    for count, valve in enumerate(problem.valves):
+        elapsed = time.perf_counter() - started
+        report(Progress(f"trying {valve.name}", count, len(problem.valves), 0, 0, elapsed, "valves"))
+        sized.append(_size_valve(trials, valve))
+    working = [row for row, valve in enumerate(sized) if valve.works and valve.mass is not None]
     # Of valves with the same bottle and mass the one at the lowest pressure.
-    suggested = min(good, key=lambda row: (sized[row].mass, sized[row].pressure), default=None)
+    suggested = min(working, key=lambda row: (sized[row].mass, sized[row].pressure), default=None)
     recording = None
     if suggested is not None:
         choice = sized[suggested]
@@ -58,7 +58,7 @@ def size_for_profile(problem: SizingProblem, threads: int | None = None, report:
         recording=recording,
         runs=trials.runs,
         failures=dict(trials.failures),
-        seconds=time.perf_counter() - begun,
+        seconds=time.perf_counter() - started,
         streams=trials.seeds.size,
     )
 
@@ -75,51 +75,51 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
     problem = trials.problem
     tried = try_pressures(trials, valve)
     works = works_in(problem, tried)
-    first = first_of(works)
+    lowest = first_of(works)
     in_all = tried["gas"] * problem.repetitions * (1.0 + problem.reserve)
     bottles = [smallest_bottle(problem.bottles, gas) for gas in in_all.tolist()]
-    # The pressure with the lightest bottle, of these the lowest. Without a bottle it is the lowest that works; where
-    # none works, the one with the smallest error, which is infinite for failed runs: argmin would take nan for it.
-    if first is None:
-        least = int(np.argmin(np.where(np.isnan(tried["error"]), np.inf, tried["error"])))
+    if lowest is None:
+        # The smallest error; argmin would take a failed run, whose error is nan.
+        chosen = int(np.argmin(np.where(np.isnan(tried["error"]), np.inf, tried["error"])))
     else:
+        # The lightest bottle at the lowest pressure; without any bottle, the lowest pressure that works.
         full = [np.inf if bottle is None else bottle.full_mass for bottle in bottles]
         masses = np.where(works, full, np.inf)
-        least = int(np.argmin(masses)) if np.isfinite(masses).any() else first
-    pressure, error, gas, gains = tried[least].tolist()
-    gas_in_all = float(in_all[least])
+        chosen = int(np.argmin(masses)) if np.isfinite(masses).any() else lowest
+    pressure, error, gas, gains = tried[chosen].tolist()
+    gas_in_all = float(in_all[chosen])
     bottle, is_cold, remarks = None, False, []
-    if first is None:
+    if lowest is None:
         rated = highest_pressure(problem, valve)
         if rated < problem.highest_pressure:
             remarks.append(f"not tried above {PRESSURE.text(rated)}, the rated pressure of its parts")
     else:
         bottle, is_cold = _lasting_bottle(problem, gas, gas_in_all, pressure)
-        failing = np.flatnonzero(~works[first:])
+        failing = np.flatnonzero(~works[lowest:])
         if failing.size:
-            text = PRESSURE.text(float(tried["pressure"][first + failing[0]]))
+            text = PRESSURE.text(float(tried["pressure"][lowest + failing[0]]))
             remarks.append(f"at {text} the error limit is exceeded again")
     if is_cold:
         remarks.append("a lighter bottle has enough gas, but gets too cold before the end")
-    if first is not None and bottles[least] is None:
+    if lowest is not None and bottles[chosen] is None:
         largest = max(problem.bottles, key=lambda part: part.values["content"])
-        lasts = f"{largest.name} lasts for {100.0 * largest.values['content'] / gas_in_all:.0f} % of the use"
-        remarks.append(f"no bottle is large enough: {lasts}")
-    used = gas * problem.repetitions
+        duration = f"{largest.name} lasts for {100.0 * largest.values['content'] / gas_in_all:.0f} % of the use"
+        remarks.append(f"no bottle is large enough: {duration}")
+    gas_used = gas * problem.repetitions
     margins = None
-    if first is not None:
+    if lowest is not None:
         margins = SizingMargins(
             error=1.0 - error / problem.largest_error,
             torque=ceiling(problem, pressure) / problem.profile.largest - 1.0,
             flow=flow_margin(trials, valve, pressure),
-            gas=None if bottle is None or used <= 0.0 else bottle.values["content"] / used - 1.0,
+            gas=None if bottle is None or gas_used <= 0.0 else bottle.values["content"] / gas_used - 1.0,
         )
     columns = trials.columns(valve, np.array([pressure]), np.array([gains]), np.ones(1))
     return SizedValve(
         valve=valve,
-        works=first is not None,
+        works=lowest is not None,
         pressure=pressure,
-        lowest_pressure=None if first is None else float(tried["pressure"][first]),
+        lowest_pressure=None if lowest is None else float(tried["pressure"][lowest]),
         gains={path: float(columns[path][0]) for path in problem.gains},
         error=error,
         gas=gas,
@@ -143,9 +143,9 @@ def _lasting_bottle(problem: SizingProblem, gas: float, in_all: float, pressure:
         return smallest_bottle(problem.bottles, in_all), False
     enough = [bottle for bottle in problem.bottles if bottle.values["content"] >= in_all]
     period, paper = problem.profile.period, load_bottle(PAPER_BOTTLE)
-    needed = problem.repetitions * period
+    duration = problem.repetitions * period
     # A second more than the use, so that a bottle that lasts is one whose time is up.
-    schedule = Schedule(needed + 1.0, 0.0, max(needed, 1.0))
+    schedule = Schedule(duration + 1.0, 0.0, max(duration, 1.0))
     for number, part in enumerate(sorted(enough, key=lambda bottle: bottle.full_mass)):
         changes = [
             f"{path}={entry.value} {entry.unit}"

@@ -54,26 +54,20 @@ def alternatives_to(
     bottle = max(shelf.bottles, key=lambda bottle: bottle.values["content"])
     candidates = [_Candidate(requirements, pair) for pair in tried]
     candidates += _at_less_pressure(requirements, tried, report)
-    able = sorted((at for at in candidates if at.pair.has(requirements)), key=lambda at: at.pair.flow)
-    # A device whose toes drag is no alternative.
-    weak = sorted(
-        (
-            at
-            for at in candidates
-            if at.pair.toes >= requirements.clearance and not requirements.is_reached_by(at.pair.torque)
-        ),
-        key=lambda at: -at.pair.torque,
-    )
-    low = sorted(
-        (
-            at
-            for at in candidates
-            if requirements.is_reached_by(at.pair.torque) and 0.0 <= at.pair.toes < requirements.clearance
-        ),
-        key=lambda at: -at.pair.toes,
-    )
+    able = [candidate for candidate in candidates if candidate.pair.has(requirements)]
+    able.sort(key=lambda candidate: candidate.pair.flow)
+    weak, low = [], []
+    for candidate in candidates:
+        is_strong = requirements.is_reached_by(candidate.pair.torque)
+        if not is_strong and candidate.pair.toes >= requirements.clearance:
+            weak.append(candidate)
+        # A device whose toes drag is no alternative.
+        elif is_strong and 0.0 <= candidate.pair.toes < requirements.clearance:
+            low.append(candidate)
+    weak.sort(key=lambda candidate: -candidate.pair.torque)
+    low.sort(key=lambda candidate: -candidate.pair.toes)
     report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
-    nearest = [] if able else [_as_walked(lesser[0], bottle, shelf) for lesser in (weak, low) if lesser]
+    nearest = [] if able else [_as_walked(group[0], bottle, shelf) for group in (weak, low) if group]
     alternatives = [
         alternative for alternative in (_thriftiest(able, bottle, shelf), *nearest) if alternative is not None
     ]
@@ -111,8 +105,8 @@ def _at_more_pressure(requirements: DesignRequirements, tried: Sequence[WalkedDe
     """
     best: list[WalkedDevice] = []
     for kind in dict.fromkeys(pair.valve.kind for pair in tried):
-        of_kind = [pair for pair in tried if pair.valve.kind == kind]
-        strongest, highest = max(of_kind, key=lambda pair: pair.torque), max(of_kind, key=lambda pair: pair.toes)
+        pairs = [pair for pair in tried if pair.valve.kind == kind]
+        strongest, highest = max(pairs, key=lambda pair: pair.torque), max(pairs, key=lambda pair: pair.toes)
         best += {(pair.valve.name, pair.actuator.name): pair for pair in (strongest, highest)}.values()
     for factor in _MORE_PRESSURE:
         higher = requirements.at_gauge(factor)
@@ -127,13 +121,13 @@ def _thriftiest(able: Sequence[_Candidate], bottle: Part, shelf: AvailableParts)
 
     Among the first few candidates, one that keeps the required toe clearance on the bottle is preferred.
     """
-    first: Alternative | None = None
+    fallback: Alternative | None = None
     for candidate in able[:_MOST_WALKED]:
         alternative = _as_walked(candidate, bottle, shelf)
         if alternative is not None and alternative.requirements.clearance >= candidate.requirements.clearance:
             return alternative
-        first = alternative if first is None else first
-    return first
+        fallback = alternative if fallback is None else fallback
+    return fallback
 
 
 def _lasting(

@@ -62,9 +62,9 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
     stature = f"{requirements.height:.4g} m"
     if requirements.stature is None:
         stature += f" (assumed: a body mass index of {BODY_MASS_INDEX:g} kg/m^2; give --stature)"
-    said = [f"a wearer of {requirements.mass:.4g} kg and {stature}; {requirements.text()}"]
+    sentences = [f"a wearer of {requirements.mass:.4g} kg and {stature}; {requirements.text()}"]
     if requirements.toes is None and requirements.clearance < TOES:
-        said.append(
+        sentences.append(
             f"the lowest height of the toes in the healthy gait itself is {CLEARANCE.text(sizing.healthy_toes)}"
         )
     sections = (
@@ -76,7 +76,7 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
         name="design",
         kicker="From a wearer to a device",
         title="The device",
-        said=said,
+        said=sentences,
         parts=(*sections, finding.Section("How to read it", said=_READING, is_detail=True)),
         found=sizing,
         passed=device is not None,
@@ -89,11 +89,11 @@ def _sections(requirements: DesignRequirements, device: SizedDevice) -> tuple[fi
     # A walk on a bottle may end at nine tenths of the request, so how far it fell short is said.
     short = f" ({100.0 * share:.0f} % of the request: pressure falls with the bottle)" if share < 1.0 else ""
     low, high = (share * walk_of(walked.scenario).gait.body_mass for share in SCALED_MASS)
-    wanted, lasts = f"{requirements.seconds / 60.0:.4g} min", minutes_text(device.life.discharge.walking_time)
+    duration, lasts = f"{requirements.seconds / 60.0:.4g} min", minutes_text(device.life.discharge.walking_time)
     last = TORQUE.text(float(walked.peak_torques[-1]))
     rows = (
         ("controller", f"{walked.scenario.controller.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
-        ("lasts", f"{lasts}, of {wanted}"),
+        ("lasts", f"{lasts}, of {duration}"),
         ("then", device.life.discharge.ending.message),
         ("peak torque", f"{TORQUE.text(device.torque)} in the mean stride{short}, {last} in the last"),
         ("lowest toes", f"{CLEARANCE.text(device.toes)} over the ground in mid-swing"),
@@ -110,7 +110,7 @@ def _sections(requirements: DesignRequirements, device: SizedDevice) -> tuple[fi
         remarks.append(
             f"the gait is known for {low:.0f} to {high:.0f} kg: outside this range, torque and gas are extrapolated"
         )
-    caption, draw = _CAPTION.format(wished=wanted, lasts=lasts), partial(bottle_figure, walked)
+    caption, draw = _CAPTION.format(wished=duration, lasts=lasts), partial(bottle_figure, walked)
     masses = ((name, MASS.text(mass, ".0f")) for name, mass in device.masses.items())
     return (
         finding.Section("The walk on its bottle", facts(rows), remarks=remarks, code=device.command),

@@ -59,10 +59,12 @@ def shelf_of(catalogue: str | Path) -> AvailableParts:
 
     Raises ParameterError if the catalogue cannot be read, StudyError if no walk is known for its valves.
     """
-    own, usual = load_catalogue(catalogue).groups, load_catalogue().groups
-    groups = {group: own[group] or parts for group, parts in usual.items()}
+    user_groups, package_groups = load_catalogue(catalogue).groups, load_catalogue().groups
+    groups = {group: user_groups[group] or parts for group, parts in package_groups.items()}
     groups["valves"] = {name: part for name, part in groups["valves"].items() if part.kind in WALKS}
     if not groups["valves"]:
         raise StudyError(f"--catalogue {catalogue}: no valve is of a kind that walks: {', '.join(WALKS)}")
     is_own = Path(catalogue).suffix == ".toml"
-    return AvailableParts(groups, frozenset(name for name in own if own[name] and is_own), str(catalogue))
+    return AvailableParts(
+        groups, frozenset(name for name in user_groups if user_groups[name] and is_own), str(catalogue)
+    )

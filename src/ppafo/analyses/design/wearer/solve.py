@@ -90,14 +90,14 @@ def _device(
     )
     # Both regulators may be of one part.
     regulators = [shelf.part("regulators", name) for name in _REGULATORS]
-    of_regulators = {f"regulator {part.name}": part.full_mass for part in regulators}
-    if len(of_regulators) < len(regulators):
-        of_regulators = {f"2 x {name}": 2.0 * mass for name, mass in of_regulators.items()}
+    regulator_masses = {f"regulator {part.name}": part.full_mass for part in regulators}
+    if len(regulator_masses) < len(regulators):
+        regulator_masses = {f"2 x {name}": 2.0 * mass for name, mass in regulator_masses.items()}
     masses = {
         f"actuator {pair.actuator.name}": pair.actuator.full_mass,
         f"valve {pair.valve.name}": pair.valve.full_mass,
         f"bottle {bottle.name}, full": bottle.full_mass,
-        **of_regulators,
+        **regulator_masses,
         "shut-off valve": SHUT_OFF_PARTS["mass"],
         f"processor {processor.name}": processor.full_mass,
         f"battery, {electrical.cells} x {cell.name}": electrical.mass,

@@ -49,19 +49,21 @@ def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -
     is_followed = valve.kind == _PROPORTIONAL
     own_limit = float(load_walk(WALKS[valve.kind]).controller.settings["largest_torque"])
     # No request above what the supply pressure can hold with this actuator; those that are equal then are one.
-    held = actuator.values["torque_constant"] * (requirements.pressure - STANDARD_ATMOSPHERE)
-    follows = dict.fromkeys(min(factor * requirements.torque, held) for factor in _REQUESTS)
-    for request in follows if is_followed else [_ABOVE * requirements.torque]:
+    static_torque = actuator.values["torque_constant"] * (requirements.pressure - STANDARD_ATMOSPHERE)
+    requests = [_ABOVE * requirements.torque]
+    if is_followed:
+        requests = list(dict.fromkeys(min(factor * requirements.torque, static_torque) for factor in _REQUESTS))
+    for request in requests:
         # Requests and limits as their overrides have them, with four digits.
         rounded = float(f"{request:.4g}")
-        asked = written_text(rounded, "N m")
-        limit = (f"controller.largest_torque={asked}",) if request > own_limit else ()
+        text = written_text(rounded, "N m")
+        limit = (f"controller.largest_torque={text}",) if request > own_limit else ()
         peak: tuple[str, ...] = ()
         lifts: list[tuple[str, ...]] = [()]
         if is_followed:
             # The lift in the swing: the walk's own, then one that begins at toe-off, with all torque.
-            torque = float(f"{min(_DORSIFLEXION * held, max(rounded, own_limit)):.4g}")
-            peak = (f"controller.peak_torque={asked}",)
+            torque = float(f"{min(_DORSIFLEXION * static_torque, max(rounded, own_limit)):.4g}")
+            peak = (f"controller.peak_torque={text}",)
             lifts = [(), (f"controller.swing_peak_torque={written_text(torque, 'N m')}", *_EARLY_LIFT)]
         for lift in lifts:
             tried = _strides_of(valve, actuator, (*common, *peak, *limit, *lift))

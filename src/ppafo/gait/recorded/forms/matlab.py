@@ -29,7 +29,7 @@ def _read(path: str | Path) -> MotionTable:
     name = next((name for name in file.columns if name.rpartition(".")[2].lower() in _TIMES), None)
     if name is None:
         names = ", ".join(list(file.columns)[:12])
-        raise DataError(f"{path}: no variable is called 'time' or 't'; it has {names}{file.said_of_objects()}")
+        raise DataError(f"{path}: no variable is called 'time' or 't'; it has {names}{file.advice_on_objects()}")
     time = file.columns[name]
     columns = {other: values for other, values in file.columns.items() if other != name and values.size == time.size}
     columns |= {

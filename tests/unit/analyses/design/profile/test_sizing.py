@@ -99,6 +99,7 @@ def test_a_sizing_is_drawn_and_told_as_data_like_any_answer(sizing: Sizing) -> N
     (legend,) = finding_of(sizing).plot().legends  # above both panels
     assert [text.get_text() for text in legend.get_texts()] == ["Enfield Technologies LS-V05s"]
     assert finding_of(sizing).to_dict()["suggested"] == "enfield-ls-v05s"
+    assert "\nMargins\n" in str(finding_of(sizing))
 
 
 def test_a_tenth_of_a_psi_less_is_not_enough(sizing: Sizing) -> None:

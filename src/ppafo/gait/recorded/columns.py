@@ -1,0 +1,137 @@
+"""Columns of a curve in the tables of a walk: found by name, summed in SI units, and missed by name."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from textwrap import shorten
+
+import numpy as np
+
+from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted
+from ppafo.gait.recorded.mapping import (
+    setting_text,
+)
+from ppafo.gait.recorded.near_columns import nearest_column
+from ppafo.gait.recorded.table import MotionTable
+from ppafo.signals.recording import Floats
+from ppafo.units import to_si
+from ppafo.wording import one_line
+
+LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
+"""Curves that are undefined while the foot is off a force plate, which does not count as a gap."""
+_MOST_NAMES, _LONGEST_TEXT = 12, 160
+"""Limits of a message: number of column names, and characters of the names and of a remark."""
+_COORDINATES = (".x", ".y", ".z")
+"""Ends of the names of the coordinates of a marker."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CurveColumns:
+    """Columns of a curve: unit key in a gait map, table, and terms as pairs of sign and column name."""
+
+    unit_key: str
+    table: MotionTable
+    terms: tuple[tuple[float, str], ...]
+    may_be_absent: bool = False
+
+    def in_unit(self, stated: str | None, si_units: Sequence[str]) -> tuple[Floats, str]:
+        """Return the sum of the terms in the first SI unit that fits, and this unit; raises DataError if none fits."""
+        total = np.zeros(self.table.time.size)
+        chosen = si_units[0]
+        wrong: list[PpafoError] = []
+        for sign, name in self.terms:
+            if not self.may_be_absent:
+                with noted_in(wrong):
+                    check_recorded(self.table.columns[name], f"{self.table.file}: column {name!r}")
+            with noted_in(wrong):
+                values, chosen = self._column(name, stated, si_units)
+                total += sign * values
+        raise_noted(wrong)
+        return total, chosen
+
+    def _column(self, name: str, stated: str | None, si_units: Sequence[str]) -> tuple[Floats, str]:
+        """Return a column in the first SI unit that fits, and this unit; raises DataError if none fits."""
+        where = f"{self.table.file}: column {name!r}"
+        unit = stated or self.table.units[name]
+        values = self.table.columns[name]
+        if not unit:
+            gait_map = f"a gait map ({setting_text('columns')})"
+            raise DataError(f"{where}: the file does not state its unit; give {self.unit_key} in {gait_map}")
+        parsed_unit = "" if unit == "-" else unit
+        problem = ""
+        for si_unit in si_units:
+            try:
+                # Units are affine: two conversions give scale and zero for a whole column.
+                zero, one = (to_si(number, parsed_unit, si_unit) for number in (0.0, 1.0))
+            except UnitError as error:
+                problem = problem or str(error)
+                continue
+            return zero + (one - zero) * values, si_unit
+        raise DataError(f"{where} [{unit}]: {problem}")
+
+
+def check_recorded(values: Floats, where: str) -> None:
+    """Raise DataError for a column without any number; ``where`` is its name in the message."""
+    if not np.isfinite(values).any():
+        raise DataError(f"{where} contains no numbers; use another file, or map another column")
+
+
+def find_columns(
+    curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool
+) -> CurveColumns | None:
+    """Return the columns of a curve from the one table that has all of them; None for an optional curve without any."""
+    unsigned = [name.removeprefix("-") for name in names]
+    # One table must have all terms: files need not share a clock to the sample.
+    holders = [table for table in tables if all(name in table.columns for name in unsigned)]
+    if len(holders) > 1:
+        files = " and ".join(table.file for table in holders)
+        raise DataError(
+            f"{curve}: both {files} have the column {unsigned[0]!r}; give one of them, or name another column"
+        )
+    if holders:
+        signs = [-1.0 if name.startswith("-") else 1.0 for name in names]
+        terms = tuple(zip(signs, unsigned, strict=True))
+        return CurveColumns(f"{curve}.unit", holders[0], terms, curve in LOADS)
+    if optional and not any(name in table.columns for name in unsigned for table in tables):
+        return None
+    raise DataError(missing_column({curve: unsigned}, tables))
+
+
+def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTable]) -> str:
+    """Return a message on the missing columns of curves; ``names`` are the unsigned columns of each curve."""
+    reasons = "; ".join(_why_missing(curve, columns, tables) for curve, columns in names.items())
+    return f"{reasons} {_columns_text(tables)}"
+
+
+def _why_missing(curve: str, names: Sequence[str], tables: Sequence[MotionTable]) -> str:
+    """Return a text on the missing column of a curve, with the nearest name; raises DataError for duplicates."""
+    known = [name for table in tables for name in table.columns]
+    missing = next((name for name in names if name not in known), names[0])
+    twins = [name for name in known if re.fullmatch(re.escape(_marker(missing)) + r"#\d+(\.[xyz])?", name)]
+    if twins:
+        files = ", ".join(table.file for table in tables)
+        either = " or ".join(repr(_marker(name)) for name in twins if name[-2:] not in _COORDINATES[1:])
+        raise DataError(
+            f"{curve}: {files} has {_marker(missing)!r} more than once, and they differ: choose one, "
+            f"{either}, in a gait map ({setting_text('columns')})"
+        )
+    if missing in known:
+        return f"{curve}: no file has all of its columns"
+    return f"{curve}: there is no column {missing!r}{nearest_column(missing, known)}"
+
+
+def _columns_text(tables: Sequence[MotionTable]) -> str:
+    """Return the columns and remarks of files, shortened, and a hint to name columns in a gait map, as text."""
+    # A marker counts once, not by its coordinates.
+    names = list(dict.fromkeys(one_line(_marker(name)) for table in tables for name in table.columns))
+    first_names = ", ".join(names[:_MOST_NAMES]) + (", ..." if len(names) > _MOST_NAMES else "")
+    texts = [first_names, *(one_line(remark) for table in tables for remark in table.remarks)]
+    listed = "; ".join(shorten(text, _LONGEST_TEXT, placeholder=" ...") for text in texts)
+    files = ", ".join(table.file for table in tables)
+    schema = f"a gait map ({setting_text('columns')}), 'ppafo doctor --schema gait-map'"
+    return f"({files}: {listed}); name the columns in {schema}"
+
+
+def _marker(name: str) -> str:
+    """Return the marker of a coordinate; any other column name is returned unchanged."""
+    return name[:-2] if name[-2:] in _COORDINATES else name
