@@ -100,10 +100,12 @@ def follow_entry(
         # The first link that holds wins, so it is the outermost choice.
         for link in reversed(follows):
             number = " + ".join([*(_term(term, rows, collector) for term in link.terms), repr(link.gap)])
-            source = link.sources[0]
-            # Compared with the default to the bit: a value that was written again counts as not set.
-            is_set = f"{cell('settings', source)} != {settings[places[source]].value!r}"
-            text = f"(({number}) if {is_set} else {text})" if link.when_set else f"({number})"
+            text_of_link, source = f"({number})", link.sources[0]
+            if link.when_set:
+                # Compared with the default to the bit: a value that was written again counts as not set.
+                is_set = f"{cell('settings', source)} != {settings[places[source]].value!r}"
+                text_of_link = f"({text_of_link} if {is_set} else {text})"
+            text = text_of_link
         lines.append(f"{name} = {text} if {own} == {settings[places[path]].value!r} else {own}")
         lines.append(f"{cell('followed', path)} = {name}")
     head = boundary.head("follow", dict.fromkeys(("settings", "followed"), "float64[::1]"))
