@@ -36,39 +36,39 @@ class RequestedProgram:
         digest = hashlib.sha256(without_origins(self.source).encode()).hexdigest()[:24]
         return f"ppafo_{self.compiler.name}_{self.compiler.effort.name.lower()}_{digest}"
 
-    def place(self, folder: Path) -> Path:
-        """Path of the cached program in ``folder``."""
-        return folder / f"{self.name}-{short_hash(self.compiler.identity())}"
+    def folder_in(self, cache: Path) -> Path:
+        """Folder of the program in the cache folder."""
+        return cache / f"{self.name}-{short_hash(self.compiler.identity())}"
 
     def compile(self, path: Path) -> ModuleType:
         """Compile the program; the result is stored next to ``path`` if ``path`` is absolute."""
         return execute(self.name, self.source, path, self.compiler.compile_text)
 
 
-def load_kept_module(kept: Path, wanted: RequestedProgram) -> ModuleType | None:
+def load_kept_module(folder: Path, program: RequestedProgram) -> ModuleType | None:
     """Return the module of a cached program; None if it is missing. A damaged program is removed."""
-    if not os.path.lexists(kept):
+    if not os.path.lexists(folder):
         return None
-    if not is_whole(kept):
-        logger.warning("ppafo: the compiled model %s is damaged; it is made anew", kept.name)
-        remove(kept)
+    if not is_whole(folder):
+        logger.warning("ppafo: the compiled model %s is damaged; it is made anew", folder.name)
+        remove(folder)
         return None
     try:
-        path = kept / f"{wanted.name}.py"
-        module = execute(wanted.name, wanted.source, path, wanted.compiler.run_text)
-        os.utime(kept)
+        path = folder / f"{program.name}.py"
+        module = execute(program.name, program.source, path, program.compiler.run_text)
+        os.utime(folder)
     except OSError:  # another process has removed it in this instant, or the disk is full
-        return sys.modules.get(wanted.name)
+        return sys.modules.get(program.name)
     return module
 
 
-def execute(name: str, source: str, path: Path, execute: Callable[[str, str, ModuleType], None]) -> ModuleType:
-    """Return the module filled by ``execute``; Python's own bytecode file, which may be damaged, is not used."""
+def execute(name: str, source: str, path: Path, fill: Callable[[str, str, ModuleType], None]) -> ModuleType:
+    """Return the module filled by ``fill``; Python's own bytecode file, which may be damaged, is not used."""
     module = ModuleType(name)
     module.__file__ = str(path)
     sys.modules[name] = module
     try:
-        execute(source, str(path), module)
+        fill(source, str(path), module)
     # A module that was interrupted half-way must not be found by the next import.
     except BaseException:
         del sys.modules[name]
@@ -81,17 +81,17 @@ def short_hash(described: str) -> str:
     return hashlib.sha256(described.encode()).hexdigest()[:12]
 
 
-def is_whole(kept: Path) -> bool:
+def is_whole(folder: Path) -> bool:
     """Return whether all files of a program folder have their recorded hashes."""
     try:
-        stated = json.loads(read_regular_file(kept / CHECKSUMS))
+        stated = json.loads(read_regular_file(folder / CHECKSUMS))
         # What else lies there is no part of it.
         files = stated.items() if isinstance(stated, dict) else ()
         names = [name for name, _ in files]
         return (
             bool(names)
-            and is_own(kept, [CHECKSUMS, *names])
-            and all(hashlib.sha256(read_regular_file(kept / name)).hexdigest() == digest for name, digest in files)
+            and is_own(folder, [CHECKSUMS, *names])
+            and all(hashlib.sha256(read_regular_file(folder / name)).hexdigest() == digest for name, digest in files)
         )
     except (OSError, ValueError, RecursionError):
         return False
@@ -113,5 +113,5 @@ def remove(folder: Path) -> None:
 
 def is_kept(source: str, compiler: Compiler) -> bool:
     """Return whether a program was already loaded with this compiler or is in the cache."""
-    wanted, folder = RequestedProgram(source, compiler), cache_folder()
-    return wanted.name in sys.modules or (folder is not None and os.path.lexists(wanted.place(folder)))
+    program, cache = RequestedProgram(source, compiler), cache_folder()
+    return program.name in sys.modules or (cache is not None and os.path.lexists(program.folder_in(cache)))

@@ -21,12 +21,12 @@ from ppafo.engine.cache.tidying import evict
 from ppafo.engine.compilers import Compiler, Effort
 from ppafo.wording import reason
 
-# One process compiles a program while others wait for it.
-
 try:
     import fcntl
 except ImportError:  # not on this system: each process compiles for itself
     fcntl = None  # type: ignore[assignment]
+
+logger = logging.getLogger("ppafo")
 
 LONGEST_WAIT = 300.0
 """Longest wait for a lock [s], after which a process compiles for itself; a dead process holds no lock."""
@@ -35,46 +35,44 @@ _PAUSE = 0.05
 
 
 @contextlib.contextmanager
-def one_process(kept: Path) -> Iterator[None]:
+def one_process(folder: Path) -> Iterator[None]:
     """Lock a program during its compilation; continue without a lock if none is available."""
-    file = kept.with_name(LOCK + kept.name)
-    held = _lock(file)
+    lock_file = folder.with_name(LOCK + folder.name)
+    descriptor = _lock(lock_file)
     try:
         yield
     finally:
-        if held is not None:
+        if descriptor is not None:
             with contextlib.suppress(OSError):
-                file.unlink()
-            os.close(held)
+                lock_file.unlink()
+            os.close(descriptor)
 
 
-def _lock(place: Path) -> int | None:
-    """Open and lock a file, waiting for its present owner; None if the file cannot be locked."""
+def _lock(lock_file: Path) -> int | None:
+    """Open and lock a file, waiting for its present owner; its descriptor, or None if it cannot be locked."""
     if fcntl is None:
         return None
     end = time.monotonic() + LONGEST_WAIT
     while time.monotonic() < end:
         try:
-            file = os.open(place, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600)
+            descriptor = os.open(lock_file, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600)
         except OSError:
             return None
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             # Who had it before may have removed it in the meantime: then others lock another file of this name.
-            if os.path.samestat(os.fstat(file), os.lstat(place)):
-                return file
+            if os.path.samestat(os.fstat(descriptor), os.lstat(lock_file)):
+                return descriptor
         except BlockingIOError:
             time.sleep(_PAUSE)
         except FileNotFoundError:
             pass
         except OSError:
-            os.close(file)
+            os.close(descriptor)
             return None
-        os.close(file)
+        os.close(descriptor)
     return None
 
-
-logger = logging.getLogger("ppafo")
 
 QUIET = 2.0
 """Duration of a compilation [s] below which no message is shown."""
@@ -106,17 +104,17 @@ def announce(where: str, models: int = 1) -> Iterator[None]:
         logger.warning("ppafo: compiled in %.1f s and %s", seconds, where)
 
 
-def make(wanted: RequestedProgram, kept: Path | None) -> ModuleType:
+def make(program: RequestedProgram, folder: Path | None) -> ModuleType:
     """Compile a program into the cache, or in memory if there is no cache folder or the program cannot be stored."""
-    if kept is not None:
+    if folder is not None:
         try:
-            with one_process(kept):
+            with one_process(folder):
                 # Another process may have compiled it while this one waited for the lock.
-                return load_kept_module(kept, wanted) or _compile_and_keep(kept, wanted)
+                return load_kept_module(folder, program) or _compile_and_keep(folder, program)
         except OSError as error:
-            logger.warning("ppafo: the compiled model is not kept in %s: %s", kept.parent, reason(error))
+            logger.warning("ppafo: the compiled model is not kept in %s: %s", folder.parent, reason(error))
     with announce("not kept"):
-        return wanted.compile(Path(f"<{wanted.name}>"))
+        return program.compile(Path(f"<{program.name}>"))
 
 
 def load_all(programs: Iterable[tuple[str, Effort]], compiler: Compiler, load: Callable[[str, Effort], object]) -> None:
@@ -145,16 +143,16 @@ def load_all(programs: Iterable[tuple[str, Effort]], compiler: Compiler, load: C
             task.result()
 
 
-def _compile_and_keep(kept: Path, wanted: RequestedProgram) -> ModuleType:
+def _compile_and_keep(folder: Path, program: RequestedProgram) -> ModuleType:
     """Compile a program in a temporary folder, which is renamed to its final name when complete."""
     # Written aside and renamed: to other processes a program is whole, or not there.
-    aside = kept.with_name(f".writing-{secrets.token_hex(8)}")
+    aside = folder.with_name(f".writing-{secrets.token_hex(8)}")
     try:
         aside.mkdir(mode=0o700)
-        path = aside / f"{wanted.name}.py"
-        path.write_text(wanted.source, encoding="utf-8")
-        with announce(f"kept in {kept.parent}"):
-            module = wanted.compile(path)
+        path = aside / f"{program.name}.py"
+        path.write_text(program.source, encoding="utf-8")
+        with announce(f"kept in {folder.parent}"):
+            module = program.compile(path)
         files = sorted(file for file in aside.rglob("*") if not file.is_dir())
         hashes = {
             file.relative_to(aside).as_posix(): hashlib.sha256(read_regular_file(file)).hexdigest() for file in files
@@ -163,10 +161,10 @@ def _compile_and_keep(kept: Path, wanted: RequestedProgram) -> ModuleType:
         for entry in aside.rglob("*"):  # compilers let a group write where the user's habits (umask) do
             entry.chmod(0o700 if entry.is_dir() else 0o600)
         with contextlib.suppress(OSError):  # another process was quicker, with the same program
-            aside.rename(kept)
-        evict(kept.parent)
+            aside.rename(folder)
+        evict(folder.parent)
     except OSError:
-        sys.modules.pop(wanted.name, None)
+        sys.modules.pop(program.name, None)
         raise
     finally:
         remove(aside)

@@ -20,23 +20,23 @@ def load_generated(source: str, compiler: Compiler) -> ModuleType:
     Raises ProgramError if the source cannot be compiled, with the source file of the faulty function, and CompilerError
     if the compiler does not work.
     """
-    wanted = RequestedProgram(source, compiler)
+    program = RequestedProgram(source, compiler)
     # A second thread must not get a module of which only the beginning has run.
-    with _LOADING.setdefault(wanted.name, threading.RLock()):
-        if wanted.name in sys.modules:
-            return sys.modules[wanted.name]
-        folder = cache_folder()
+    with _LOADING.setdefault(program.name, threading.RLock()):
+        if program.name in sys.modules:
+            return sys.modules[program.name]
+        cache = cache_folder()
         # Loading runs what lies there, so the folder is looked at each time, not once for the process.
-        why_not = refusal(folder)
-        kept = None if folder is None or why_not else wanted.place(folder)
-        if kept is None:
+        why_not = refusal(cache)
+        folder = None if cache is None or why_not else program.folder_in(cache)
+        if folder is None:
             logger.warning("ppafo: compiled models are not kept: %s; %s names another folder", why_not, CACHE_VARIABLE)
-        module = None if kept is None else load_kept_module(kept, wanted)
+        module = None if folder is None else load_kept_module(folder, program)
         if module is not None:
             return module
         from ppafo.engine.cache.making import make  # most programs are there
 
-        return make(wanted, kept)
+        return make(program, folder)
 
 
 def note_name(compiler: Compiler) -> str:
