@@ -140,7 +140,7 @@ def test_a_torque_that_a_joint_cannot_give_is_said_as_printed_and_what_is_said_t
     said = capsys.readouterr().out
     (printed,) = re.findall(r"^> (the torque stays .*)$", README, re.MULTILINE)
     assert f"hold: completed\n{printed}\n" in said
-    path, value = re.findall(r"with `(\S+) = (.*?)` it does", printed)[0]
+    path, value = re.findall(r"with `(\S+) = (.*?)` it follows", printed)[0]
     mended = ["--set", "device.set=./elbow.toml", "--set", "reference.level=9 N m", "--set", f"{path}={value}"]
     assert main(["simulate", "hold.toml", *mended, "--check"]) == 0
     # How it follows its reference stands between how it ended and the numbers.

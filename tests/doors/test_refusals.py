@@ -96,7 +96,9 @@ def test_a_unit_names_the_parameter_that_python_names(
     pytest.importorskip("fmpy", reason="FMPy is not installed (pip install -e .[dev])")
     with pytest.raises(Exception, match="ExitInitializationMode"):
         Instance(unit, {path: value})
-    assert named in capfd.readouterr().out
+    refusal = capfd.readouterr().out
+    assert named in refusal
+    assert re.search(r"= .+ (is out of range: (at least|at most|above) .|contradicts another parameter)", refusal)
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")

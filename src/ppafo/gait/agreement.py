@@ -112,15 +112,15 @@ def delay_remarks(walk: MeanStride) -> list[str]:
     # Curves that are late by the same time are on one other clock, and are named together.
     together = max(late.values(), default=0.0) - min(late.values(), default=0.0) < LARGEST_DELAY
     groups = [tuple(late)] if late and together else [(name,) for name in late]
-    said = []
+    remarks = []
     for names in groups:
         delay, which = float(np.mean([late[name] for name in names])), " and ".join(names)
         way = "behind" if delay > 0.0 else "ahead of"
-        said.append(
+        remarks.append(
             f"{which}: about {1000.0 * abs(delay):.0f} ms {way} {other}, by healthy walking; are they on one clock, "
             f"with the same filters? Adding {-delay:+.3f} s to their times would bring them together"
         )
-    return said
+    return remarks
 
 
 def _peak(values: Floats, share: float) -> float:
@@ -140,11 +140,11 @@ def _end(values: Floats) -> float:
 
 def size_remarks(walk: MeanStride) -> list[str]:
     """Return remarks on curves whose size does not match the other curves of the mean stride, with the numbers."""
-    said = []
+    remarks = []
     for name, usual in (("shank_angle", USUAL_SHANK), ("ankle_angle", USUAL_ANKLE)):
         turns = float(np.ptp(np.degrees(walk.curves[name])))
         if not usual[0] <= turns <= usual[1]:
-            said.append(
+            remarks.append(
                 f"{name} covers {turns:.0f} deg in a stride, usual are {usual[0]:g} to {usual[1]:g} deg: "
                 "check its scale"
             )
@@ -153,12 +153,12 @@ def size_remarks(walk: MeanStride) -> list[str]:
     lean = shank - np.mean(shank)
     follows, (low, high) = float(np.sum(lean * ankle) / np.sum(lean**2)), USUAL_FOLLOWING
     if follows > high or _RESTS < follows < low:
-        said.append(
+        remarks.append(
             f"ankle_angle turns {follows:.2g} times as far as shank_angle while the foot stands, usual are {low:g} to "
             f"{high:g}: check the scale of both"
         )
     if "ankle_moment" not in walk.curves:
-        return said
+        return remarks
     moment, why = walk.curves["ankle_moment"], "check its scale: N m/kg is per body mass, not per stature or weight"
     peak, force = float(np.max(moment)), walk.curves.get("vertical_force")
     # The lever of the vertical force about the ankle, unless the scale of the force is in doubt itself.
@@ -166,13 +166,13 @@ def size_remarks(walk: MeanStride) -> list[str]:
     if force is not None and not force_remarks(force):
         arm = peak / (STANDARD_GRAVITY * float(force[np.argmax(moment)]))
     if arm is not None and not USUAL_LEVER[0] <= arm <= USUAL_LEVER[1]:
-        said.append(
+        remarks.append(
             f"ankle_moment reaches {peak:.3g} N m/kg, which is the vertical force at {100.0 * arm:.0f} cm from the "
             f"ankle, usual are {100.0 * USUAL_LEVER[0]:.0f} to {100.0 * USUAL_LEVER[1]:.0f} cm: {why}"
         )
     elif arm is None and peak > 0.0 and not USUAL_MOMENT[0] <= peak <= USUAL_MOMENT[1]:
-        said.append(
+        remarks.append(
             f"ankle_moment reaches {peak:.3g} N m/kg, usual are {USUAL_MOMENT[0]:g} to {USUAL_MOMENT[1]:g} N m/kg: "
             f"{why}"
         )
-    return said
+    return remarks

@@ -215,9 +215,9 @@ def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[G
     design = np.hstack(terms)
     # Least squares over all samples, not a transform: both ends belong to one phase, and samples may be few.
     solution = np.linalg.lstsq(design, values, rcond=None)[0]
-    left = design @ solution - values
+    residuals = design @ solution - values
     cosines, sines = solution[1 : harmonics + 1].tolist(), solution[harmonics + 1 :].tolist()
-    error = FitError(float(np.sqrt(np.mean(left**2))), float(np.max(np.abs(left))))
+    error = FitError(float(np.sqrt(np.mean(residuals**2))), float(np.max(np.abs(residuals))))
     return GaitCurve(float(solution[0]), tuple(cosines), tuple(sines), deviation), error
 
 

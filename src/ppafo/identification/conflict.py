@@ -54,13 +54,13 @@ def _groups(runs: FitRuns) -> Iterator[tuple[str, list[slice]]]:
         (block.channel, block.recording, f"{block.channel} of {block.recording}", *block.groups)
         for block in runs.blocks
     ]
-    seen = {tuple((block.rows.start, block.rows.stop) for block in runs.blocks)}
+    known = {tuple((block.rows.start, block.rows.stop) for block in runs.blocks)}
     for column in zip(*labels, strict=True):
         for name in dict.fromkeys(column):
             rows = [block.rows for block, label in zip(runs.blocks, column, strict=True) if label == name]
             key = tuple((part.start, part.stop) for part in rows)
-            if key not in seen:
-                seen.add(key)
+            if key not in known:
+                known.add(key)
                 yield name, rows
 
 

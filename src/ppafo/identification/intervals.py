@@ -33,6 +33,8 @@ _NARROW = 0.1
 _BENT = 1.1
 """Least ratio of profile and linear limits [-] for which the profile is followed."""
 
+_SHOWN_WEIGHT = 0.1
+"""Least weight of a variable in a combination [-] for which it is listed."""
 _UNKNOWN = 0.5
 """Standard error of a combination of scaled variables [-] above which it is not identifiable."""
 
@@ -47,15 +49,15 @@ def interval_ends(runs: FitRuns, point: Floats, linear: Linear, times: float) ->
     low, high = np.maximum(point - wide, runs.low), np.minimum(point + wide, runs.high)
     least = cost_of(runs, runs.residuals_at(point), point, linear)
     sides = [(number, ends) for number in np.flatnonzero(runs.prior == 0.0).tolist() for ends in (low, high)]
-    held = [number for number, _ in sides]
+    fixed = [number for number, _ in sides]
     offsets = np.array([ends[number] - point[number] for number, ends in sides])
-    straight = point[:, None] + covariance[:, held] / covariance[held, held] * offsets
-    first = _least_beside(runs, straight, held, linear)
-    for place, (number, ends) in enumerate(sides):
+    straight = point[:, None] + covariance[:, fixed] / covariance[fixed, fixed] * offsets
+    squares, points = _least_beside(runs, straight, fixed, linear)
+    for side, (number, ends) in enumerate(sides):
         bound = float((runs.low if ends is low else runs.high)[number])
-        if offsets[place] != 0.0:
-            tried = float(first[0][place]), first[1][:, place]
-            ends[number] = _end(runs, point, least, linear, number, bound, tried, times)
+        if offsets[side] != 0.0:
+            at_limit = float(squares[side]), points[:, side]
+            ends[number] = _end(runs, point, least, linear, number, bound, at_limit, times)
     return low, high
 
 
@@ -101,16 +103,16 @@ def _end(
     return float(inner[number] + share * (outer[number] - inner[number]))
 
 
-def _least_beside(runs: FitRuns, points: Floats, held: list[int], linear: Linear) -> tuple[Floats, Floats]:
+def _least_beside(runs: FitRuns, points: Floats, fixed: list[int], linear: Linear) -> tuple[Floats, Floats]:
     """Return the minimum of the squares with one variable fixed, for each scaled point, and the points of the minima.
 
-    ``held`` is the index of the fixed variable of each point. The other variables take Gauss-Newton steps with the
+    ``fixed`` is the index of the fixed variable of each point. The other variables take Gauss-Newton steps with the
     Jacobian of the estimate. The minimum is infinite if no run succeeds.
     """
     covariance, slopes = linear.root @ linear.root.T, linear.rows[:, 1:]
-    low, high, each = runs.low[:, None], runs.high[:, None], np.arange(len(held))
+    low, high, each = runs.low[:, None], runs.high[:, None], np.arange(len(fixed))
     tried = best = np.clip(points, low, high)
-    least = np.full(len(held), np.inf)
+    least = np.full(len(fixed), np.inf)
     for _ in range(_CORRECTIONS + 1):
         errors = whitened_errors(runs, runs.residuals_at_points(tried), linear)
         squares = squares_of(runs, errors, tried)
@@ -119,7 +121,7 @@ def _least_beside(runs: FitRuns, points: Floats, held: list[int], linear: Linear
         pull = slopes.T @ errors + np.square(runs.prior)[:, None] * (tried - runs.start[:, None])
         step = -covariance @ pull
         # Of all steps, the one that leaves the number where it is held.
-        step -= covariance[:, held] / covariance[held, held] * step[held, each]
+        step -= covariance[:, fixed] / covariance[fixed, fixed] * step[fixed, each]
         # To first order the squares fall by that much; where no run succeeds they are no numbers.
         moves = -np.sum(pull * step, axis=0) > _STILL
         if not moves.any():
@@ -167,5 +169,5 @@ def unidentified(covariance: Floats, names: Sequence[str]) -> Iterator[dict[str,
     for variance, vector in zip(variances[::-1].tolist(), vectors.T[::-1], strict=True):
         if math.sqrt(max(variance, 0.0)) > _UNKNOWN:
             largest = float(vector[np.argmax(np.abs(vector))])
-            weights = {name: float(one) / largest for name, one in zip(names, vector, strict=True)}
-            yield {name: one for name, one in weights.items() if abs(one) >= 0.1}
+            weights = {name: float(weight) / largest for name, weight in zip(names, vector, strict=True)}
+            yield {name: weight for name, weight in weights.items() if abs(weight) >= _SHOWN_WEIGHT}

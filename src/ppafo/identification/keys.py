@@ -18,27 +18,27 @@ def quantity_in(
     table: StrictTable,
     key: str,
     unit: str,
-    said: str,
+    where: str,
     low: float = -math.inf,
     high: float = math.inf,
     atmosphere: float = STANDARD_ATMOSPHERE,
 ) -> float | None:
-    """Return the number at a key of a table [unit], None if the key is absent; ``said`` starts messages.
+    """Return the number at a key of a table [unit], None if the key is absent; ``where`` starts messages.
 
     Raises IdentificationError if the text does not fit the unit or the number is not from ``low`` to ``high``.
     """
     text = getattr(table, key)
     if text is None:
         return None
-    value = quantity_of(f"{said}: {key}", text, unit, atmosphere)
+    value = quantity_of(f"{where}: {key}", text, unit, atmosphere)
     if not low <= value <= high:
-        raise IdentificationError(f"{said}: {key} = {text!r} must be from {low:g} to {high:g} {unit}")
+        raise IdentificationError(f"{where}: {key} = {text!r} must be from {low:g} to {high:g} {unit}")
     return value
 
 
-def positive_in(table: StrictTable, key: str, unit: str, said: str) -> float | None:
+def positive_in(table: StrictTable, key: str, unit: str, where: str) -> float | None:
     """Return the number at a key like ``quantity_in``. Raises IdentificationError also if it is not positive."""
-    value = quantity_in(table, key, unit, said)
+    value = quantity_in(table, key, unit, where)
     if value is not None and value <= 0.0:
-        raise IdentificationError(f"{said}: {key} = {getattr(table, key)!r} must be above zero")
+        raise IdentificationError(f"{where}: {key} = {getattr(table, key)!r} must be above zero")
     return value

@@ -41,20 +41,20 @@ class NewSet:
 
 def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], valve: str | None = None) -> NewSet:
     """Return the set with every usable estimate that it has an entry for; later estimates override earlier ones."""
-    found: dict[str, bool] = {}
+    is_identified: dict[str, bool] = {}
     for estimate in estimates:
         find_effects([estimate.path])
         quantity = parameter_set.declarations().get(estimate.path)
         if quantity is not None and estimate.is_usable and is_within(estimate.value, quantity):
             parameter_set = _with_estimate(parameter_set, estimate, quantity)
-            found[estimate.path] = estimate.is_identified
+            is_identified[estimate.path] = estimate.is_identified
     problem = ""
     try:
         build_device(parameter_set, valve)
     except ParameterError as error:
         problem = str(error)
-    written = tuple(path for path, is_identified in found.items() if is_identified)
-    fitted = tuple(path for path, is_identified in found.items() if not is_identified)
+    written = tuple(path for path, is_so in is_identified.items() if is_so)
+    fitted = tuple(path for path, is_so in is_identified.items() if not is_so)
     return NewSet(parameter_set, written, fitted, problem)
 
 
@@ -67,11 +67,7 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
     value, low, high = (
         from_si(number, unit, si_unit, atmosphere) for number in (estimate.value, estimate.low, estimate.high)
     )
-    was = (
-        "the set had no value"
-        if before is None
-        else f"the set had {number_text(before)} ({before.origin}: {before.source})"
-    )
+    previous = "no value" if before is None else f"{number_text(before)} ({before.origin}: {before.source})"
     interval = f"{100.0 * estimate.confidence:g}% interval {low:.6g} to {high:.6g} {unit}".rstrip()
     half_width = half_width_for(CONFIDENCE, max(high - value, value - low), estimate.confidence)
     entry = Entry(
@@ -79,18 +75,18 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
         unit=unit,
         origin="identified" if estimate.is_identified else "fitted",
         source="; ".join(estimate.recordings),
-        note=f"{estimate.verdict}, {interval}; {estimate.explanation.rstrip('.')}. Before, {was}.",
+        note=f"{estimate.verdict}, {interval}; {estimate.explanation.rstrip('.')}. Before, the set had {previous}.",
         # An interval that is cut at a bound is too narrow on that side.
         uncertainty=_in_digits_of(half_width, half_width),
     )
     # An orifice that is given as an area has no sonic conductance any more, and the other way round.
     section, _, name = estimate.path.rpartition(".")
     others = {f"{section}.{member}" for form, other in _FORMS if name in form for member in other}
-    kept = {path: old for path, old in parameter_set.numbers.items() if path not in others}
+    numbers = {path: old for path, old in parameter_set.numbers.items() if path not in others}
     # What was fitted as the pressure of both regulators holds for both.
     links = acting(links_of_set(parameter_set), {estimate.path})
-    found = {path: entry for path in (estimate.path, *(path for path, link in links.items() if link.when_set))}
-    return replace(parameter_set, numbers={**kept, **found})
+    numbers |= dict.fromkeys((estimate.path, *(path for path, link in links.items() if link.when_set)), entry)
+    return replace(parameter_set, numbers=numbers)
 
 
 _DIGITS = 3

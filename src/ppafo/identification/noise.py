@@ -43,21 +43,22 @@ def burg(series: Sequence[Floats], highest: int = HIGHEST_ORDER) -> tuple[float,
     of a bench. Correlated noise in shorter series is therefore not detected, and intervals are too narrow there.
     """
     forward, backward = list(series), list(series)
-    count = sum(len(one) for one in series)
-    power, found, best = 1.0, [], (0.0, 0)
-    for order in range(1, min(highest, count // SAMPLES_PER_COEFFICIENT, min(len(one) for one in series) - 2) + 1):
-        ahead, behind = [one[1:] for one in forward], [one[:-1] for one in backward]
+    count, shortest = sum(map(len, series)), min(map(len, series))
+    power, coefficients, best = 1.0, list[float](), (0.0, 0)
+    for order in range(1, min(highest, count // SAMPLES_PER_COEFFICIENT, shortest - 2) + 1):
+        ahead, behind = [errors[1:] for errors in forward], [errors[:-1] for errors in backward]
         across = sum(float(np.sum(a * b)) for a, b in zip(ahead, behind, strict=True))
         size = sum(float(np.sum(a * a + b * b)) for a, b in zip(ahead, behind, strict=True))
         # Residuals of 0 throughout, of a law without noise, have no memory.
         if size <= 0.0:
             break
-        found.append(max(-_LARGEST_REFLECTION, min(_LARGEST_REFLECTION, 2.0 * across / size)))
-        forward = [a - found[-1] * b for a, b in zip(ahead, behind, strict=True)]
-        backward = [b - found[-1] * a for a, b in zip(ahead, behind, strict=True)]
-        power *= 1.0 - found[-1] ** 2
+        coefficient = max(-_LARGEST_REFLECTION, min(_LARGEST_REFLECTION, 2.0 * across / size))
+        coefficients.append(coefficient)
+        forward = [a - coefficient * b for a, b in zip(ahead, behind, strict=True)]
+        backward = [b - coefficient * a for a, b in zip(ahead, behind, strict=True)]
+        power *= 1.0 - coefficient**2
         best = min(best, (count * math.log(max(power, 1.0e-300)) + 2.0 * order, order))
-    return tuple(found[: best[1]])
+    return tuple(coefficients[: best[1]])
 
 
 def noise_of(series: Sequence[Floats], highest: int = HIGHEST_ORDER, may_drift: bool = True) -> Noise:
@@ -66,23 +67,25 @@ def noise_of(series: Sequence[Floats], highest: int = HIGHEST_ORDER, may_drift: 
     The random walk is tried only if sensors ``may_drift``; an autoregression would need many coefficients for slow
     drift. Columns are summed in power, as in ``burg``.
     """
-    count, size = sum(len(one) for one in series), sum(float(np.square(one).sum()) for one in series)
+    count, size = sum(map(len, series)), sum(float(np.square(values).sum()) for values in series)
     # What is less than the floor is the engine's, and no noise.
     if size < 0.5 * count:
         return Noise(1.0)
     reflection = burg(series, highest)
-    found = Noise(1.0, reflection, 0.0, math.sqrt(math.prod(1.0 - one * one for one in reflection)))
-    best = 2.0 * count * math.log(found.innovation) + 2.0 * len(reflection)
-    last = math.inf
+    innovation = math.sqrt(math.prod(1.0 - coefficient * coefficient for coefficient in reflection))
+    noise = Noise(1.0, reflection, 0.0, innovation)
+    best = 2.0 * count * math.log(innovation) + 2.0 * len(reflection)
+    previous = math.inf
     for gain in _GAINS if may_drift and count >= SAMPLES_PER_COEFFICIENT else ():
-        innovation = math.sqrt(sum(float(np.square(_without_level(one, gain)).sum()) for one in series) / size)
+        squares = sum(float(np.square(_without_level(values, gain)).sum()) for values in series)
+        innovation = math.sqrt(squares / size)
         # With ever less gain the innovations fall, and grow again: what follows is larger still.
-        if innovation > last:
+        if innovation > previous:
             break
-        last, criterion = innovation, 2.0 * count * math.log(innovation) + 2.0
+        previous, criterion = innovation, 2.0 * count * math.log(innovation) + 2.0
         if criterion < best:
-            best, found = criterion, Noise(1.0, (), gain, innovation)
-    return found
+            best, noise = criterion, Noise(1.0, (), gain, innovation)
+    return noise
 
 
 def _without_level(values: Floats, gain: float) -> Floats:
@@ -96,9 +99,9 @@ def whiten(values: Floats, noise: Noise) -> Floats:
     if noise.gain > 0.0:
         return _without_level(forward, noise.gain) / noise.innovation
     backward, power = forward.copy(), 1.0
-    done = forward.copy()
-    for order, one in enumerate(noise.reflection, start=1):
-        forward, backward = forward[1:] - one * backward[:-1], backward[:-1] - one * forward[1:]
-        power *= 1.0 - one * one
-        done[order:] = forward / math.sqrt(power)
-    return done
+    innovations = forward.copy()
+    for order, coefficient in enumerate(noise.reflection, start=1):
+        forward, backward = forward[1:] - coefficient * backward[:-1], backward[:-1] - coefficient * forward[1:]
+        power *= 1.0 - coefficient * coefficient
+        innovations[order:] = forward / math.sqrt(power)
+    return innovations

@@ -179,19 +179,19 @@ def tolerances_of(section: BenchSection | None, file: str) -> Tolerances:
         text = None if section is None else getattr(section, name)
         if text is None:
             continue
-        said = f"{file}: bench: {name}"
-        limit = limits[name] = quantity_of(said, text, unit)
+        where = f"{file}: bench: {name}"
+        limit = limits[name] = quantity_of(where, text, unit)
         # Half of a number on either side is no tolerance of a bench any more, and a misplaced point in most cases.
         if not 0.0 <= limit < math.inf or (unit == "1" and limit > _LARGEST_FRACTION):
             most = f" and at most {_LARGEST_FRACTION:.0%}" if unit == "1" else ""
-            raise IdentificationError(f"{said} = '{text}': must be 0 or above{most}")
+            raise IdentificationError(f"{where} = '{text}': must be 0 or above{most}")
     return Tolerances(**limits, each_recording=() if section is None else section.each_recording)
 
 
-def quantity_of(said: str, text: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Return the number in a text of a problem file, in ``unit``; ``said`` is the file and key in messages.
+def quantity_of(where: str, text: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+    """Return the number in a text of a problem file, in ``unit``; ``where`` is the file and key in messages.
 
     Raises IdentificationError if the text does not fit the unit.
     """
-    with refused_as(IdentificationError, f"{said} = '{text}'", UnitError):
+    with refused_as(IdentificationError, f"{where} = '{text}'", UnitError):
         return parse_quantity(text, unit, atmosphere)

@@ -62,7 +62,7 @@ def with_residuals(
     quantity = "pressure change" if y.quantity == "pressure" else y.quantity
     left = [readings_mark("", at, residuals), Mark("level", (), 0.0, colour=BLACK, style={"linewidth": 1.4})]
     below = Panel(x, Kind("Residual (measured - model)", y.unit, quantity), left, "Residuals", legend="")
-    return Panel(x, y, marks, title, legend="inside"), below
+    return Panel(x, y, marks, title, legend="figure"), below
 
 
 @dataclass(frozen=True, slots=True)

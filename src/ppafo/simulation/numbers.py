@@ -39,11 +39,6 @@ WHOLE_NUMBERS = ("sensors.seed", "wearer.person")
 _RATE, _PERIOD = "controller.rate", "controller.period"
 
 
-def chosen_path(path: str, scenario: Scenario) -> str:
-    """Return the path with ``valve.`` in place of ``valves.NAME.`` if NAME is the valve of the scenario."""
-    return one_path(path, scenario.device.valve_name)
-
-
 _OF_JOINT = ("actuator.", "friction.", "foot_plate.")
 _PARTS = {
     "name": str,
@@ -61,10 +56,13 @@ _PARTS = {
     "links": Mapping,
 }
 """Class of each part of a scenario, for any kind of motion; two of them may be None."""
-
-
 _ACCEPTED: deque[Scenario] = deque(maxlen=16)
 """Scenarios checked last: they are frozen, so that repeated simulation needs no new check."""
+
+
+def chosen_path(path: str, scenario: Scenario) -> str:
+    """Return the path with ``valve.`` in place of ``valves.NAME.`` if NAME is the valve of the scenario."""
+    return one_path(path, scenario.device.valve_name)
 
 
 def check_parts(scenario: Scenario) -> None:
@@ -72,8 +70,8 @@ def check_parts(scenario: Scenario) -> None:
     if any(scenario is accepted for accepted in _ACCEPTED):
         return
 
-    def refusal(path: str, value: Any, must: str) -> ScenarioError:
-        return ScenarioError(f"{scenario.name}: {path} = {shown(value)}: {must}")
+    def refusal(path: str, value: Any, rule: str) -> ScenarioError:
+        return ScenarioError(f"{scenario.name}: {path} = {shown(value)}: {rule}")
 
     for name, kind in _PARTS.items():
         part = getattr(scenario, name)
@@ -85,17 +83,17 @@ def check_parts(scenario: Scenario) -> None:
         raise refusal("motion", scenario.motion, "must be a motion, such as FreeMotion")
     if not isinstance(scenario.controlled, str) or scenario.controlled not in CONTROLLED:
         raise refusal("controlled", scenario.controlled, f"must be one of {', '.join(CONTROLLED)}")
-    absent = {f"{section}.{name}" for section in ORIFICES for name in other_form(scenario.device, section)} | {_RATE}
-    take, named = taken_number(), scenario.device.effects
+    absent = _numbers_of_other_form(scenario.device) | {_RATE}
+    to_float, named_effects = taken_number(), scenario.device.effects
     for path, quantity in declared_numbers(scenario).items():
         section, _, name = path.partition(".")
         # An effect that the device does not name has its defaults.
-        if path in absent or (section == EFFECT_SETTINGS and name.partition(".")[0] not in named):
+        if path in absent or (section == EFFECT_SETTINGS and name.partition(".")[0] not in named_effects):
             continue
         value = number_under(scenario, _attributes(path, scenario))
         try:
             # An ankle without its device has no actuator, friction or plate, as no file can say.
-            is_good = is_within(take(value), quantity) or (value == 0.0 and path.startswith(_OF_JOINT))
+            is_good = is_within(to_float(value), quantity) or (value == 0.0 and path.startswith(_OF_JOINT))
         except ValueError:
             is_good = False
         if not is_good:
@@ -163,7 +161,7 @@ def links_that_hold(scenario: Scenario) -> Graph:
 
 def _numbers_of_graph(scenario: Scenario) -> dict[str, Any]:
     """Return the numbers that the links of a scenario name, keyed by path; for an orifice, of its present form."""
-    absent = {f"{section}.{name}" for section in ORIFICES for name in other_form(scenario.device, section)}
+    absent = _numbers_of_other_form(scenario.device)
     present = (path for path in paths_in(scenario.graph) if path not in absent)
     return {path: number_under(scenario, _attributes(path, scenario)) for path in present}
 
@@ -177,6 +175,11 @@ def other_form(device: Device, section: str) -> tuple[str, ...]:
     """Return the names of the numbers in the form that an orifice (``valve`` or ``actuator.leak``) does not have."""
     orifice = device.valve.orifice if section == "valve" else device.actuator.leak
     return tuple(quantity.name for quantity in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM))
+
+
+def _numbers_of_other_form(device: Device) -> set[str]:
+    """Return the paths of the numbers of orifices in the form that these do not have."""
+    return {f"{section}.{name}" for section in ORIFICES for name in other_form(device, section)}
 
 
 def _changing_form(scenario: Scenario, paths: Collection[str]) -> list[str]:

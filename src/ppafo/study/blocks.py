@@ -4,6 +4,7 @@ Runs are numbered configuration by configuration, within a configuration grid po
 fastest), and within a grid point draw by draw. A chunk never contains runs of two configurations.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +19,14 @@ MAXIMUM_RUNS_OF_CHUNK = 65_536
 """Largest number of runs of a chunk, unless the study sets another number."""
 _FEWEST_RUNS_OF_CHUNK = 512
 """Smallest number of runs of a chunk, whatever memory its traces take."""
+_CHUNKS_OF_SMALL_STUDY, _FEWEST_STEPS = 16, 2**22
+"""Number of chunks into which the runs of a configuration are divided even if they are few, so that an interrupt loses
+one of them, and smallest number of steps of such a chunk: some tenths of a second of a processor."""
 _MAXIMUM_STEPS = 2**25
 """Largest number of steps of all runs between two reports: some seconds of a processor."""
 _SLOW_RUNS_OF_CHUNK = 64
-"""Number of runs of a chunk with a Python controller: a few seconds between reports, so that little can be lost."""
+"""Number of runs of a chunk with a Python controller: a few seconds between reports, so that little can be lost. Also
+the smallest number of runs of an automatic chunk, which keeps two processors busy."""
 _MAXIMUM_BYTES_OF_TRACES = 48_000_000
 """Largest size of the traces of a chunk during computation [bytes]."""
 
@@ -41,7 +46,7 @@ class Chunk:
 
 
 def chunk_size(study: Study) -> int:
-    """Return the number of runs of a full chunk; it is smaller if traces are kept, to limit memory."""
+    """Return the number of runs of a full chunk; it is smaller if traces are kept or the study has few long runs."""
     if study.runs_of_chunk is not None:
         return study.runs_of_chunk
     if any(configuration.scenario.controller.custom is not None for configuration in study.configurations):
@@ -52,12 +57,19 @@ def chunk_size(study: Study) -> int:
     size = min(runs_at_once(configuration.scenario, MAXIMUM_RUNS_OF_CHUNK) for configuration in study.configurations)
     while size > _FEWEST_RUNS_OF_CHUNK and size * bytes_of_run > _MAXIMUM_BYTES_OF_TRACES:
         size //= 2
-    return size
+    steps = max(_steps_of(configuration.scenario) for configuration in study.configurations)
+    share = math.ceil(study.runs_of_configuration / _CHUNKS_OF_SMALL_STUDY)
+    return min(size, max(share, _SLOW_RUNS_OF_CHUNK, math.ceil(_FEWEST_STEPS / steps)))
+
+
+def _steps_of(scenario: Scenario) -> float:
+    """Return the number of time steps of a run."""
+    return scenario.run.duration / scenario.run.step
 
 
 def runs_at_once(scenario: Scenario, most: int) -> int:
     """Return the number of runs between two progress reports: ``most``, or fewer for long runs."""
-    steps = scenario.run.duration / scenario.run.step
+    steps = _steps_of(scenario)
     while most > _FEWEST_RUNS_OF_CHUNK and most * steps > _MAXIMUM_STEPS:
         most //= 2
     return most

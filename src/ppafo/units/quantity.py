@@ -64,13 +64,6 @@ def _did_you_mean(meant: Iterable[tuple[str, ...]]) -> str:
     return f", did you mean {' or '.join(filter(None, (', '.join(others), last)))}?" if last else ""
 
 
-def pressures_to_write(unit: str, si_unit: str) -> str:
-    """Return the accepted suffixes of a pressure unit, for a level or a difference, as text for a message."""
-    if si_unit == DIFFERENCE:
-        return f"write {unit}_d for a difference"
-    return f"write {unit}_g for gauge or {unit}_a for absolute"
-
-
 SI = "SI"
 """Unit of a number that is already in SI, for any quantity; written by programs."""
 
@@ -227,7 +220,9 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
         raise UnitError(f"{given_text} does not fit{_did_you_mean(meant)}: {_describe_unit(si_unit)}")
     is_pressure = si_unit in (LEVEL, DIFFERENCE)
     if is_pressure and not kind:
-        raise UnitError(f"'{unit}' does not say which pressure: {pressures_to_write(unit, si_unit)}")
+        suffixes = f"{unit}_g for gauge or {unit}_a for absolute"
+        suffixes = f"{unit}_d for a difference" if si_unit == DIFFERENCE else suffixes
+        raise UnitError(f"'{unit}' does not say which pressure: write {suffixes}")
     if is_pressure and (kind == "d") != (si_unit == DIFFERENCE):
         raise UnitError(f"'{unit}' is a {KINDS[kind]}, {_describe_unit(si_unit)}")
     counts_from_atmosphere = kind == "g" and si_unit == LEVEL

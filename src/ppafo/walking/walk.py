@@ -34,9 +34,13 @@ from ppafo.walking.result import WalkResult, result_of_walk
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
 
 Progress = Callable[[float, float], None]
+"""Callback with the work done and all of the work."""
+
+_MINUTE = 60.0
+"""A minute [s]."""
 
 
-def silent(done: float, total: float) -> None:  # both are there for those who listen
+def silent(done: float, total: float) -> None:  # the arguments of ``Progress``
     """Ignore the progress of a walk; default callback."""
 
 
@@ -93,12 +97,12 @@ def walk(
     else:
         chosen = load_walk(scenario, overrides, gait=gait, task_sequence=task_sequence, bottle=bottle)
     chosen = lasting(chosen, minutes)
-    run, carried = plan_walk(chosen), walk_of(chosen).bottle
+    run, carried_bottle = plan_walk(chosen), walk_of(chosen).bottle
     custom = chosen.controller.custom
     if custom is not None:
         check_no_bottle(chosen)
         return result_of_walk(chosen, run, run_sampled(batch_of(run), custom), None)
-    if carried is None:
+    if carried_bottle is None:
         # In parts short enough for an interrupt to be seen and for progress to be reported.
         batch, count = batch_of(run), run.step_count
         block = begin_block(batch, effort_for(batch))
@@ -106,7 +110,7 @@ def walk(
             block.advance(min(STEPS_PER_CALL, count - done))
             progress(min(done + STEPS_PER_CALL, count) * run.step / 60.0, count * run.step / 60.0)
         return result_of_walk(chosen, run, block.result(), None)
-    outcome, supply = run_on_bottle(run, fed_device(chosen), carried, walk_of(chosen).gait.stride_time, progress)
+    outcome, supply = run_on_bottle(run, fed_device(chosen), carried_bottle, walk_of(chosen).gait.stride_time, progress)
     return result_of_walk(chosen, run, outcome, supply)
 
 
@@ -117,26 +121,28 @@ def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = sil
     sequence is repeated. Faults are ignored, since a stopped device uses no gas. Raises ScenarioError for a walk
     without a bottle.
     """
-    sound = dict.fromkeys(walk_of(scenario).faults, FaultSettings())
-    scenario = replace(scenario, motion=replace(walk_of(scenario), faults=sound, broken={}))
+    intact = dict.fromkeys(walk_of(scenario).faults, FaultSettings())
+    scenario = replace(scenario, motion=replace(walk_of(scenario), faults=intact, broken={}))
     motion, planned = walk_of(scenario), task_sequence_of_walk(scenario)
     if motion.bottle is None:
         raise ScenarioError(f"{scenario.name}: has no bottle")
     if scenario.controller.custom is not None:
         check_no_bottle(scenario)
-    strides = math.ceil(schedule.longest / motion.gait.stride_time)
-    seconds = float(planned.duration) if planned is not None else strides * motion.gait.stride_time
-    unrecorded = 60.0 if planned is None else 1.0
-    if planned is None:  # no more steps than a run may take: what lasts longer begins again, as a task sequence does
-        before = with_duration(scenario, unrecorded)
-        step = plan_walk(replace(before, run=replace(before.run, output_interval=unrecorded))).step
-        seconds = min(seconds, unrecorded * (MAXIMUM_STEPS * step // unrecorded))
-    count = max(1, round(seconds / unrecorded))
-    whole = with_duration(scenario, seconds if planned is not None else count * unrecorded)
-    if planned is None:
-        whole = replace(whole, run=replace(whole.run, output_interval=unrecorded))
-    run = plan_walk(whole)
-    return life_on_bottle(run, fed_device(whole), motion.bottle, motion.gait.stride_time, schedule, progress)
+
+    def recorded_each_minute(seconds: float) -> Scenario:
+        lasting_walk = with_duration(scenario, seconds)
+        return replace(lasting_walk, run=replace(lasting_walk.run, output_interval=_MINUTE))
+
+    if planned is not None:
+        longest = with_duration(scenario, float(planned.duration))
+    else:
+        # A walk of more steps than a run may take begins again, like a task sequence.
+        step = plan_walk(recorded_each_minute(_MINUTE)).step
+        seconds = math.ceil(schedule.longest / motion.gait.stride_time) * motion.gait.stride_time
+        seconds = min(seconds, _MINUTE * (MAXIMUM_STEPS * step // _MINUTE))
+        longest = recorded_each_minute(_MINUTE * max(1, round(seconds / _MINUTE)))
+    run = plan_walk(longest)
+    return life_on_bottle(run, fed_device(longest), motion.bottle, motion.gait.stride_time, schedule, progress)
 
 
 def lasting(scenario: Scenario, minutes: float | None) -> Scenario:
@@ -197,9 +203,9 @@ def compare_walks(
             f"{worn.scenario.name} on its bottle: {ending.message}, after {ending.time:.3g} s: fewer than "
             f"{SHORTEST_STRIDES} strides; take a fuller, larger or warmer bottle"
         )
-    # As long as the bottle lasted, where one ended the walk.
-    as_long = minutes if ending is None else float(worn.recording.time[-1]) / 60.0
-    bare = walk(without_device(configuration), minutes=as_long, progress=progress)
+    # Without the device for the same time, which a bottle may have shortened.
+    duration = minutes if ending is None else float(worn.recording.time[-1]) / 60.0
+    bare = walk(without_device(configuration), minutes=duration, progress=progress)
     return WalkComparison(worn, bare, healthy_metrics(configuration))
 
 
@@ -208,7 +214,7 @@ def with_device_off(configuration: Scenario) -> Scenario:
     name = f"{configuration.name}-off"
     control = Control(event_on_off.OFF.name, {}, configuration.controller.period)
     motion = replace(walk_of(configuration), bottle=None, timing=THRESHOLDS)
-    # Nothing follows others where it is no longer there.
+    # Links to numbers that are left out go too.
     links = outside(configuration.links, "controller", "timing", "supply_line")
     return replace(configuration, name=name, controller=control, motion=motion, supply_line=None, links=links)
 
@@ -232,7 +238,7 @@ def without_device(configuration: Scenario) -> Scenario:
     off = with_device_off(configuration)
     device, motion = off.device, walk_of(off)
     lowest, highest = ANKLE_RANGE
-    # Nothing but its stops is left of the actuator: they are the range of the ankle.
+    # The stops of the actuator become the range of the ankle.
     ankle = Actuator(0.0, 0.0, lowest, highest, _NO_CHAMBER, _NO_CHAMBER, 0.0, device.actuator.leak)
     leg = replace(
         device, actuator=ankle, friction=Friction(0.0, 0.0, 0.0), foot_plate=FootPlate(0.0, 0.0), effects={}, links={}

@@ -392,3 +392,20 @@ def test_noise_that_turns_the_command_on_the_way_is_no_oscillation_once_the_loop
     assert metered["settled_reversals"][0] == pytest.approx(settled.reversals, rel=1e-6)
     assert metered["settled_span"][0] == pytest.approx(settled.span, rel=1e-6)
     assert (follows(metered, scenario, columns)[0] == 1.0) == (result.tracking is None)
+
+
+def test_a_law_on_the_angle_alone_that_load_and_friction_hold_is_told_the_law_that_follows() -> None:
+    changes = ["controller.kind=pid", "motion.external_torque=1.5 N m", "run.duration=2 s"]
+    scenario = load_scenario("cylinder-servo", changes)
+    verdict = tried(scenario, simulate(scenario).tracking)
+    assert verdict is not None
+    assert "`pid` acts on the angle without a torque loop inside" in verdict.cause
+    assert verdict.tried == "with `controller.kind = cascade` it follows, as a further run shows"
+
+
+def test_a_free_joint_that_its_torque_presses_on_a_stop_is_told_so() -> None:
+    changes = ["motion.kind=free", "reference.level=9 N m"]
+    told = simulate(TASK, changes).tracking
+    assert told is not None
+    assert "nothing resists the torque but the upper stop, on which the joint lies" in told.cause
+    assert told.remedies == ()

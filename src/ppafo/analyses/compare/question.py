@@ -53,7 +53,8 @@ def compare(
             written
         overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
         baseline: configuration that all others are compared with; default: the first
-        draws: draws of the uncertain values of the study, or of the noise; default 4096
+        draws: draws of the uncertain values of the study, or of the noise, at least 32; default 4096, whatever the
+            runs of the study
         seed: random seed; default: the file's
         confidence: confidence of all intervals; default 95%
         maximum_failed: fraction of the runs that may fail before the study is refused; default 1%

@@ -153,7 +153,7 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     written, fitted = new_set.written, new_set.fitted
     # What holds for this model only is in the set as well, and is never counted with what is identified.
     # Other numbers may be identified too, such as the zero of a scale, for which a set has no place.
-    count = "no value of the set identified"
+    count = "no value of the set identified" if fitted else "none, since no value of a set was identified"
     if written:
         count = f"{count_of(len(written), 'value')} of the set identified: {', '.join(written)}"
     fitted_text = f"; for this model only: {', '.join(fitted)}" if fitted else ""
@@ -167,7 +167,8 @@ def finding_of(identification: Identification) -> Finding[Identification]:
         found=identification,
         passed=identification.is_good,
         kind=identification.kind,
-        files={f"{name}.toml": lambda: parameter_set_toml(new_set.parameter_set).encode()},
+        # A set without a new value would be the one before under another name.
+        files={f"{name}.toml": lambda: parameter_set_toml(new_set.parameter_set).encode()} if written or fitted else {},
     )
 
 

@@ -59,7 +59,7 @@ def export_fmu(
     out: the folder to write, or the unit itself: a name that ends in .fmu
 
     >>> print(export_fmu("step-response", out=Path("step.fmu")).text)
-    written: step.fmu; next: fmpy simulate step.fmu --show-plot
+    written: step.fmu; next: fmpy simulate step.fmu --output-file step.csv
     """
     from ppafo.cli.output import export, export_file
     from ppafo.exports.fmu.interface import closed_loop, plant_alone
@@ -76,7 +76,9 @@ def export_fmu(
         return functional_unit(interface_of(load_scenario(scenario, overrides)), int(fmi), chosen)
 
     def next_step(file: Path) -> str:
-        return f"fmpy simulate {shlex.quote(str(file))} --show-plot"
+        # Without --show-plot, which needs packages that FMPy does not install.
+        table = file.with_suffix(".csv").name
+        return f"fmpy simulate {shlex.quote(str(file))} --output-file {shlex.quote(table)}"
 
     # A folder may be named like a unit too; it then gets the unit among its files.
     if out.suffix == ".fmu" and not out.is_dir():

@@ -99,6 +99,7 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
         "version": __version__,
         "input_count": str(len(interface.inputs)),
         "paths": paths,
+        "units": "\n".join(f'    "{setting.quantity.unit}",' for setting in library.settings),
         "changes": "".join(tuning_of(interface, setting)[0] for setting in library.settings),
         "first_inputs": ", ".join([*(repr(variable.start) for variable in interface.inputs), "0.0"]),
         "output_changes": "".join(variability_of(name)[0] for name in library.program.outputs),

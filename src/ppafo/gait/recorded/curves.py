@@ -87,7 +87,7 @@ def check_scatter(
     """Raise DataError for curves that scatter by a quarter of their range, or whose Fourier series fits badly."""
     most = f"at most {100.0 * REFUSED_SPREAD:.0f} % and {100.0 * REFUSED_MISFIT:.0f} % are accepted"
     scatters = _scatters(curves, errors, REFUSED_SPREAD, REFUSED_MISFIT)
-    raise_noted([DataError(f"{walk[name].file}: {said}; {most}; {_remedy()}") for name, said in scatters])
+    raise_noted([DataError(f"{walk[name].file}: {message}; {most}; {_remedy()}") for name, message in scatters])
 
 
 def _scatters(
@@ -114,7 +114,7 @@ def _remedy() -> str:
 def scatter_remarks(curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError]) -> list[str]:
     """Return a remark on each curve with unusual scatter between strides or an unusual misfit of its series."""
     scatters = _scatters(curves, errors, REMARKED_SPREAD, REMARKED_MISFIT)
-    return [f"{said}: that is noise, or the walk is not steady; {_remedy()}" for _, said in scatters]
+    return [f"{message}: that is noise, or the walk is not steady; {_remedy()}" for _, message in scatters]
 
 
 def acceleration_of(position: Floats, harmonics: int, stride_time: float) -> Floats:

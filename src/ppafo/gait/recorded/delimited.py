@@ -60,8 +60,8 @@ def rows_of(block: NumberBlock, cells: Cells, clock: Sequence[int] = ()) -> tupl
     ``clock`` are the indices of the named columns that must be complete. Raises DataError, with line and column, for a
     cell that is not a number.
     """
-    kept = [place for place, name in enumerate(cells.names) if name]
-    labels = [cells.names[place] for place in kept]
+    named = [column for column, name in enumerate(cells.names) if name]
+    labels = [cells.names[column] for column in named]
     width = len(cells.names)
     rows: list[list[float]] = []
     numbers: list[int] = []
@@ -80,7 +80,7 @@ def rows_of(block: NumberBlock, cells: Cells, clock: Sequence[int] = ()) -> tupl
         rows.append(
             [
                 number_in(row[place], number, label, () if index in clock else UNSEEN)
-                for index, (place, label) in enumerate(zip(kept, labels, strict=True))
+                for index, (place, label) in enumerate(zip(named, labels, strict=True))
             ]
         )
         numbers.append(number)
@@ -115,25 +115,26 @@ def table_of(
     Duplicate column names are allowed. Raises DataError, with file, line and column, for values that cannot be read.
     """
     written = [name for name in cells.names if name]
-    apart = told_apart(written)
-    own = iter(apart)
-    named = Cells([next(own) if name else "" for name in cells.names], cells.units)
-    timed = clock.name if isinstance(clock, PerFrame) else clock
-    at = written.index(timed) if timed else None
+    distinct = told_apart(written)
+    distinct_names = iter(distinct)
+    named = Cells([next(distinct_names) if name else "" for name in cells.names], cells.units)
+    time_name = clock.name if isinstance(clock, PerFrame) else clock
+    time_column = written.index(time_name) if time_name else None
     try:
-        values, numbers = rows_of(block, named, () if at is None else (at,))
-        time: Floats = np.arange(len(values), dtype=np.float64) if at is None else values[:, at]
-        first = 0.0 if at is None else 1.0
+        values, numbers = rows_of(block, named, () if time_column is None else (time_column,))
+        has_clock = time_column is not None
+        time: Floats = values[:, time_column] if has_clock else np.arange(len(values), dtype=np.float64)
+        first = 1.0 if has_clock else 0.0
         time = time * seconds if isinstance(clock, str) else (time - first) / clock.rate
         check_clock(time, numbers, may_have_trials=False)
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
-    twins = {name: others for name, others in doubled(written, apart).items() if name != timed}
+    twins = {name: others for name, others in doubled(written, distinct).items() if name != time_name}
     columns = without_copies(
-        {name: values[:, place] for place, name in enumerate(apart) if place != at},
+        {name: values[:, column] for column, name in enumerate(distinct) if column != time_column},
         twins,
     )
     units = [unit for name, unit in zip(cells.names, cells.units, strict=True) if name]
-    stated = dict(zip((*apart, *written), (*units, *units), strict=True))
+    stated = dict(zip((*distinct, *written), (*units, *units), strict=True))
     remarks = tuple(said_of_doubled(twins, columns, noun))
     return MotionTable(str(path), time, columns, {name: stated[name] for name in columns}, kind=kind, remarks=remarks)

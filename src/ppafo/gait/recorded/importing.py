@@ -137,7 +137,7 @@ def _over_taken_strides(
     curves: Mapping[str, CurveStatistics], walk: Mapping[str, Signal], strides: StrideSelection, wrong: list[PpafoError]
 ) -> dict[str, CurveStatistics]:
     """Return the curves over the selected strides only; a curve that covers none of them is reported and left out."""
-    kept = {}
+    remaining = {}
     for name, curve in curves.items():
         is_taken = [stride in strides.taken for stride in curve.strides]
         if not any(is_taken):
@@ -151,8 +151,8 @@ def _over_taken_strides(
             )
             continue
         taken = [stride for stride in curve.strides if stride in strides.taken]
-        kept[name] = curve if all(is_taken) else over_strides(name, curve.curves[is_taken], taken)
-    return kept
+        remaining[name] = curve if all(is_taken) else over_strides(name, curve.curves[is_taken], taken)
+    return remaining
 
 
 def _finish(
@@ -186,20 +186,20 @@ def _finish(
         check_direction(walk, signs_from)
     raise_noted(wrong)
     gait = _gait(settings, source.tables, taken, {name: curve for name, (curve, _) in fitted.items()}, footfalls.events)
-    said = [*remarks, *_remarks(curves, strides, footfalls.events)]
-    said += knee_remarks(knee, walk, settings.stature)
-    said += sign_remarks(means["shank_angle"], means["ankle_angle"])
-    said += moment_remarks(means["ankle_moment"]) if "ankle_moment" in means else []
-    said += turning_remarks(mean_stride)
-    said += delay_remarks(mean_stride) + size_remarks(mean_stride)
-    said += _sampling_remarks(walk, taken)
+    all_remarks = [*remarks, *_remarks(curves, strides, footfalls.events)]
+    all_remarks += knee_remarks(knee, walk, settings.stature)
+    all_remarks += sign_remarks(means["shank_angle"], means["ankle_angle"])
+    all_remarks += moment_remarks(means["ankle_moment"]) if "ankle_moment" in means else []
+    all_remarks += turning_remarks(mean_stride)
+    all_remarks += delay_remarks(mean_stride) + size_remarks(mean_stride)
+    all_remarks += _sampling_remarks(walk, taken)
     tilt = standing_tilt(means["shank_angle"], means["ankle_angle"])
     sign, taken_off = source.columns.ankle_angle.sign_and_neutral()
     # The reading of the file that would be neutral.
     neutral = float(np.degrees(taken_off)) + sign * tilt
     given = setting_text("ankle_neutral", math.radians(neutral), f"{neutral:.1f} deg")
-    said += zero_remarks(tilt, f"{given}, or ankle_angle.neutral in a gait map, corrects it")
-    said += scatter_remarks(curves, errors)
+    all_remarks += zero_remarks(tilt, f"{given}, or ankle_angle.neutral in a gait map, corrects it")
+    all_remarks += scatter_remarks(curves, errors)
     names = tuple(table.file for table in source.tables)
     return ImportedGait(
         gait,
@@ -209,7 +209,7 @@ def _finish(
         errors,
         footfalls.events,
         names,
-        tuple(dict.fromkeys(said)),
+        tuple(dict.fromkeys(all_remarks)),
     )
 
 
@@ -296,24 +296,24 @@ def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> 
     for name, signal in walk.items():
         if signal.rate < _COARSE_RATE:
             rates.setdefault(round(signal.rate), []).append(name)
-    said = [
+    remarks = [
         f"{', '.join(names)}: {rate} samples a second; heel strikes and toe-offs are known to about "
         f"{500.0 / rate:.0f} ms"
         for rate, names in rates.items()
     ]
     force = walk.get("vertical_force")
     if force is None:
-        return said
+        return remarks
     spans = [(stride.toe_off, stride.end, _WITHIN_SWING * (stride.end - stride.toe_off)) for stride in strides]
     # Only the middle of the swing: at its ends the foot may still be on the plate.
     swings = [force.values[(force.time > off + slack) & (force.time < end - slack)] for off, end, slack in spans]
     scatter = max((float(np.std(values)) for values in swings if values.size > 1), default=0.0)
     if scatter > _NOISY_FORCE:
-        said.append(
+        remarks.append(
             f"the vertical force scatters by {scatter:.2g} body weights while the foot is in the air: events are found "
             f"at 0.05 and 0.03; a low pass of the plate, or {setting_text('low_pass')}, makes them surer"
         )
-    return said
+    return remarks
 
 
 def _remarks(curves: Mapping[str, CurveStatistics], strides: StrideSelection, events: str) -> list[str]:

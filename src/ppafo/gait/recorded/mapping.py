@@ -157,9 +157,9 @@ def unsaid_axes(columns: GaitMap) -> list[str]:
     for name, mapped in (("shank_angle", columns.shank_angle), ("ankle_angle", columns.ankle_angle)):
         unsaid = [key for key in ("forward", "vertical") if key not in mapped.model_fields_set]
         if mapped.terms is None and unsaid:
-            said = " and ".join(f'{key} = "{getattr(mapped, key)}"' for key in unsaid)
+            assumed_axes = " and ".join(f'{key} = "{getattr(mapped, key)}"' for key in unsaid)
             verb = "is" if len(unsaid) == 1 else "are"
-            axes.append(f"the gait map does not say {' and '.join(unsaid)} of {name}: {said} {verb} assumed")
+            axes.append(f"the gait map does not say {' and '.join(unsaid)} of {name}: {assumed_axes} {verb} assumed")
     return axes
 
 

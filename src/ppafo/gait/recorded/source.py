@@ -145,7 +145,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     if settings.columns is None:
         # Only without a map: a user's map names the columns as the file has them.
         tables = [FORMS[table.form].arrange(table) for table in tables]
-    settings, said = _with_subject(settings, tables, wrong)
+    settings, remarks = _with_subject(settings, tables, wrong)
     # Without a body mass loads are looked at per kg of 1 kg, and scaled to 1 below.
     body_mass = settings.body_mass or 1.0
     convention = (
@@ -170,11 +170,11 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         with noted_in(wrong):
             force, more = force_of_plates(tables, convention.plates, walk["shank_angle"], body_mass)
             walk |= {} if force is None else {FORCE: force}
-            said += more
+            remarks += more
     mended = [f"{Path(table.file).name}: {remark}" for table in tables for remark in table.remarks]
     mended += _ends(walk, tables)
     signs_from: SignSource = "columns" if settings.columns is None else "map"
-    return GaitSource(tables, columns, walk, settings, signs_from, (*said, *convention.remarks, *mended))
+    return GaitSource(tables, columns, walk, settings, signs_from, (*remarks, *convention.remarks, *mended))
 
 
 def of_largest_one(signal: Signal, is_upwards: bool = False) -> Signal:
@@ -194,7 +194,7 @@ def _with_subject(
         [(table.file, value) for table in tables if table.trial and (value := getattr(table.trial, name)) is not None]
         for name in ("body_mass", "stature")
     )
-    said = []
+    remarks = []
     if settings.body_mass is None and not masses:
         wrong.append(
             DataError(
@@ -206,15 +206,15 @@ def _with_subject(
     elif settings.body_mass is None:
         file, mass = masses[0]
         settings = replace(settings, body_mass=mass)
-        said.append(f"body mass {mass:.4g} kg, as {Path(file).name} states")
+        remarks.append(f"body mass {mass:.4g} kg, as {Path(file).name} states")
     elif masses and abs(masses[0][1] - settings.body_mass) > _SAME * settings.body_mass:
-        said.append(
+        remarks.append(
             f"body mass {settings.body_mass:.4g} kg as stated; {Path(masses[0][0]).name} states {masses[0][1]:.4g} kg"
         )
     if settings.stature is None and statures:
         settings = replace(settings, stature=statures[0][1])
-        said.append(f"stature {statures[0][1]:.4g} m, as {Path(statures[0][0]).name} states")
-    return settings, said
+        remarks.append(f"stature {statures[0][1]:.4g} m, as {Path(statures[0][0]).name} states")
+    return settings, remarks
 
 
 def _ends(walk: Mapping[str, Signal], tables: Sequence[MotionTable]) -> list[str]:
@@ -228,11 +228,11 @@ def _ends(walk: Mapping[str, Signal], tables: Sequence[MotionTable]) -> list[str
             seen.setdefault((float(signal.time[0]), float(signal.time[-1]), low, high), []).append(name)
         if signal.absent is not None:
             loads.setdefault(round(100.0 * float(signal.absent.mean())), []).append(name)
-    said = [
+    remarks = [
         f"{', '.join(names)} from {first:.4g} to {last:.4g} s: not seen in the rest of {low:.4g} to {high:.4g} s"
         for (first, last, low, high), names in seen.items()
     ]
-    return said + [
+    return remarks + [
         f"{', '.join(names)}: absent in {percent} % of the record, where no plate measured this foot"
         for percent, names in loads.items()
     ]

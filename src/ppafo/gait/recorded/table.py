@@ -81,12 +81,12 @@ def cut_table(
     seen = (table.time[:-1] >= low) & (table.time[1:] <= high)
     jumps = np.flatnonzero(seen & (steps > _LARGEST_JUMP * median)).tolist()
     long = [index for index in jumps if steps[index] > longest_gap + 1.5 * median]
-    said = [
+    remarks = [
         f"rows from {table.time[i]:g} to {table.time[i + 1]:g} s are missing"
         + ("" if i in long else " and were bridged")
         for i in jumps
     ]
-    table = replace(table, remarks=(*table.remarks, *said))
+    table = replace(table, remarks=(*table.remarks, *remarks))
     if long:
         after = np.array(long) + 1
         middles = 0.5 * (table.time[long] + table.time[after])
@@ -114,7 +114,7 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
     bitwise equal for two frames or more and then jumps further than a marker at rest can move in one sample interval,
     which is ``MOST_ACCELERATION`` times the interval squared [m].
     """
-    columns, said = dict(table.columns), []
+    columns, remarks = dict(table.columns), []
     labels = dict.fromkeys(name[:-2] for name in names if name[-2:] in _COORDINATES)
     interval = float(np.median(np.diff(table.time))) if table.time.size > 1 else 0.0
     for label in labels:
@@ -137,8 +137,8 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
         for name in own:
             columns[name] = np.where(gap, np.nan, columns[name])
         how = " and ".join(lost)
-        said.append(f"marker '{label}' was lost in {np.count_nonzero(gap)} of {table.time.size} frames ({how})")
-    return replace(table, columns=columns, remarks=(*table.remarks, *said))
+        remarks.append(f"marker '{label}' was lost in {np.count_nonzero(gap)} of {table.time.size} frames ({how})")
+    return replace(table, columns=columns, remarks=(*table.remarks, *remarks))
 
 
 def _held(at: Floats, furthest: float) -> NDArray[np.bool_]:
@@ -164,7 +164,7 @@ def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> Motio
     """
     from scipy.interpolate import CubicSpline
 
-    columns, said, time = dict(table.columns), [], table.time
+    columns, remarks, time = dict(table.columns), [], table.time
     for name in dict.fromkeys(names):
         if name not in columns or longest <= 0.0:
             continue
@@ -178,6 +178,8 @@ def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> Motio
         through = CubicSpline(time[known], whole[known])
         for first, last in short:
             whole[first:last] = through(time[first:last])
-            said.append(f"column '{name}': {last - first} samples from {time[first]:g} to {time[last - 1]:g} s filled")
+            remarks.append(
+                f"column '{name}': {last - first} samples from {time[first]:g} to {time[last - 1]:g} s filled"
+            )
         columns[name] = whole
-    return replace(table, columns=columns, remarks=(*table.remarks, *said))
+    return replace(table, columns=columns, remarks=(*table.remarks, *remarks))

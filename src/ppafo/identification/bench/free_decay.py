@@ -138,7 +138,7 @@ def free_decay(
     IdentificationError, with file, sample and remedy, for recordings from which neither can be estimated.
     """
     check_sources(sources, PROCEDURE, (ANGLE,), MINIMUM_SAMPLES)
-    sources, said = without_wrong_samples(sources, PROCEDURE, (ANGLE, VELOCITY), start, end)
+    sources, remarks = without_wrong_samples(sources, PROCEDURE, (ANGLE, VELOCITY), start, end)
     decays = tuple(decay_of(source, start, end) for source in sources)
     damping, friction = _OF_THE_DEVICE if inertia else _OVER_INERTIA
     # An inertia of 1 kg m^2 stands for none.
@@ -204,7 +204,7 @@ def free_decay(
         f"{slowing.deceleration:.4g} rad/s^2{unknown}",
         _panels(decays, model, slowing),
         "another torque acts, such as gravity, an end stop or a friction of another shape",
-        said,
+        remarks,
     )
 
 

@@ -12,7 +12,7 @@ pressure does not, the actuator slid, and T_s is the kinetic friction. A ``force
 area [m^2] and forces, for which a set has no entry.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,7 +127,7 @@ def static_torque(
     shown_slope, slope_unit = in_shown_unit(values[unknowns.slope_path], unknowns.slope_unit)
     shown_friction, unit = in_shown_unit(values[unknowns.friction_path], unknowns.unit)
     scatter, _ = in_shown_unit(float(np.std(residuals)), unknowns.unit)
-    return result_of(
+    result = result_of(
         PROCEDURE,
         sources,
         fitted,
@@ -163,6 +163,25 @@ def static_torque(
         ),
         f"one {unknowns.slope} and a {unknowns.friction} linear in pressure do not describe them",
     )
+    return _with_possible_friction(result, unknowns)
+
+
+def _with_possible_friction(result: BenchResult, unknowns: _Unknowns) -> BenchResult:
+    """Return the result, valid for this model only if its friction, or the growth, lies below zero with certainty."""
+    if result.conflict:
+        return result
+    if result[unknowns.friction_path].high < 0.0:
+        fault = f"the {unknowns.friction} without pressure is negative, as if it drove the motion"
+    elif result[unknowns.growth_path].high < 0.0:
+        fault = f"the {unknowns.friction} falls as the pressure rises, as if pressure loosened the seal"
+    else:
+        return result
+    estimates = tuple(
+        replace(estimate, verdict="holds for this model only") if estimate.verdict == "identified" else estimate
+        for estimate in result.estimates
+    )
+    remedy = "check the channels and their units, or add recordings at other pressures"
+    return replace(result, estimates=estimates, conflict=f"{fault}; {remedy}")
 
 
 def _straight_line(readings: TorqueReadings, files: str) -> tuple[float, float, float, float]:
@@ -206,4 +225,4 @@ def _marks(readings: TorqueReadings, slope: float, zero: float) -> list[Mark]:
         on = readings.branch == sign
         marks.append(readings_mark(label, readings.pressure[on], readings.load[on], role))
     ends = np.array([readings.pressure.min(), readings.pressure.max()])
-    return [*marks, curve_mark("nominal", ends, slope * ends + zero)]
+    return [*marks, curve_mark("without friction", ends, slope * ends + zero)]

@@ -10,7 +10,9 @@ from ppafo.identification.bench.checks import check_moves, check_not_clipped, ch
 from ppafo.identification.bench.law import recordings_of
 from ppafo.identification.bench.wrong_readings import check_no_wrong_reading, check_not_alone
 from ppafo.identification.source import RecordingSource, pool
+from ppafo.identification.wording import in_shown_unit
 from ppafo.signals.recording import Floats
+from ppafo.units import percentage
 
 PROCEDURE = "static-torque"
 TORQUE, FORCE = "torque", "force"
@@ -20,6 +22,8 @@ _MINIMUM_SAMPLES = 6
 """Least number of readings that separates slope, friction, growth of the friction, and zero."""
 _MINIMUM_LEVELS = 3
 """Least number of different pressures that shows whether the torque is linear in pressure."""
+_SAME_LEVEL = 0.1
+"""Fraction of the highest pressure [-] within which pressures are one level: jitter of a regulator is no second one."""
 _MORE_THAN_FRICTION = 0.3
 """Fraction of its range [-] by which the torque may change at one pressure when friction reverses."""
 _BINS = 20
@@ -134,13 +138,18 @@ def _check_separable(sources: tuple[RecordingSource, ...], pressure: Floats, dir
             )
     if pressure.max() == pressure.min():
         check_moves(sources[0], PROCEDURE, "pressure_difference")
-    # Two levels fix a line, but do not show whether it is one.
-    bins = np.floor(_BINS * (pressure - pressure.min()) / np.ptp(pressure))
+    # Two levels fix a line, but do not show whether it is one. Slope, zero and growth of the friction are extrapolated
+    # from the spread of the pressures to zero, which the jitter about one commanded pressure does not carry.
+    highest = float(np.abs(pressure).max())
+    width = max(float(np.ptp(pressure)) / _BINS, _SAME_LEVEL * highest)
+    bins = np.floor((pressure - pressure.min()) / width)
     levels = np.unique(np.minimum(bins, _BINS - 1)).size
     if levels < _MINIMUM_LEVELS:
+        shown, unit = in_shown_unit(width, "Pa_d")
         raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE} needs readings at {_MINIMUM_LEVELS} different pressures or more, "
-            f"there are {levels}"
+            f"{', '.join(source.name for source in sources)}: {PROCEDURE} needs readings at {_MINIMUM_LEVELS} "
+            f"different pressures or more, there are {levels}: pressures closer than {shown:.3g} {unit}, "
+            f"{percentage(_SAME_LEVEL, 2)} of the highest, are one; add recordings at other pressures"
         )
 
 

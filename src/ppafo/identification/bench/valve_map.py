@@ -108,13 +108,11 @@ def valve_map(
     )
 
     def law(at: Values) -> Floats:
-        before, behind = (
-            true_pressure(at, name, shown)
-            for name, shown in zip(PRESSURES, (sweep.upstream, sweep.downstream), strict=True)
-        )
+        true_upstream = true_pressure(at, "upstream_pressure", sweep.upstream)
+        true_downstream = true_pressure(at, "downstream_pressure", sweep.downstream)
         spool = np.concatenate([spool_of(command, at[_PLAY]) for command in sweep.commands])
         area = area_of_command(spool, at[band], at[_GAIN], at[_SATURATION])
-        shape = np.abs(orifice_shape(before, behind, gas.heat_capacity_ratio))
+        shape = np.abs(orifice_shape(true_upstream, true_downstream, gas.heat_capacity_ratio))
         flow = read_flow(at, gas, area * gas.choked_flow_constant * shape)
         # A play needs every command, so that readings that cannot be drop out of the flow alone.
         return np.where(is_possible, flow, sweep.flow)
@@ -187,10 +185,11 @@ def _marks(sweep: _Sweep, model: Floats) -> list[Mark]:
     """Return the plot marks of readings and fitted flow over command, separately for rising and falling commands."""
     marks = []
     for role, sign in (("rising", 1.0), ("falling", -1.0)):
-        on = sweep.branch == sign
-        if on.any():
-            marks.append(readings_mark(f"command {role}", sweep.command[on], sweep.flow[on], role))
-            marks.append(curve_mark("fitted" if sign > 0 else "", sweep.command[on], model[on]))
+        is_on_branch = sweep.branch == sign
+        if is_on_branch.any():
+            marks.append(readings_mark(f"command {role}", sweep.command[is_on_branch], sweep.flow[is_on_branch], role))
+            name = "fitted" if sign > 0.0 else ""
+            marks.append(curve_mark(name, sweep.command[is_on_branch], model[is_on_branch]))
     return marks
 
 

@@ -92,7 +92,7 @@ def vane_leak(
     if sources and all("mass_flow" in source.recording for source in sources):
         return _steady_leak(sources, opening, size, tolerances, confidence)
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
-    sources, said = without_wrong_samples(sources, PROCEDURE, CHANNELS, start, end)
+    sources, remarks = without_wrong_samples(sources, PROCEDURE, CHANNELS, start, end)
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS)
     for source in sources:
         # One of them may be of a room.
@@ -103,8 +103,8 @@ def vane_leak(
             "chamber 1 empties in some recordings and chamber 2 in others; give each its own procedure"
         )
     volumes = volume_1, volume_2
-    found = _decaying_leak(sources, decays, opening, size, volumes, volume_deviation, tolerances, confidence)
-    return replace(found, remarks=(*said, *found.remarks))
+    result = _decaying_leak(sources, decays, opening, size, volumes, volume_deviation, tolerances, confidence)
+    return replace(result, remarks=(*remarks, *result.remarks))
 
 
 def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumber:
@@ -142,7 +142,9 @@ class _ClosedChambers(NamedTuple):
     def changes(self) -> tuple[float, float]:
         """Fall of the first and rise of the second pressure [Pa]."""
         edge = self.edge
-        fall, rise = (float(np.mean(one[-edge:]) - np.mean(one[:edge])) for one in (self.first, self.second))
+        fall, rise = (
+            float(np.mean(pressure[-edge:]) - np.mean(pressure[:edge])) for pressure in (self.first, self.second)
+        )
         return -fall, rise
 
     @property
@@ -166,7 +168,7 @@ class _ClosedChambers(NamedTuple):
     @property
     def fitted(self) -> list[tuple[str, Floats]]:
         """Fitted channels with their pressures [Pa]; the constant pressure of a room is not fitted."""
-        return [pair for place, pair in enumerate(self.sensors) if place != self.room]
+        return [sensor for side, sensor in enumerate(self.sensors) if side != self.room]
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -177,11 +179,9 @@ class _ClosedChambers(NamedTuple):
         edge, difference = self.edge, self.first - self.second
         if edge < 2:
             return float(difference[0]), float(difference[-1])
-        start, end = (
-            float(np.polyfit(self.time[rows] - self.time[at], difference[rows], 1)[1])
-            for rows, at in ((slice(edge), 0), (slice(-edge, None), -1))
-        )
-        return start, end
+        start = np.polyfit(self.time[:edge] - self.time[0], difference[:edge], 1)[1]
+        end = np.polyfit(self.time[-edge:] - self.time[-1], difference[-edge:], 1)[1]
+        return float(start), float(end)
 
     def start_of(self, sensor: str) -> str:
         """Return the name of the initial pressure [Pa] of a chamber, given its channel."""
@@ -193,12 +193,12 @@ class _ClosedChambers(NamedTuple):
 
     def numbers(self) -> Iterator[FitVariable]:
         """Yield the unknowns: initial pressures (in a room, with a prior of its noise) and relaxation after filling."""
-        for place, (sensor, values) in enumerate(self.sensors):
+        for side, (sensor, values) in enumerate(self.sensors):
             size = max(abs(self.changes[self.changing]), float(np.std(np.diff(values))), 1.0)
-            found = sought(self.start_of(sensor), float(values[: self.edge].mean()), 1.0, scale=size)
-            if place == self.room:
-                found = replace(found, start=float(values.mean()), deviation=max(float(values.std()), 1.0))
-            yield found
+            initial = sought(self.start_of(sensor), float(values[: self.edge].mean()), 1.0, scale=size)
+            if side == self.room:
+                initial = replace(initial, start=float(values.mean()), deviation=max(float(values.std()), 1.0))
+            yield initial
         for sensor, _ in self.fitted:
             yield from within(self.relaxation_of(sensor), _MOST_RELAXED)
 
@@ -266,10 +266,10 @@ def pressures_of_fall(
     flow = opening.flow(sizes, lower + difference, lower)
     slowness = difference / np.maximum(quickened * rate * flow, 1.0e-300)
     steps = 0.5 * (slowness[1:] + slowness[:-1]) * np.diff(logs)
-    known = np.concatenate(([0.0], np.cumsum(steps)))
-    left = np.exp(np.interp(times, known, np.log(difference)))
-    end = second + rises * (start - left)
-    return end + left, end
+    fall_times = np.concatenate(([0.0], np.cumsum(steps)))
+    remaining = np.exp(np.interp(times, fall_times, np.log(difference)))
+    lower = second + rises * (start - remaining)
+    return lower + remaining, lower
 
 
 def _decaying_leak(
@@ -295,7 +295,7 @@ def _decaying_leak(
     longest = max(float(decay.time[-1]) for decay in decays)
 
     def law(at: Values) -> Floats:
-        gas, fitted = opening.gas, list[Floats]()
+        gas, pressures = opening.gas, list[Floats]()
         # Flow goes with 1 / sqrt(T), the pressure that it makes with T.
         warm = gas.specific_gas_constant * np.sqrt(gas.temperature * (gas.temperature + at[TEMPERATURE]))
         rate = warm * (1.0 + at[GAS_LAW]) / (emptied * (1.0 + at[_VOLUME]))
@@ -305,11 +305,11 @@ def _decaying_leak(
             ratio = at[_RATIO] if decay.room is None else 0.0 if decay.room == 1 else math.inf
             falls = pressures_of_fall(opening, paths.sizes(at), first, second, ratio, rate, decay.time)
             faded = np.exp(-decay.time / relaxed)
-            for place, ((sensor, _), pressure) in enumerate(zip(decay.sensors, falls, strict=True)):
-                if place != decay.room:
+            for side, ((sensor, _), pressure) in enumerate(zip(decay.sensors, falls, strict=True)):
+                if side != decay.room:
                     offset = 1.0 + at[decay.relaxation_of(sensor)] * faded
-                    fitted.append(pressure * offset + at[f"zero of {sensor}"])
-        return np.concatenate(fitted)
+                    pressures.append(pressure * offset + at[f"zero of {sensor}"])
+        return np.concatenate(pressures)
 
     numbers = (
         *paths.sought(start, alone),
@@ -329,21 +329,20 @@ def _decaying_leak(
         # A law that is wrong parts early from late falls.
         ([half for _, _, decay in series for half in decay.halves()],),
     )
-    found, model = solve(law, readings, numbers, confidence)
+    fitted, model = solve(law, readings, numbers, confidence)
     times = [decay.time for _, _, decay in series]
-    time, parts = np.concatenate(times), np.split(model, np.cumsum([one.size for one in times])[:-1])
-    curves = zip(times, parts, strict=True)
-    marks = [
-        readings_mark("measured", time, readings.measured),
-        *(curve_mark("" if number else opening.law, *curve) for number, curve in enumerate(curves)),
-    ]
+    time, models = np.concatenate(times), np.split(model, np.cumsum([values.size for values in times])[:-1])
+    marks = [readings_mark("measured", time, readings.measured)]
+    # The legend names the first curve only.
+    names = [opening.law, *[""] * (len(times) - 1)]
+    marks += [curve_mark(*curve) for curve in zip(names, times, models, strict=True)]
     is_room = all(decay.room is not None for decay in decays)
     room = (f"the pressure in chamber {3 - chamber} is constant, so it is treated as a room",) if is_room else ()
     fall = max(1.0 - last / first for first, last in (decay.ends for decay in decays))
     return result_of(
         PROCEDURE,
         sources,
-        found,
+        fitted,
         reported,
         f"{count_of(len(decays), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}",
         with_residuals(
@@ -404,13 +403,13 @@ def _beside(has_volume: bool) -> ReportedNumber:
 
 def _rough_size(decays: tuple[_ClosedChambers, ...], opening: Opening, unit: OpeningSizes, rate: float) -> float:
     """Return the positive multiple of ``unit`` whose flow gives the mean rate of change of the pressure."""
-    found = []
+    sizes = []
     for item in decays:
         flow = float(np.mean(opening.flow(unit, item.first, item.second)))
         scatter = float(np.std(np.diff((item.first, item.second)[item.changing])))
         # Of a chamber that holds, what its noise would hide.
-        found.append(max(item.changes[item.changing], 0.01 * scatter, 1.0e-9) / (rate * flow * float(item.time[-1])))
-    return float(np.mean(found))
+        sizes.append(max(item.changes[item.changing], 0.01 * scatter, 1.0e-9) / (rate * flow * float(item.time[-1])))
+    return float(np.mean(sizes))
 
 
 def _steady_leak(
@@ -427,8 +426,8 @@ def _steady_leak(
     first, second, flow = (pool(sources, name) for name in STEADY)
     check_no_wrong_reading(sources, PROCEDURE, "mass_flow", (first, second), np.ones(flow.size, dtype=bool))
     flow, is_possible, remarks = meter_readings(sources, PROCEDURE, first - second, tolerances.zero_of_flow)
-    first, second, flow = (each[is_possible] for each in (first, second, flow))
-    names = [name for name, is_kept in zip(recordings_of(sources), is_possible.tolist(), strict=True) if is_kept]
+    first, second, flow = first[is_possible], second[is_possible], flow[is_possible]
+    labels = np.array(recordings_of(sources))[is_possible].tolist()
     difference = first - second
     # A leak of another law parts low from high pressures.
     is_high = difference > np.median(difference)
@@ -438,11 +437,11 @@ def _steady_leak(
         _, alone = opening.rough_sizes(first, second, flow)
         reported = [replace(size, size=alone.size), replace(_beside(has_volume=True), size=alone.beside)]
         paths = Paths(size.path, beside=reported[1].path)
-    found, model = solve_flow(
+    fitted, model = solve_flow(
         opening,
         paths,
         {"pressure_1": first, "pressure_2": second},
-        PooledReadings(flow, ["mass_flow"] * flow.size, names, (halves,)),
+        PooledReadings(flow, ["mass_flow"] * flow.size, labels, (halves,)),
         tolerances,
         confidence,
     )
@@ -452,7 +451,7 @@ def _steady_leak(
     return result_of(
         PROCEDURE,
         sources,
-        found,
+        fitted,
         reported,
         f"{flow.size} steady readings; scatter {scatter:.2%} of the largest flow",
         with_residuals("Steady leak", *axes, marks, difference, flow - model),

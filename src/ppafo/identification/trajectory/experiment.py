@@ -67,25 +67,25 @@ class FittedExperiment:
 
 def check_experiment(experiment: FittedExperiment) -> None:
     """Raise IdentificationError, with the label first, for an experiment that cannot be fitted."""
-    said, recording, inputs = f"experiment '{experiment.label}'", experiment.recording, experiment.inputs
+    where, recording, inputs = f"experiment '{experiment.label}'", experiment.recording, experiment.inputs
     if len(recording) < 2:
-        raise IdentificationError(f"{said}: {recording.label} has only one sample; a fit needs two or more")
+        raise IdentificationError(f"{where}: {recording.label} has only one sample; a fit needs two or more")
     for name in experiment.channels:
         if name not in FITTED_CHANNELS:
-            raise IdentificationError(f"{said}: channel '{name}' cannot be fitted; {', '.join(FITTED_CHANNELS)} can")
+            raise IdentificationError(f"{where}: channel '{name}' cannot be fitted; {', '.join(FITTED_CHANNELS)} can")
     for name in inputs:
         if name not in ALL_INPUTS:
             hint = nearest_name(name, ALL_INPUTS)
-            raise IdentificationError(f"{said}: '{name}' is not a measured input{hint}; use {', '.join(ALL_INPUTS)}")
+            raise IdentificationError(f"{where}: '{name}' is not a measured input{hint}; use {', '.join(ALL_INPUTS)}")
     for name, use in (*((name, "") for name in experiment.channels), *((name, " to follow") for name in inputs)):
         if name not in recording:
             have = ", ".join(recording.names)
-            raise IdentificationError(f"{said}: {recording.label} has no channel '{name}'{use}; it has {have}")
+            raise IdentificationError(f"{where}: {recording.label} has no channel '{name}'{use}; it has {have}")
     scenario, has_torque = experiment.scenario, EXTERNAL_TORQUE in inputs
     motion, follows = vane_motion(scenario), {ANGLE} & set(inputs) & set(experiment.channels)
     is_python = scenario.controller.is_outside and COMMAND not in inputs
     refuse_first(
-        said,
+        where,
         (not experiment.channels, "there is no channel to compare"),
         (bool(follows), "the angle of the vane is prescribed by the recording, so it cannot be compared"),
         (
@@ -107,18 +107,18 @@ def check_experiment(experiment: FittedExperiment) -> None:
         ),
     )
     if COMMAND in inputs:
-        check_command(recording, said)
-    experiment.scenario.device.check_pressurised(f"{said}: a fit of motion")
+        check_command(recording, where)
+    experiment.scenario.device.check_pressurised(f"{where}: a fit of motion")
     if inputs:
-        check_gaps(recording, said)
-        check_absolute(recording, experiment.scenario.device.supply.atmospheric_pressure, said)
+        check_gaps(recording, where)
+        check_absolute(recording, experiment.scenario.device.supply.atmospheric_pressure, where)
 
 
-def refuse_first(said: str, *checks: tuple[bool, str]) -> None:
-    """Raise IdentificationError for the first failed check of pairs (is wrong, reason); ``said`` starts the message."""
+def refuse_first(where: str, *checks: tuple[bool, str]) -> None:
+    """Raise IdentificationError for the first failed of pairs (is wrong, reason); ``where`` starts the message."""
     for is_wrong, why in checks:
         if is_wrong:
-            raise IdentificationError(f"{said}: {why}")
+            raise IdentificationError(f"{where}: {why}")
 
 
 def scenario_of(experiment: FittedExperiment) -> Scenario:
@@ -132,25 +132,25 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
     if COMMAND in experiment.inputs:
         # A recorded command needs no sensors.
         scenario = replace(with_control(scenario, replay_control(recording)), sensors=Sensors())
-    said = f"experiment '{experiment.label}'"
+    where = f"experiment '{experiment.label}'"
     if ANGLE in experiment.inputs:
         # From here the recorded angle prescribes the vane's.
         angle = np.interp([experiment.start], recording.time, recording[ANGLE])
-        scenario = replace(scenario, motion=FreeMotion(float(between_stops(angle, scenario.device, said)[0])))
+        scenario = replace(scenario, motion=FreeMotion(float(between_stops(angle, scenario.device, where)[0])))
     if experiment.initial_state == "scenario":
         return scenario
     before = recording.time <= experiment.start + _FITS
     if not before.any():
         raise IdentificationError(
-            f"{said}: {recording.label} has no sample up to {experiment.start:g} s, from which the initial state could "
-            f"be taken"
+            f"{where}: {recording.label} has no sample up to {experiment.start:g} s, from which the initial state "
+            f"could be taken"
         )
     time = recording.time[before]
     rest = {name: value_at_rest(time, recording[name][before], at_end=True) for name in recording.names}
     recorded = {name: rest[name] for name in ("pressure_1", "pressure_2") if name in rest}
     scenario = replace(scenario, initial=replace(scenario.initial, **recorded))
     if ANGLE in rest and ANGLE not in experiment.inputs and isinstance(scenario.motion, FreeMotion):
-        start = float(between_stops(np.array([rest[ANGLE]]), scenario.device, said)[0])
+        start = float(between_stops(np.array([rest[ANGLE]]), scenario.device, where)[0])
         scenario = replace(scenario, motion=replace(scenario.motion, angle=start))
     return scenario
 

@@ -124,9 +124,11 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     start = np.array([number.start for number in free])
     runs = tuple(
         prepare(
-            one, numbers_in(one.label, numbers, start), reach_of([item for item in numbers if item.acts_in(one.label)])
+            experiment,
+            numbers_in(experiment.label, numbers, start),
+            reach_of([number for number in numbers if number.acts_in(experiment.label)]),
         )
-        for one in problem.experiments
+        for experiment in problem.experiments
     )
     report(Progress(f"trajectory fit: {len(free)} numbers, {len(runs)} recordings"))
     blocks = blocks_of(runs, numbers, start)
@@ -171,7 +173,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         scenarios=scenarios,
         conflict=conflict,
         remarks=_remarks(fitted, scenarios, estimates),
-        outliers=tuple(_left_out(fitted, blocks, {run.label: run.time for run in runs})),
+        outliers=tuple(_outlier_remarks(fitted, blocks, {run.label: run.time for run in runs})),
     )
 
 
@@ -180,7 +182,7 @@ def _remarks(fitted: Fit, scenarios: Sequence[Scenario], estimates: Sequence[Est
     remarks = [text for text in dict.fromkeys(broken_rule(scenario.device) for scenario in scenarios) if text]
     if fitted.edge:
         wanted, bounds = [], []
-        for estimate in (one for one in estimates if one.path in fitted.edge):
+        for estimate in (item for item in estimates if item.path in fitted.edge):
             side = fitted.edge[estimate.path]
             wanted.append(f"{estimate.path} {'above' if side > 0 else 'below'} {_in_unit(estimate.value, estimate)}")
             inside = estimate.value - side * _INSIDE * abs(estimate.value)
@@ -190,7 +192,7 @@ def _remarks(fitted: Fit, scenarios: Sequence[Scenario], estimates: Sequence[Est
             f"or give {' and '.join(bounds)}, and the fit ends there as at a bound"
         )
     elif not fitted.has_converged:
-        starts = ", ".join(f'start = "{_in_unit(each.value, each)}" of {each.path}' for each in estimates)
+        starts = ", ".join(f'start = "{_in_unit(item.value, item)}" of {item.path}' for item in estimates)
         remarks.append(
             f"the search stopped after {fitted.evaluations} runs before it converged; give the parameters {starts}, "
             "where it ended"
@@ -198,7 +200,7 @@ def _remarks(fitted: Fit, scenarios: Sequence[Scenario], estimates: Sequence[Est
     return tuple(remarks)
 
 
-def _left_out(fitted: Fit, blocks: Sequence[ResidualBlock], times: Mapping[str, Floats]) -> Iterator[str]:
+def _outlier_remarks(fitted: Fit, blocks: Sequence[ResidualBlock], times: Mapping[str, Floats]) -> Iterator[str]:
     """Yield a remark on the outliers of each channel of each recording; ``times`` [s] are the sample times."""
     for block in blocks:
         samples = [row - block.rows.start for row in fitted.outliers if block.rows.start <= row < block.rows.stop]
@@ -291,14 +293,14 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
 
 def _channel(fitted: Fit, experiment: str, measured: FitChannel, model: Floats) -> ChannelFit:
     """Return the residual statistics of a channel of an experiment, given the model at its samples."""
-    left = measured.values - model
+    residuals = measured.values - model
     return ChannelFit(
         experiment=experiment,
         channel=measured.name,
         unit=CHANNELS[measured.name].unit,
         noise=fitted.noise[measured.name],
         order=fitted.correlation[measured.name],
-        rms=float(np.sqrt(np.mean(left * left))),
-        largest=float(np.max(np.abs(left))),
+        rms=float(np.sqrt(np.mean(residuals * residuals))),
+        largest=float(np.max(np.abs(residuals))),
         span=float(np.ptp(measured.values)),
     )

@@ -24,9 +24,9 @@ class TrajectoryProblem:
         _refuse_twice("experiment", labels)
         for experiment in self.experiments:
             check_experiment(experiment)
-        twice = double_use(use_of(experiment) for experiment in self.experiments)
-        if twice:
-            raise IdentificationError(twice)
+        message = double_use(use_of(experiment) for experiment in self.experiments)
+        if message:
+            raise IdentificationError(message)
         for parameter in self.parameters:
             for label in parameter.recordings:
                 if label not in labels:
@@ -50,8 +50,8 @@ def numbers_of(problem: TrajectoryProblem) -> tuple[FitNumber, ...]:
     )
 
 
-def _refuse_twice(what: str, names: list[str]) -> None:
-    """Raise IdentificationError for a duplicated name; ``what`` is the kind of the named things in the message."""
+def _refuse_twice(kind: str, names: list[str]) -> None:
+    """Raise IdentificationError for a duplicated name; ``kind`` is the kind of the named things."""
     twice = first_twice(names)
     if twice is not None:
-        raise IdentificationError(f"{what} '{twice}' is named twice")
+        raise IdentificationError(f"{kind} '{twice}' is named twice")

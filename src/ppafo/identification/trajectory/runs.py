@@ -9,17 +9,15 @@ import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.program import Program
 from ppafo.engine.replay import StepInputs, replay
-from ppafo.engine.rows import leaves, rebuilt, row_numbers
-from ppafo.engine.run import NEVER_FAILED, Run, batches_of
+from ppafo.engine.rows import leaves, rebuilt
+from ppafo.engine.run import NEVER_FAILED, Run, batches_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
@@ -64,11 +62,11 @@ class FitChannel:
 
 
 @dataclass(frozen=True, slots=True)
-class PreparedExperiment:
+class _PreparedExperiment:
     """Experiment prepared for fitting: completed scenario, planned run, and samples located between its records.
 
     ``time`` has the sample times in the run [s]; a fitted offset may shift them by up to ``reach`` [s]. ``run`` has the
-    time step and clock of all runs. A sample lies a ``fraction`` [-] of the interval after the record ``place``.
+    time step and clock of all runs. A sample lies a ``fraction`` [-] of the interval after the record ``before``.
     ``inputs`` are the inputs at each step, computed from ``recorded``; None without recorded inputs.
     """
 
@@ -78,25 +76,25 @@ class PreparedExperiment:
     time: Floats
     channels: tuple[FitChannel, ...]
     reach: float
-    place: Indices
+    before: Indices
     fraction: Floats
     recorded: RecordedInputs | None = None
     inputs: StepInputs | None = None
 
 
-def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: float = 0.0) -> PreparedExperiment:
+def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: float = 0.0) -> _PreparedExperiment:
     """Return an experiment prepared for fitting.
 
     ``numbers`` are the start values by path; ``reach`` [s] is the largest time offset that may be tried. Raises
     IdentificationError for a recording with too few samples or a saturated sensor.
     """
-    recording, said = experiment.recording, f"experiment '{experiment.label}'"
+    recording, where = experiment.recording, f"experiment '{experiment.label}'"
     inside = recording.time >= experiment.start - _FITS
     # A sample that rounding puts before the start is the one at the start.
     time = np.maximum(recording.time[inside] - experiment.start, 0.0)
     if time.size < MINIMUM_SAMPLES:
         raise IdentificationError(
-            f"{said}: {recording.label} has {time.size} samples after {experiment.start:g} s, "
+            f"{where}: {recording.label} has {time.size} samples after {experiment.start:g} s, "
             f"at least {MINIMUM_SAMPLES} are needed"
         )
     channels = [
@@ -105,22 +103,18 @@ def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: f
     actuator = experiment.scenario.device.actuator
     stops = actuator.angle_min, actuator.angle_max
     for channel in channels:
-        clipped = max(plateaus(channel.values), key=lambda item: item.count)
+        clipped = max(plateaus(channel.values), key=lambda plateau: plateau.count)
         # A vane that rests at its stop repeats one value on a coarse converter, and is at no limit of a sensor.
         rests = channel.name == ANGLE and any(abs(clipped.value - stop) < _ZERO_OF_ANGLE for stop in stops)
-        if (
-            not rests
-            and channel.floor == 0.0
-            and is_at_limit(channel.values, clipped)
-            and not noise_of(channel.values) > 0.0
-        ):
+        has_noise = channel.floor > 0.0 or noise_of(channel.values) > 0.0
+        if is_at_limit(channel.values, clipped) and not (rests or has_noise):
             raise IdentificationError(
-                f"{said}: channel '{channel.name}' is exactly its {clipped.word} value for {clipped.count} of "
+                f"{where}: channel '{channel.name}' is exactly its {clipped.word} value for {clipped.count} of "
                 f"{channel.values.size} samples: its sensor is at its limit; end the recording before it, or give the "
                 "standard deviation of the sensor in noise"
             )
-    before = scenario_of(experiment)
-    scenario = replace(before, run=replace(before.run, duration=float(time[-1]) + reach))
+    scenario = scenario_of(experiment)
+    scenario = replace(scenario, run=replace(scenario.run, duration=float(time[-1]) + reach))
     recorded = RecordedInputs(recording, experiment.inputs, experiment.start) if experiment.inputs else None
     return prepare_samples(experiment.label, scenario, time, channels, reach, numbers, recorded)
 
@@ -133,30 +127,30 @@ def prepare_samples(
     reach: float,
     numbers: Mapping[str, float],
     recorded: RecordedInputs | None = None,
-) -> PreparedExperiment:
+) -> _PreparedExperiment:
     """Return samples of a scenario prepared for fitting, at ``numbers`` [SI], with time offsets up to ``reach`` [s]."""
     run = replace(plan_run(with_numbers(scenario, numbers)), tolerance=FIT_TOLERANCE)
-    nowhere = np.zeros(time.size)
-    place = nowhere.astype(np.intp)
-    unplaced = PreparedExperiment(label, scenario, run, time, tuple(channels), reach, place, nowhere, recorded)
-    return _place_samples(unplaced, run)
+    unlocated = np.zeros(time.size)
+    before = unlocated.astype(np.intp)
+    prepared = _PreparedExperiment(label, scenario, run, time, tuple(channels), reach, before, unlocated, recorded)
+    return _locate_samples(prepared, run)
 
 
-def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment:
+def _locate_samples(prepared: _PreparedExperiment, run: Run) -> _PreparedExperiment:
     """Return the experiment with its samples located in a record that is only as fine as they need."""
     time, recorded = prepared.time, prepared.recorded
     every = _steps_between_samples(time, prepared.reach, run.step)
     records = math.ceil((float(time[-1]) + prepared.reach) / (run.step * every) - _FITS)
     position = time / (run.step * every)
-    place = np.minimum(np.floor(position + _FITS), records).astype(np.intp)
-    fraction = np.maximum(position - place, 0.0)
+    before = np.minimum(np.floor(position + _FITS), records).astype(np.intp)
+    fraction = np.maximum(position - before, 0.0)
     # Rounding of the clock must not make a sample lie between two records.
     fraction[fraction < _FITS] = 0.0
     frozen = replace(run, record_every=every, step_count=math.ceil(records * every - _FITS), needs_parts=True)
     if recorded is not None and recorded.has(ANGLE) and isinstance(prepared.scenario.motion, FreeMotion):
         frozen = with_prescribed_angle(frozen, prepared.scenario.motion.angle)
     inputs = None if recorded is None else step_inputs(recorded, prepared.scenario.device, frozen)
-    return replace(prepared, run=frozen, place=place, fraction=fraction, inputs=inputs)
+    return replace(prepared, run=frozen, before=before, fraction=fraction, inputs=inputs)
 
 
 def _steps_between_samples(time: Floats, reach: float, step: float) -> float:
@@ -188,38 +182,38 @@ def numbers_in(label: str, numbers: Sequence[FitNumber], point: Floats) -> dict[
 
 
 def signals_of(
-    experiments: Sequence[PreparedExperiment], numbers: Sequence[FitNumber], points: Floats
+    experiments: Sequence[_PreparedExperiment], numbers: Sequence[FitNumber], points: Floats
 ) -> list[dict[str, Floats]]:
     """Return the channels of each experiment [SI] (samples, points) at points [SI] (numbers, points).
 
     A failed run is NaN throughout. Experiments run in parallel, one thread each.
     """
 
-    def one(prepared: PreparedExperiment) -> dict[str, Floats]:
+    def signals(prepared: _PreparedExperiment) -> dict[str, Floats]:
         return signals_at(prepared, columns_in(prepared.label, numbers, points), points.shape[1])
 
     # Compiled runs release the interpreter.
     workers = min(len(experiments), os.cpu_count() or 1)
     if workers == 1:
-        return [one(prepared) for prepared in experiments]
+        return [signals(prepared) for prepared in experiments]
     with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(one, experiments))
+        return list(pool.map(signals, experiments))
 
 
-def residuals_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[FitNumber], points: Floats) -> Floats:
+def residuals_of(experiments: Sequence[_PreparedExperiment], numbers: Sequence[FitNumber], points: Floats) -> Floats:
     """Return residuals, measured - model [SI] (samples of all channels, points), at points [SI] (numbers, points)."""
     signals = signals_of(experiments, numbers, points)
     return np.concatenate(
         [
-            channel.values[:, None] - of_one[channel.name]
-            for prepared, of_one in zip(experiments, signals, strict=True)
+            channel.values[:, None] - modelled[channel.name]
+            for prepared, modelled in zip(experiments, signals, strict=True)
             for channel in prepared.channels
         ]
     )
 
 
 def blocks_of(
-    experiments: Sequence[PreparedExperiment], numbers: Sequence[FitNumber], point: Floats
+    experiments: Sequence[_PreparedExperiment], numbers: Sequence[FitNumber], point: Floats
 ) -> tuple[ResidualBlock, ...]:
     """Return the residual rows of each channel of each recording, with noise floor and integration error.
 
@@ -230,14 +224,14 @@ def blocks_of(
     coarse = signals_of(experiments, numbers, point[:, None])
     # The error is about in proportion to what is allowed, so that half as long steps show most of it.
     halved = []
-    for one in experiments:
-        scenario = replace(one.scenario, run=replace(one.scenario.run, step=0.5 * one.run.step))
-        run = plan_run(with_numbers(scenario, numbers_in(one.label, numbers, point)))
-        halved.append(_place_samples(one, replace(run, tolerance=_FINER * one.run.tolerance)))
+    for prepared in experiments:
+        scenario = replace(prepared.scenario, run=replace(prepared.scenario.run, step=0.5 * prepared.run.step))
+        run = plan_run(with_numbers(scenario, numbers_in(prepared.label, numbers, point)))
+        halved.append(_locate_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance)))
     fine = signals_of(halved, numbers, point[:, None])
-    for prepared, before, after in zip(experiments, coarse, fine, strict=True):
+    for prepared, coarse_signals, fine_signals in zip(experiments, coarse, fine, strict=True):
         for channel in prepared.channels:
-            error = (after[channel.name][:, 0] - before[channel.name][:, 0]) / (1.0 - _FINER)
+            error = (fine_signals[channel.name][:, 0] - coarse_signals[channel.name][:, 0]) / (1.0 - _FINER)
             error = error if np.isfinite(error).all() else np.zeros_like(error)
             rounded = rounding_of(channel.values, resolution_of(channel.values))
             floor = np.maximum(max(channel.floor, float(np.sqrt(np.mean(np.square(error))))), rounded)
@@ -262,7 +256,7 @@ _NUMBERS_OF_RUN = (
 """Fields of a run that depend on the parameters of its scenario; program, clock and prescribed motion do not."""
 
 
-def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
+def run_with(prepared: _PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     """Return the run of an experiment with changed parameters [SI], on the same program and clock.
 
     A parameter may be an array (runs,). Raises IdentificationError if a valve setting or an effect changes to or from
@@ -271,41 +265,42 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     base = prepared.run
     scenario = with_numbers(prepared.scenario, numbers)
     device = scenario.device
-    said, before = f"experiment '{prepared.label}'", prepared.scenario.device.valve.settings
+    where, planned_settings = f"experiment '{prepared.label}'", prepared.scenario.device.valve.settings
     settings: Mapping[str, Any] = device.valve.settings
-    own = {path.rpartition(".")[2] for path in numbers if path.startswith("valves.")}
+    fitted = {path.rpartition(".")[2] for path in numbers if path.startswith("valves.")}
     kind = VALVES[device.valve.kind]
     for run in range(max((value.size for value in settings.values() if isinstance(value, np.ndarray)), default=1)):
-        now = {name: at(value, run) for name, value in settings.items()}
-        given = kind.settings(**now)
-        valve = kind.choose(given)
-        if valve != base.program.valve or (valve.command_delay(given) > 0.0) != base.program.late_commands:
-            moved = " or ".join(f"valve.{name}" for name in now if name in own and 0.0 in (now[name], before[name]))
+        values = {name: at(value, run) for name, value in settings.items()}
+        of_run = kind.settings(**values)
+        valve = kind.choose(of_run)
+        if valve != base.program.valve or (valve.command_delay(of_run) > 0.0) != base.program.late_commands:
+            switched = [name for name in values if name in fitted and 0.0 in (values[name], planned_settings[name])]
+            moved = " or ".join(f"valve.{name}" for name in switched)
             raise IdentificationError(
-                f"{said}: {moved} changed to or from 0, which is another model of the valve; give a start and a "
+                f"{where}: {moved} changed to or from 0, which is another model of the valve; give a start and a "
                 f"lower bound above 0"
             )
     if any(np.any(is_on != (effect in base.program.effects)) for effect, is_on in switches_of(device).items()):
         raise IdentificationError(
-            f"{said}: an effect was switched on or off by the fit, which is another model; give a start and a lower "
+            f"{where}: an effect was switched on or off by the fit, which is another model; give a start and a lower "
             f"bound above 0"
         )
     planned, _ = scenario.motion.motion_kind.plan(scenario)
     # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
-    supplied = planned.plant
+    plant = planned.plant
 
     def range_of_supply(first: float, second: float, atmosphere: float) -> float:
         return supply_range(
-            supplied._replace(supply_pressure=first, dorsiflexion_pressure=second, atmospheric_pressure=atmosphere)
+            plant._replace(supply_pressure=first, dorsiflexion_pressure=second, atmospheric_pressure=atmosphere)
         )
 
-    pressures = supplied.supply_pressure, supplied.dorsiflexion_pressure, supplied.atmospheric_pressure
+    pressures = plant.supply_pressure, plant.dorsiflexion_pressure, plant.atmospheric_pressure
     allowed = supply_range(base.plant) / over_runs(range_of_supply, *pressures)
-    of_numbers = {name: getattr(planned, name) for name in _NUMBERS_OF_RUN}
-    return replace(base, tolerance=base.tolerance * allowed, **of_numbers)
+    changed = {name: getattr(planned, name) for name in _NUMBERS_OF_RUN}
+    return replace(base, tolerance=base.tolerance * allowed, **changed)
 
 
-def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+def signals_at(prepared: _PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
     """Return the channels [SI] (samples, runs) of one experiment for ``count`` runs with parameters [SI] by path.
 
     Runs that differ only in zeros and gains of compared sensors are simulated once. A pressure sensor reads gauge
@@ -318,51 +313,50 @@ def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], coun
         if path.removeprefix(ZERO_OF).removeprefix(GAIN_OF) in compared and path.startswith((ZERO_OF, GAIN_OF))
     }
     running = {path: column for path, column in columns.items() if path not in errors}
-    together = np.array([np.broadcast_to(column, (count,)) for column in running.values()]).reshape(-1, count)
+    table = np.array([np.broadcast_to(column, (count,)) for column in running.values()]).reshape(-1, count)
     # A zero or a gain of a compared sensor needs no run of its own.
-    _, first, place = np.unique(together, axis=1, return_index=True, return_inverse=True)
-    fewer = {path: np.broadcast_to(column, (count,))[first] for path, column in running.items()}
-    found = _with_inputs(prepared, fewer, len(first))
+    _, first, run_of = np.unique(table, axis=1, return_index=True, return_inverse=True)
+    distinct = {path: np.broadcast_to(column, (count,))[first] for path, column in running.items()}
+    signals = _with_inputs(prepared, distinct, len(first))
     atmosphere = prepared.scenario.device.supply.atmospheric_pressure
-    for name, values in found.items():
+    for name, values in signals.items():
         rest = 0.0 if name == ANGLE else atmosphere
         gain, zero = (np.asarray(errors.get(f"{path}{name}", 0.0)) for path in (GAIN_OF, ZERO_OF))
-        found[name] = rest + (1.0 + gain) * (values[:, place.ravel()] - rest) + zero
-    return found
+        signals[name] = rest + (1.0 + gain) * (values[:, run_of.ravel()] - rest) + zero
+    return signals
 
 
-def _with_inputs(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+def _with_inputs(prepared: _PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
     """Return ideal sensor signals; runs with different zeros of recorded inputs are simulated in separate groups."""
     zeros = {path: column for path, column in columns.items() if path.startswith(ZERO_OF)}
-    rest = {path: column for path, column in columns.items() if path not in zeros}
+    others = {path: column for path, column in columns.items() if path not in zeros}
     if not zeros or prepared.inputs is None:
-        return _run_signals(prepared, rest, count)
-    table = np.array(list(zeros.values()))
-    kinds, group = np.unique(table, axis=1, return_inverse=True)
-    found: dict[str, Floats] = {}
-    for number, kind in enumerate(kinds.T):
+        return _run_signals(prepared, others, count)
+    distinct, group = np.unique(np.array(list(zeros.values())), axis=1, return_inverse=True)
+    signals: dict[str, Floats] = {}
+    for number, values_of_group in enumerate(distinct.T.tolist()):
         members = np.flatnonzero(group.ravel() == number)
-        zero_of = {path.removeprefix(ZERO_OF): float(one) for path, one in zip(zeros, kind, strict=True)}
+        zero_of = {path.removeprefix(ZERO_OF): zero for path, zero in zip(zeros, values_of_group, strict=True)}
         # What a run follows less the zeros [rad], [Pa] of the sensors that recorded it; both inlets may have one.
         both = zero_of.get(SUPPLY, 0.0)
-        off = {
+        offsets = {
             "path.level": zero_of.get(ANGLE, 0.0),
             "plant.supply_pressure": both,
             "plant.dorsiflexion_pressure": zero_of.get(DORSIFLEXION_SUPPLY, both),
         }
-        moved = {path: values - off.get(path, 0.0) for path, values in prepared.inputs.parameters.items()}
-        own = {path: column[members] for path, column in rest.items()}
-        inputs = StepInputs(prepared.inputs.command, moved)
-        part = _run_signals(replace(prepared, inputs=inputs), own, len(members))
-        for name, values in part.items():
-            found.setdefault(name, np.empty((len(values), count)))[:, members] = values
-    return found
+        corrected = {path: values - offsets.get(path, 0.0) for path, values in prepared.inputs.parameters.items()}
+        inputs = StepInputs(prepared.inputs.command, corrected)
+        of_group = {path: column[members] for path, column in others.items()}
+        for name, values in _run_signals(replace(prepared, inputs=inputs), of_group, len(members)).items():
+            signals.setdefault(name, np.empty((len(values), count)))[:, members] = values
+    return signals
 
 
-def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+def _run_signals(prepared: _PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
     """Return the signals of ideal sensors [SI] (samples, runs)."""
     run = run_with(prepared, columns)
-    kept, failure = _rows_of(run.program)
+    rows = state_row_numbers(run)
+    channel_rows = [rows[f"state.{name}"] for name in ("angle", "mass_1", "mass_2")]
     records: Floats | None = None
     failed = np.zeros(count, dtype=np.bool_)
     # A program has up to 32 lanes; more runs are several batches.
@@ -370,46 +364,38 @@ def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
         outcome = run_batch(batch, threads=1) if prepared.inputs is None else replay(batch, prepared.inputs)
         ends = outcome.states
         # A run that leaves what is possible, or is no number, tells the search nothing.
-        failed[members] = (ends[failure] < NEVER_FAILED) | ~np.isfinite(ends).all(axis=0)
+        failed[members] = (ends[rows["result.failure_time"]] < NEVER_FAILED) | ~np.isfinite(ends).all(axis=0)
         if records is None:
-            records = np.empty((len(kept), len(outcome.record), count))
-        for place, row in enumerate(kept):
-            records[place][:, members] = outcome.record[:, row]
+            records = np.empty((len(channel_rows), len(outcome.record), count))
+        for record, row in zip(records, channel_rows, strict=True):
+            record[:, members] = outcome.record[:, row]
     assert records is not None
     offsets = np.broadcast_to(columns.get(TIME_OFFSET, np.array(0.0)), (count,))
-    angle, mass_1, mass_2 = (_at_samples(one, prepared, offsets) for one in records)
-    found = {name: np.full(angle.shape, np.nan) for name in ("angle", "pressure_1", "pressure_2")}
+    angle, mass_1, mass_2 = (_at_samples(record, prepared, offsets) for record in records)
+    signals = {name: np.full(angle.shape, np.nan) for name in ("angle", "pressure_1", "pressure_2")}
     numbers = leaves(run.plant)
     # Pressures follow from mass and angle by the plant, whose numbers differ from run to run.
     for element in np.flatnonzero(~failed).tolist():
         plant = rebuilt(run.program.actuator.plant, [at(number, element) for number in numbers])
-        own = angle[:, element], mass_1[:, element], mass_2[:, element]
-        pressures = pressures_of(run.program.actuator, plant, *own)
-        for name, values in zip(found, (own[0], *pressures), strict=True):
-            found[name][:, element] = values
-    return {channel.name: found[channel.name] for channel in prepared.channels}
+        states = angle[:, element], mass_1[:, element], mass_2[:, element]
+        pressure_1, pressure_2 = pressures_of(run.program.actuator, plant, *states)
+        signals["angle"][:, element] = angle[:, element]
+        signals["pressure_1"][:, element], signals["pressure_2"][:, element] = pressure_1, pressure_2
+    return {channel.name: signals[channel.name] for channel in prepared.channels}
 
 
-@lru_cache(maxsize=16)
-def _rows_of(program: Program) -> tuple[tuple[int, ...], int]:
-    """Return the rows of the state from which channels are computed, and the row with the time of a failure."""
-    rows = row_numbers(program.state_rows())
-    return tuple(rows[f"state.{name}"] for name in ("angle", "mass_1", "mass_2")), rows["result.failure_time"]
-
-
-def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -> Floats:
+def _at_samples(values: Floats, prepared: _PreparedExperiment, offsets: Floats) -> Floats:
     """Return a state at the sample times, interpolated linearly between records; each run has a time offset [s]."""
     if offsets.any():
         # Before the first record the device stands still.
         interval = prepared.run.step * prepared.run.record_every
         position = np.clip((prepared.time[:, None] - offsets) / interval, 0.0, len(values) - 1.0)
-        place = np.minimum(position.astype(np.intp), len(values) - 2)
+        before = np.minimum(position.astype(np.intp), len(values) - 2)
         elements = np.arange(len(offsets))
-        here, following = values[place, elements], values[place + 1, elements]
-        return np.asarray(here + (position - place) * (following - here))
-    place, fraction = prepared.place, prepared.fraction
-    here = values[place]
-    if not fraction.any():
-        return here
-    following = values[np.minimum(place + 1, len(values) - 1)]
-    return np.asarray(here + fraction[:, None] * (following - here))
+        previous, following = values[before, elements], values[before + 1, elements]
+        return np.asarray(previous + (position - before) * (following - previous))
+    previous = values[prepared.before]
+    if not prepared.fraction.any():
+        return previous
+    following = values[np.minimum(prepared.before + 1, len(values) - 1)]
+    return np.asarray(previous + prepared.fraction[:, None] * (following - previous))

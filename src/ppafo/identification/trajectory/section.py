@@ -64,8 +64,8 @@ class SectionContext:
     tolerances: Tolerances = field(default_factory=Tolerances)
 
 
-def noise_of_channels(texts: Mapping[str, str], said: str) -> dict[str, float]:
-    """Return the standard deviation of the noise by channel [rad], [Pa]; ``said`` starts messages.
+def noise_of_channels(texts: Mapping[str, str], where: str) -> dict[str, float]:
+    """Return the standard deviation of the noise by channel [rad], [Pa]; ``where`` starts messages.
 
     Raises IdentificationError for a channel that cannot be fitted.
     """
@@ -73,8 +73,8 @@ def noise_of_channels(texts: Mapping[str, str], said: str) -> dict[str, float]:
     for name, text in texts.items():
         if name not in _NOISE_UNITS:
             hint = nearest_name(name, _NOISE_UNITS)
-            raise IdentificationError(f"{said}: noise of '{name}'{hint}: only {', '.join(_NOISE_UNITS)} have one here")
-        deviations[name] = quantity_of(f"{said}: noise.{name}", text, _NOISE_UNITS[name])
+            raise IdentificationError(f"{where}: noise of '{name}'{hint}: only {', '.join(_NOISE_UNITS)} have one here")
+        deviations[name] = quantity_of(f"{where}: noise.{name}", text, _NOISE_UNITS[name])
     return deviations
 
 
@@ -82,56 +82,56 @@ SHORTEST_STEP = 1.0e-6
 """Shortest time step that may be requested [s]; a shorter step would only cost time."""
 
 
-def trajectory_problem(section: TrajectorySection, setting: SectionContext) -> TrajectoryProblem:
+def trajectory_problem(section: TrajectorySection, context: SectionContext) -> TrajectoryProblem:
     """Return the problem of a section. Raises IdentificationError if a bench procedure already used a recording."""
-    experiments = tuple(_experiment(entry, setting) for entry in section.experiments)
+    experiments = tuple(_experiment(entry, context) for entry in section.experiments)
     scenarios = {experiment.label: experiment.scenario for experiment in experiments}
     # Samples that a bench procedure used are in its interval, which is a prior here.
-    twice = double_use(setting.used, map(use_of, experiments))
-    if twice:
+    message = double_use(context.used, map(use_of, experiments))
+    if message:
         raise IdentificationError(
-            f"{setting.file}: {twice}; omit the recording from the procedure or from the trajectory"
+            f"{context.file}: {message}; omit the recording from the procedure or from the trajectory"
         )
-    parameters = [_parameter(entry, scenarios, setting) for entry in section.parameters]
+    parameters = [_parameter(entry, scenarios, context) for entry in section.parameters]
     for entry in section.experiments:
-        limit = positive_in(entry, "time_offset", "s", f"{setting.file}: experiment '{entry.label}'")
+        limit = positive_in(entry, "time_offset", "s", f"{context.file}: experiment '{entry.label}'")
         if limit is not None:
             # The delay of the samples of one recording is known within a limit, as a tolerance is.
             deviation = deviation_of_limit(limit)
             parameters.append(
                 FreeParameter(TIME_OFFSET, 0.0, -limit, limit, deviation, (entry.label,), is_tolerance=True)
             )
-    stated = {} if setting.parameter_set is None else stated_by(setting.parameter_set, experiments[0].scenario)
-    tolerances = tolerance_parameters(setting.tolerances, experiments, parameters, stated)
+    stated = {} if context.parameter_set is None else stated_by(context.parameter_set, experiments[0].scenario)
+    tolerances = tolerance_parameters(context.tolerances, experiments, parameters, stated)
     return TrajectoryProblem((*parameters, *tolerances), experiments, section.confidence)
 
 
-def candidates_of(section: TrajectorySection, setting: SectionContext) -> tuple[CandidateExperiment, ...]:
+def candidates_of(section: TrajectorySection, context: SectionContext) -> tuple[CandidateExperiment, ...]:
     """Return the candidate experiments of a section, with scenarios, noise and sample intervals [s]."""
     candidates = []
     for entry in section.candidates:
-        said = f"{setting.file}: candidate '{entry.label}'"
-        scenario = _scenario(entry.scenario, entry.overrides, setting)
-        interval = quantity_in(entry, "interval", "s", said, SHORTEST_STEP, scenario.run.duration)
+        where = f"{context.file}: candidate '{entry.label}'"
+        scenario = _scenario(entry.scenario, entry.overrides, context)
+        interval = quantity_in(entry, "interval", "s", where, SHORTEST_STEP, scenario.run.duration)
         assert interval is not None, "it has a default"
-        candidates.append(CandidateExperiment(entry.label, scenario, noise_of_channels(entry.noise, said), interval))
+        candidates.append(CandidateExperiment(entry.label, scenario, noise_of_channels(entry.noise, where), interval))
     return tuple(candidates)
 
 
-def _experiment(entry: ExperimentSection, setting: SectionContext) -> FittedExperiment:
+def _experiment(entry: ExperimentSection, context: SectionContext) -> FittedExperiment:
     """Return an experiment of a section: its recording, and the scenario that models it."""
-    said = f"{setting.file}: experiment '{entry.label}'"
-    source = setting.read(entry)
+    where = f"{context.file}: experiment '{entry.label}'"
+    source = context.read(entry)
     if entry.scenario is None:
-        scenario, start, inputs = _replay(entry, source.recording, setting, said)
+        scenario, start, inputs = _replay(entry, source.recording, context, where)
     else:
         for name in ("locked", "volume"):
             if getattr(entry, name) is not None:
                 raise IdentificationError(
-                    f"{said}: {name} and a scenario: the scenario prescribes how the vane moves; omit one of them"
+                    f"{where}: {name} and a scenario: the scenario prescribes how the vane moves; omit one of them"
                 )
-        scenario = _scenario(entry.scenario, entry.overrides, setting)
-        start, inputs = quantity_in(entry, "start", "s", said) or 0.0, entry.inputs or ()
+        scenario = _scenario(entry.scenario, entry.overrides, context)
+        start, inputs = quantity_in(entry, "start", "s", where) or 0.0, entry.inputs or ()
     channels = entry.channels
     if channels is None:
         # All that is neither locked nor followed; of a fixed volume its pressure.
@@ -140,7 +140,7 @@ def _experiment(entry: ExperimentSection, setting: SectionContext) -> FittedExpe
         channels = channels if entry.volume is None else ("pressure_1",)
         if scenario.device.actuator.has_one_chamber:
             channels = tuple(name for name in channels if name != "pressure_2")
-    step = quantity_in(entry, "step", "s", said, SHORTEST_STEP, LONGEST_STEP)
+    step = quantity_in(entry, "step", "s", where, SHORTEST_STEP, LONGEST_STEP)
     scenario = scenario if step is None else replace(scenario, run=replace(scenario.run, step=step))
     # The scenario of a replay has the state of the samples already.
     is_read = entry.scenario is not None and entry.initial_state in ("recording", "fitted")
@@ -150,59 +150,59 @@ def _experiment(entry: ExperimentSection, setting: SectionContext) -> FittedExpe
         recording=source.recording,
         start=start,
         channels=channels,
-        noise=noise_of_channels(entry.noise, said),
+        noise=noise_of_channels(entry.noise, where),
         inputs=inputs,
         initial_state="recording" if is_read else "scenario",
         source=source.trace,
     )
 
 
-def _scenario(name: str, overrides: tuple[str, ...], setting: SectionContext) -> Scenario:
+def _scenario(name: str, overrides: tuple[str, ...], context: SectionContext) -> Scenario:
     """Return a bundled scenario, or one from a file in the folder of the problem, with the device of the problem."""
-    name_or_file = name if name in list_scenarios() else str(setting.folder / name)
+    name_or_file = name if name in list_scenarios() else str(context.folder / name)
     # The valve of the problem goes before what the experiment changes of it.
-    chosen = () if setting.valve is None else (f"device.valve={setting.valve}",)
-    return load_scenario(name_or_file, over(chosen, overrides, ScenarioError), setting.parameter_set)
+    chosen = () if context.valve is None else (f"device.valve={context.valve}",)
+    return load_scenario(name_or_file, over(chosen, overrides, ScenarioError), context.parameter_set)
 
 
-def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], setting: SectionContext) -> FreeParameter:
+def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], context: SectionContext) -> FreeParameter:
     """Return a parameter to fit [SI]; ``scenarios`` are the scenarios of the experiments, by label."""
     scenario = next((scenarios[label] for label in entry.recordings if label in scenarios), None)
     acting = scenario or next(iter(scenarios.values()))
     quantity = declaration_of(entry.path, acting)
     atmosphere = acting.device.supply.atmospheric_pressure
-    said = f"{setting.file}: parameter '{entry.path}'"
+    where = f"{context.file}: parameter '{entry.path}'"
     start, low, high = (
-        quantity_in(entry, key, quantity.unit, said, atmosphere=atmosphere) for key in ("start", "low", "high")
+        quantity_in(entry, key, quantity.unit, where, atmosphere=atmosphere) for key in ("start", "low", "high")
     )
     deviation = math.inf
     if entry.prior == "bench":
-        estimate = setting.bench.get(full_path(entry.path, acting))
+        estimate = context.bench.get(full_path(entry.path, acting))
         if estimate is None or not estimate.is_usable:
-            have = ", ".join(path for path, known in setting.bench.items() if known.is_usable) or "none"
+            identified = ", ".join(path for path, known in context.bench.items() if known.is_usable) or "none"
             raise IdentificationError(
-                f"{said}: prior = 'bench': no procedure of this problem identified it; identified: {have}"
+                f"{where}: prior = 'bench': no procedure of this problem identified it; identified: {identified}"
             )
         start, deviation = estimate.value, estimate.wider_half_width / interval_factor(estimate.confidence)
     elif entry.prior is not None:
-        start = quantity_of(f"{said}: prior.mean", entry.prior.mean, quantity.unit, atmosphere)
+        start = quantity_of(f"{where}: prior.mean", entry.prior.mean, quantity.unit, atmosphere)
         deviation = abs(start) * entry.prior.relative
     return FreeParameter(entry.path, start, low, high, deviation, entry.recordings)
 
 
 def _replay(
-    entry: ExperimentSection, recording: Recording, setting: SectionContext, said: str
+    entry: ExperimentSection, recording: Recording, context: SectionContext, where: str
 ) -> tuple[Scenario, float, tuple[str, ...]]:
     """Return a replay scenario for a recording, its start time [s] in the recording, and its inputs.
 
     The replay starts at the first sample unless a start is given. Raises IdentificationError if a scenario is needed.
     """
-    if setting.parameter_set is None:
-        raise IdentificationError(f"{said}: needs a scenario, because no device was given")
+    if context.parameter_set is None:
+        raise IdentificationError(f"{where}: needs a scenario, because no device was given")
     inputs = tuple(name for name in INPUTS if name in recording) if entry.inputs is None else entry.inputs
     is_locked, is_fixed = entry.locked is not None, entry.volume is not None
     refuse_first(
-        said,
+        where,
         (entry.initial_state == "scenario", "initial_state = 'scenario', but it has no scenario; omit it"),
         (
             (is_locked or is_fixed) and ANGLE in inputs,
@@ -215,18 +215,18 @@ def _replay(
         ),
         (COMMAND not in inputs, f"has no scenario, so inputs must have '{COMMAND}'"),
     )
-    first = quantity_in(entry, "start", "s", said)
-    first = float(recording.time[0]) if first is None else first
-    used = recording.between(first, float(recording.time[-1]))
-    device = build_device(apply_overrides(setting.parameter_set, entry.overrides, valve=setting.valve), setting.valve)
-    angle, volume = quantity_in(entry, "locked", "rad", said), positive_in(entry, "volume", "m^3", said)
+    start_time = quantity_in(entry, "start", "s", where)
+    start_time = float(recording.time[0]) if start_time is None else start_time
+    used = recording.between(start_time, float(recording.time[-1]))
+    device = build_device(apply_overrides(context.parameter_set, entry.overrides, valve=context.valve), context.valve)
+    angle, volume = quantity_in(entry, "locked", "rad", where), positive_in(entry, "volume", "m^3", where)
     known = {} if angle is None else {ANGLE: angle}
     if volume is not None:
         device, known = with_fixed_volume(device, volume)
     remedies = dict.fromkeys(FITTED_CHANNELS, "give a scenario, which prescribes the initial state")
-    start = start_of(used, device, known, said, remedies)
+    start = start_of(used, device, known, where, remedies)
     motion = locked_vane(start.angle) if known else None
-    return replay_scenario(recording, device, start, used.duration, said, motion), first, inputs
+    return replay_scenario(recording, device, start, used.duration, where, motion), start_time, inputs
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,19 +243,19 @@ class TrajectoryOutcome:
         return not self.fit.conflict and not self.fit.remarks
 
 
-def solve_section(section: TrajectorySection, setting: SectionContext, report: Report) -> TrajectoryOutcome:
+def solve_section(section: TrajectorySection, context: SectionContext, report: Report) -> TrajectoryOutcome:
     """Return the result of a section; all input errors are reported before the search starts."""
     try:
-        problem = trajectory_problem(section, setting)
-        candidates = candidates_of(section, setting)
+        problem = trajectory_problem(section, context)
+        candidates = candidates_of(section, context)
         fitted = fit(problem, report)
         expected = expected_information(fitted, candidates)
     except (IdentificationError, DataError) as error:
-        if str(error).startswith(setting.file):
+        if str(error).startswith(context.file):
             raise
-        raise type(error)(f"{setting.file}: {error}") from error
+        raise type(error)(f"{context.file}: {error}") from error
     sources = tuple(RecordingSource(experiment.recording, experiment.source) for experiment in problem.experiments)
-    disagreeing = _against_bench(fitted.estimates, setting.bench)
+    disagreeing = _against_bench(fitted.estimates, context.bench)
     return TrajectoryOutcome(
         fitted, expected, (*remarks_on_readings(sources), *fitted.outliers, *fitted.remarks, *disagreeing)
     )

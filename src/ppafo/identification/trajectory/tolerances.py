@@ -61,7 +61,7 @@ def tolerance_parameters(
 
     ``stated`` are the half-widths of the 95 % intervals stated in the set [SI], by path.
     """
-    found: list[FreeParameter] = []
+    parameters: list[FreeParameter] = []
     for experiment in experiments:
         free = {
             full_path(item.path, experiment.scenario)
@@ -70,7 +70,7 @@ def tolerance_parameters(
         }
         for path, (start, deviation) in _of_run(tolerances, experiment).items():
             if path not in free and deviation > 0.0:
-                found.append(_parameter(path, start, deviation, (experiment.label,)))
+                parameters.append(_parameter(path, start, deviation, (experiment.label,)))
     # What is fitted is moved already; a second number for it could not be told from the first.
     given = {full_path(item.path, experiments[0].scenario) for item in fitted}
     for kind, prefix, limit_of in (("zero", ZERO_OF, tolerances.zero_of), ("gain", GAIN_OF, tolerances.gain_of)):
@@ -86,9 +86,13 @@ def tolerance_parameters(
                 continue
             groups = [(label,) for label in labels] if kind in tolerances.each_recording else [tuple(labels)]
             for group in groups:
-                whole = len(group) == len(experiments) and kind not in tolerances.each_recording
-                found.append(_parameter(path, 0.0, deviation_of_limit(limit), () if whole else group))
-    return (*found, *_of_set(tolerances, experiments, given, stated or {}), *_stribeck(tolerances, experiments, given))
+                is_common = len(group) == len(experiments) and kind not in tolerances.each_recording
+                parameters.append(_parameter(path, 0.0, deviation_of_limit(limit), () if is_common else group))
+    return (
+        *parameters,
+        *_of_set(tolerances, experiments, given, stated or {}),
+        *_stribeck(tolerances, experiments, given),
+    )
 
 
 def _stribeck(
@@ -101,7 +105,7 @@ def _stribeck(
     fixed share would shift its whole error to the static friction.
     """
     limit, scenario = tolerances.stribeck_velocity, experiments[0].scenario
-    moves = any(vane_motion(one.scenario).profile is None and ANGLE not in one.inputs for one in experiments)
+    moves = any(vane_motion(item.scenario).profile is None and ANGLE not in item.inputs for item in experiments)
     friction, has_own = scenario.device.friction, number_at(scenario, _STRIBECK) > 0.0
     if has_own or not moves or friction.static_torque <= friction.dynamic_torque:
         return

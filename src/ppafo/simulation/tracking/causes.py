@@ -14,6 +14,7 @@ from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.load_causes import flung_at_start, load_beyond_reach, stop_of, torque_beyond_reach
 from ppafo.simulation.tracking.pair_step import pair_step
 from ppafo.simulation.tracking.remedies import (
+    Remedy,
     change_text,
     dead_band,
     gain_of_device,
@@ -190,6 +191,17 @@ def gains_of_another_device(case: Case) -> TrackingCause | None:
     return TrackingCause("its gains are not this device's", (default_gain, *others))
 
 
+def _law_without_torque_loop(case: Case) -> TrackingCause | None:
+    """Cause: a law for an angle opens the valve by the angle alone, and is slow wherever the gas swings the joint."""
+    law = case.law
+    if case.scenario.controlled != ANGLE or law is None or law.only_switches:
+        return None
+    if torque_asked(case.scenario, law, case.settled.error) is not None:
+        return None
+    text = f"`{law.name}` acts on the angle without a torque loop inside, and is slow against load and friction"
+    return TrackingCause(text, (Remedy({}, ("controller.kind=cascade",)),), "take `controller.kind = cascade`")
+
+
 def _is_settling(case: Case) -> bool:
     """True if the mean error falls by at least 30 % from the first to the second half of the settled part."""
     reference, value = followed(case.recording)
@@ -225,6 +237,7 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _fully_open_valve,
     gains_of_another_device,
     _lag,
+    _law_without_torque_loop,
     _not_settled,
 )
 """Causes of a task, most certain first; the last one always applies."""

@@ -36,10 +36,16 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
     if lowest <= wanted <= highest:
         return None
     reach, supply = highest if wanted > highest else lowest, supply_that_moves(scenario.device, wanted > highest)
+    stop = stop_of(scenario, case.recording["angle"][samples]) if isinstance(scenario.motion, FreeMotion) else ""
+    lies = f"nothing resists the torque but the {stop} stop, on which the joint lies: " if stop else ""
     text = (
-        f"at {level_text('rad', wanted_at)} and {level_text('Pa', number_at(scenario, supply))} the "
+        f"{lies}at {level_text('rad', wanted_at)} and {level_text('Pa', number_at(scenario, supply))} the "
         f"actuator gives {level_text('N m', reach)} at most"
     )
+    if lies:
+        return TrackingCause(
+            text, (), "lock the joint (`motion.kind = locked`) or give it a load", is_beyond_reach=True
+        )
     remedies = []
     needed = supply_for(scenario.device, wanted_at, 1.05 * wanted)
     if needed is not None:

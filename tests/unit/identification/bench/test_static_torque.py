@@ -98,6 +98,20 @@ def test_one_pressure_is_too_few() -> None:
         static_torque((changed(source, "pressure_difference", two),))
 
 
+def test_the_jitter_of_one_commanded_pressure_is_no_range_of_pressures() -> None:
+    source = planted.static()
+    pressure = source.recording["pressure_difference"]
+    jitter = 5.0e5 + 1.2e4 * (pressure / pressure.max())
+    with pytest.raises(IdentificationError, match=r"there are 1: pressures closer than 7\.4.* psi, 10 %.*are one"):
+        static_torque((changed(source, "pressure_difference", jitter),))
+
+
+def test_a_friction_that_falls_with_pressure_is_not_called_identified() -> None:
+    result = static_torque((planted.static(growth=-1.0e-6),))
+    assert result[GROWTH].verdict == "holds for this model only"
+    assert "as if pressure loosened the seal" in result.conflict
+
+
 @pytest.mark.parametrize(
     ("load", "moves", "slope", "friction"),
     [

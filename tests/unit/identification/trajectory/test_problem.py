@@ -114,7 +114,7 @@ def test_samples_off_the_grid_lie_between_two_records(experiment: FittedExperime
     recording = experiment.recording.resample(np.linspace(0.0, 0.35, 223))
     prepared = prepare(dataclasses.replace(experiment, recording=recording), {})
     assert prepared.fraction.any()
-    at = (prepared.place + prepared.fraction) * prepared.run.step * prepared.run.record_every
+    at = (prepared.before + prepared.fraction) * prepared.run.step * prepared.run.record_every
     assert at == pytest.approx(recording.time, abs=1e-9)
 
 

@@ -18,6 +18,11 @@ static const char *const PATHS[SETTINGS] = {
 @paths@
 };
 
+/* Units of the settings. */
+static const char *const UNITS[SETTINGS] = {
+@units@
+};
+
 /* Whether a setting may be changed while the unit runs (t), only before (f), or is none of the unit's variables (h). */
 static const char CHANGES[SETTINGS + 1] = "@changes@";
 
@@ -101,6 +106,30 @@ static bool is_hidden(const char *path)
     return false;
 }
 
+/* Refuse a setting by its name in C: with the limit beyond which it is, or because it contradicts another one. */
+static bool refuse_setting(unit *item, const char *name)
+{
+    const char *path = path_of(name);
+    double value;
+    int place = 0;
+    while (place < SETTINGS - 1 && strcmp(SETTING[place].name, name) != 0) {
+        ++place;
+    }
+    value = ((const double *)&item->now.settings)[place];
+    if (is_hidden(path)) {
+        return refuse(item, "an input is out of range (it sets %s)", path);
+    }
+    if (value > SETTING[place].highest) {
+        return refuse(item, "parameter %s = %.9g %s is out of range: at most %.9g %s", path, value, UNITS[place],
+            SETTING[place].highest, UNITS[place]);
+    }
+    if (value > SETTING[place].lowest || (SETTING[place].may_be_lowest && value == SETTING[place].lowest)) {
+        return refuse(item, "parameter %s = %.9g %s contradicts another parameter", path, value, UNITS[place]);
+    }
+    return refuse(item, "parameter %s = %.9g %s is out of range: %s %.9g %s", path, value, UNITS[place],
+        SETTING[place].may_be_lowest ? "at least" : "above", SETTING[place].lowest, UNITS[place]);
+}
+
 /* The numbers of a run for the settings, if they are good. */
 static bool prepare_unit(unit *item, prepared_run *prepared)
 {
@@ -108,9 +137,7 @@ static bool prepare_unit(unit *item, prepared_run *prepared)
     follow_inputs(item);
     bad = wrong_setting(&item->now.settings);
     if (bad != NULL) {
-        const char *path = path_of(bad);
-        return is_hidden(path) ? refuse(item, "an input is out of range (it sets %s)", path)
-                               : refuse(item, "parameter %s is out of range or contradicts another", path);
+        return refuse_setting(item, bad);
     }
     prepare_run(&item->now.settings, prepared);
     bad = needs_other_program(&item->now.settings, prepared);

@@ -92,9 +92,9 @@ def read_c3d(path: str | Path) -> MotionTable:
     first = max(0, int(content["header"]["points"].get("first_frame", 0)))
     trial = _trial(parameters)
     time = (first + np.arange(frames)) / rate
-    said = said_of_doubled(twins, dict.fromkeys(labels), "points")
-    said += [f"points not read, for they have no label: {number - len(labels)}"] if len(labels) < number else []
-    return MotionTable(str(path), time, columns, units, remarks=(*trial.remarks, *said), trial=trial)
+    remarks = said_of_doubled(twins, dict.fromkeys(labels), "points")
+    remarks += [f"points not read, for they have no label: {number - len(labels)}"] if len(labels) < number else []
+    return MotionTable(str(path), time, columns, units, remarks=(*trial.remarks, *remarks), trial=trial)
 
 
 def open_c3d(path: str | Path) -> Any:
@@ -182,13 +182,13 @@ def _events(group: Any) -> tuple[Events, tuple[str, ...]]:
         return {}, ("its events are not read: one of EVENT:CONTEXTS, LABELS and TIMES is missing",) if present else ()
     sides, kinds = _texts(group, "CONTEXTS"), _texts(group, "LABELS")
     times = np.asarray(group["TIMES"]["value"], dtype=np.float64)
-    count, said = len(kinds), ""
+    count, assumption = len(kinds), ""
     if times.shape == (2, count) or (count < 2 and times.size == 2 * count):
         pairs = times.reshape(2, count)
     elif times.size == 2 * count:
-        pairs, said = times.reshape(count, 2).T, "a flat list of minutes and seconds"
+        pairs, assumption = times.reshape(count, 2).T, "a flat list of minutes and seconds"
     elif times.size == count:
-        pairs, said = np.array([np.zeros(count), times.reshape(-1)]), "a flat list of seconds"
+        pairs, assumption = np.array([np.zeros(count), times.reshape(-1)]), "a flat list of seconds"
     else:
         pairs = np.zeros((2, 0))
     if not count == len(sides) == pairs.shape[1]:
@@ -200,7 +200,9 @@ def _events(group: Any) -> tuple[Events, tuple[str, ...]]:
     for side, kind, time in zip(sides, kinds, (60.0 * pairs[0] + pairs[1]).tolist(), strict=True):
         if np.isfinite(time):
             events.setdefault((side.strip().lower(), kind.strip().lower()), []).append(time)
-    return {key: sorted(events[key]) for key in events}, (f"times of its events read as {said}",) if said else ()
+    return {key: sorted(events[key]) for key in events}, (
+        f"times of its events read as {assumption}",
+    ) if assumption else ()
 
 
 FORM = GaitForm(

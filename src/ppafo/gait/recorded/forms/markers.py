@@ -68,11 +68,11 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
     backwards = "-" if forward.startswith("-") else ""
     angles = _label(labels, foot + _ANGLES)
     heel, toe = (_first(labels, foot, names) for names in (_HEELS, _TOES))
-    said: tuple[str, ...] = ()
+    ankle_remarks: tuple[str, ...] = ()
     # The model's own angle is preferred: its zero comes from a static trial.
     if angles is None and heel is not None and toe is not None:
         angle = AngleMap(heel=heel, toe=toe, forward=forward, vertical=vertical, positive="plantarflexion")
-        said = (f"ankle angle from the markers {heel} and {toe}; its zero is the foot that stands flat",)
+        ankle_remarks = (f"ankle angle from the markers {heel} and {toe}; its zero is the foot that stands flat",)
     else:
         column = f"{angles or foot.upper() + 'AnkleAngles'}.x"
         angle = AngleMap(terms=(column,), positive="dorsiflexion", unit="deg")
@@ -84,7 +84,7 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
         **loads,
     )
     plates = tuple(name for name in table.columns if name.startswith(PLATE) and name.endswith(f".{vertical}"))
-    return Convention(columns, plates, (*remarks, *said, *units))
+    return Convention(columns, plates, (*remarks, *ankle_remarks, *units))
 
 
 def convention_of_map(columns: GaitMap, tables: Sequence[MotionTable], side: Side) -> Convention:
@@ -144,17 +144,17 @@ def _load_maps(
     remarks: list[str] = []
     moment = _label(labels, foot + _MOMENTS)
     if moment is not None and _is_measured(table, f"{moment}.x"):
-        unit, said = load_unit(table, f"{moment}.x", "moment", body_mass)
+        unit, load_remarks = load_unit(table, f"{moment}.x", "moment", body_mass)
         maps["ankle_moment"] = MomentMap(terms=(f"{moment}.x",), positive="plantarflexion", unit=unit)
-        remarks += said
+        remarks += load_remarks
     reactions = (_label(labels, foot + name) for name in _REACTIONS)
     force = next(
         (f"{name}.{vertical}" for name in reactions if name and _is_measured(table, f"{name}.{vertical}")), None
     )
     if force is not None:
-        unit, said = load_unit(table, force, "force", body_mass)
+        unit, load_remarks = load_unit(table, force, "force", body_mass)
         maps["vertical_force"] = ForceMap(terms=(force,), unit=unit or "-")
-        remarks += said
+        remarks += load_remarks
     return maps, tuple(remarks)
 
 
@@ -180,8 +180,8 @@ def _axes(
     up = int(np.argmax(np.abs(np.nanmean(apart, axis=1)) - 2.0 * np.nanstd(apart, axis=1)))
     # How far a point went, (3,), from where it is first seen to where it is last seen.
     seen = np.flatnonzero(np.isfinite(at_ankle).all(axis=0))
-    way = at_ankle[:, seen[-1]] - at_ankle[:, seen[0]] if seen.size else np.zeros(3)
-    # The mean way from heel to toes, (3,), of the samples at which both are seen.
+    travel = at_ankle[:, seen[-1]] - at_ankle[:, seen[0]] if seen.size else np.zeros(3)
+    # The mean direction from heel to toes, (3,), of the samples at which both are seen.
     pointing = None
     at_heel, at_toe = (_point(table, _first(labels, foot, names) or "") for names in (_HEELS, _TOES))
     if at_heel is not None and at_toe is not None:
@@ -189,28 +189,28 @@ def _axes(
         both = np.isfinite(shoe).all(axis=0)
         pointing = shoe[:, both].mean(axis=1) if both.any() else None
     # Most laboratories write millimetres, also where the file does not say so.
-    if np.hypot(*np.delete(way, up)) < _LEAST_WAY * {"m": 1.0, "cm": 100.0}.get(
+    if np.hypot(*np.delete(travel, up)) < _LEAST_WAY * {"m": 1.0, "cm": 100.0}.get(
         table.units.get(f"{ankle}.x", ""), 1000.0
     ):
         if pointing is None:
             return "x" if up else "y", _UPWARDS[up], ()
-        way = pointing
-    elif pointing is not None and np.delete(pointing, up) @ np.delete(way, up) < 0.0:
+        travel = pointing
+    elif pointing is not None and np.delete(pointing, up) @ np.delete(travel, up) < 0.0:
         # The ankle's travel says the axis, the foot the direction: on a treadmill both may differ.
-        way = -way
-    along = max((axis for axis in range(3) if axis != up), key=lambda axis: abs(float(way[axis])))
+        travel = -travel
+    along = max((axis for axis in range(3) if axis != up), key=lambda axis: abs(float(travel[axis])))
     # Indices of the axes are 0, 1 and 2, whose sum is 3.
     across = 3 - up - along
-    oblique = float(np.degrees(np.arctan2(abs(way[across]), abs(way[along]))))
+    oblique = float(np.degrees(np.arctan2(abs(travel[across]), abs(travel[along]))))
     if oblique > _MOST_OBLIQUE:
         raise DataError(
             f"{table.file}: walking direction is {oblique:.0f} deg off lab axis {'xyz'[along]} (limit "
             f"{_MOST_OBLIQUE:g} deg); rotate "
             "the coordinates so that one axis points along the walk"
         )
-    forward = _FORWARDS[along + 3 * bool(way[along] < 0.0)]
-    said = () if (forward, up) == ("x", 2) else (f"the walk goes along {forward}, upwards is {'xyz'[up]}",)
-    return forward, _UPWARDS[up], said
+    forward = _FORWARDS[along + 3 * bool(travel[along] < 0.0)]
+    remarks = () if (forward, up) == ("x", 2) else (f"the walk goes along {forward}, upwards is {'xyz'[up]}",)
+    return forward, _UPWARDS[up], remarks
 
 
 def _point(table: MotionTable, label: str) -> Floats | None:

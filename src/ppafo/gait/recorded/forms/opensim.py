@@ -101,8 +101,8 @@ def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Con
         (numbered if len(sides) != 1 else own if side in sides else other).append(name)
     if own or (other and len(numbered) == 1):
         plates = tuple(own or numbered)
-        said = (f"vertical force: the sum of {' and '.join(plates)}",) if len(plates) > 1 else ()
-        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=plates)}), (), said)
+        remarks = (f"vertical force: the sum of {' and '.join(plates)}",) if len(plates) > 1 else ()
+        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=plates)}), (), remarks)
     if len(numbered) == 1 and side == "right":
         return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=tuple(numbered))}))
     return Convention(usual.model_copy(update={"vertical_force": None}), tuple(numbered))
@@ -149,10 +149,10 @@ def _turned_forward(table: MotionTable) -> MotionTable:
         tipped = columns["pelvis_list"] * degree["pelvis_list"] if "pelvis_list" in columns else 0.0 * tilt
         forward = -np.sin(tilt) * np.cos(tipped) * cosine - np.sin(tipped) * sine
         columns["pelvis_tilt"] = np.arctan2(-forward, np.cos(tilt) * np.cos(tipped)) / degree["pelvis_tilt"]
-    said = (
+    remarks = (
         f"the walk goes {np.degrees(facing):.0f} deg to the left of x (pelvis_rotation): the pelvis is turned into it"
     )
-    return replace(table, columns=columns, remarks=(*table.remarks, said))
+    return replace(table, columns=columns, remarks=(*table.remarks, remarks))
 
 
 FORM = GaitForm(
