@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Collection, Mapping
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, TypeVar
 
 from ppafo.arguments.conversion import taken_number
 from ppafo.arguments.values import shown
@@ -12,7 +12,15 @@ from ppafo.model.catalog import VALVES, device_effects
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
-from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, is_within, members, range_rule
+from ppafo.parameters.declaration import (
+    AREA_FORM,
+    OF_SECOND_CHAMBER,
+    ORIFICE,
+    SONIC_FORM,
+    is_within,
+    members,
+    range_rule,
+)
 from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.effects import number_under, part_of
 from ppafo.parameters.graph import Graph, holding, in_other_forms, left, paths_in, resolved
@@ -30,6 +38,7 @@ from ppafo.simulation.scenario import (
     SupplyLine,
 )
 
+_Item = TypeVar("_Item")
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 _OF_DEVICE = (*_DEVICE_SECTIONS, "valve", EFFECT_SETTINGS)
 ORIFICES = {"valve": ("device", "valve", "orifice"), "actuator.leak": ("device", "actuator", "leak")}
@@ -103,7 +112,14 @@ def check_parts(scenario: Scenario) -> None:
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declarations of all numbers of a scenario and its device, by path; both forms of each orifice."""
-    return device_numbers(scenario.device) | scenario.motion.motion_kind.quantities(scenario)
+    device = scenario.device
+    return device_numbers(device) | of_its_chambers(scenario.motion.motion_kind.quantities(scenario), device)
+
+
+def of_its_chambers(by_path: Mapping[str, _Item], device: Device) -> dict[str, _Item]:
+    """Return items by path without those of a second chamber that the actuator does not have."""
+    absent = OF_SECOND_CHAMBER if device.actuator.has_one_chamber else frozenset()
+    return {path: item for path, item in by_path.items() if path not in absent}
 
 
 def device_numbers(device: Device) -> dict[str, Quantity]:
@@ -115,7 +131,7 @@ def device_numbers(device: Device) -> dict[str, Quantity]:
         (effect.section, quantity) for effect in device_effects() for quantity in effect.quantities_in(species)
     ]
     declared += [("valve", quantity) for quantity in (*ORIFICE, *VALVES[device.valve.kind].quantities)]
-    return {f"{section}.{quantity.name}": quantity for section, quantity in declared}
+    return of_its_chambers({f"{section}.{quantity.name}": quantity for section, quantity in declared}, device)
 
 
 def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
