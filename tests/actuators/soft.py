@@ -5,6 +5,25 @@ from pathlib import Path
 import numpy as np
 
 FOLDER = Path(__file__).parent
+OF_SECOND_CHAMBER = """
+[actuator.dead_volume_2]
+value = 10.0
+unit = "cm^3"
+origin = "assumed"
+source = "0.8 m of tube of 4 mm bore"
+
+[actuator.leak.area]
+value = 0.0
+unit = "mm^2"
+origin = "assumed"
+source = "chambers apart"
+
+[actuator.leak.discharge_coefficient]
+value = 0.6
+unit = ""
+origin = "assumed"
+source = "of no effect while the area is 0"
+"""
 
 
 def soft(folder: Path, chambers: int = 2) -> str:
@@ -24,5 +43,7 @@ def soft(folder: Path, chambers: int = 2) -> str:
     text = (FOLDER / "measured-bladder.toml").read_text(encoding="utf-8")
     text = text.replace("measured-bladder.csv", "soft.csv").replace("measured-bladder", "soft")
     text = text.replace("value = 166.8", "value = 300.0")
+    if chambers == 2:
+        text += OF_SECOND_CHAMBER
     (folder / "soft.toml").write_text(text, encoding="utf-8")
     return f"device.set={folder / 'soft.toml'}"

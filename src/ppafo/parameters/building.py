@@ -40,7 +40,7 @@ from ppafo.parameters.parameter_set import (
     number_text,
     with_followers,
 )
-from ppafo.parameters.plant import shape_and_growth
+from ppafo.parameters.plant import first_settings, shape_and_growth
 from ppafo.units.shown import counted_from, shown_in, shown_text
 from ppafo.wording import nearest_name, one_line
 
@@ -49,6 +49,9 @@ _SAME = 1.0e-9
 _COVERED = 1.01
 """Ratio by which the supply may exceed the pressures of a table."""
 _BESIDE_ANOTHER = "; the other supply is above it, and both must be on the same side of the atmosphere"
+_UNUSED_VOLUME = 1.0e-6
+"""Constant volume [m^3] in place of the second chamber of an actuator that has one; no gas flows into it."""
+_NO_LEAK = Orifice(area=0.0, discharge_coefficient=1.0)
 SUPPLIES = PRESSURE_PATH, SECOND_PRESSURE_PATH
 Reader = Callable[[str, Iterable[Quantity]], dict[str, float]]
 """Function that reads a section by its declared quantities: numbers in SI, by name."""
@@ -69,7 +72,6 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
         remedy = f"use '{completed}', which completes it" if completed else "add them to the file or as overrides"
         raise ParameterError(f"{parameter_set.file}: the device lacks {', '.join(missing)}; {remedy}")
     read, kind = _reader(parameter_set), parameter_set.valve_kinds[name]
-    relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
     species = parameter_set.texts[declaration.SPECIES_PATH].value
     if species not in SPECIES:
         raise ParameterError(
@@ -84,7 +86,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
         actuator=_actuator(parameter_set, read),
         friction=Friction(**read("friction", declaration.FRICTION)),
         foot_plate=FootPlate(**read("foot_plate", declaration.FOOT_PLATE)),
-        supply=Supply(**read("supply", declaration.SUPPLY), relieving=relieving is not None and relieving.value),
+        supply=_supply(parameter_set, read),
         valve=Valve(
             kind=kind,
             settings=read(f"valves.{name}", VALVES[kind].quantities),
@@ -100,6 +102,10 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
         links=links,
         units=parameter_set.shown,
     )
+    if device.actuator.has_one_chamber and VALVES[kind].choose(first_settings(device.valve)).joint is not None:
+        raise ParameterError(
+            f"{parameter_set.file}: valve '{name}', a '{kind}', joins two chambers: {declaration.WHY_ONE_CHAMBER}"
+        )
     is_beyond, line = beyond_pressures(device)
     if is_beyond:
         raise ParameterError(f"{parameter_set.file}: actuator: {line(0)}")
@@ -112,6 +118,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
             allowed = f"{relation} {other} = {shown_text(limit, si_unit, atmosphere=room, unit=unit)}"
             why = _BESIDE_ANOTHER if path in SUPPLIES else ""
             raise ParameterError(f"{parameter_set.file}: {path} = {number_text(entry)} must be {allowed}{why}")
+    relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
     if device.supply.is_vacuum and relieving is not None and not relieving.value:
         raise ParameterError(
             f"{parameter_set.file}: {declaration.RELIEVING_PATH} = false: gas goes from the chambers into a supply "
@@ -137,20 +144,36 @@ def growth_and_problem(device: Device) -> tuple[Any, Problem]:
     return growth, (np.logical_not(growth > 0.0), line)
 
 
+def _supply(parameter_set: ParameterSet, read: Reader) -> Supply:
+    """Return the supply; with one chamber, the port of the second one is at the atmosphere and passes nothing."""
+    numbers = read("supply", _present(parameter_set, "supply"))
+    if parameter_set.has_one_chamber:
+        numbers["dorsiflexion_pressure"] = numbers["atmospheric_pressure"]
+    relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
+    return Supply(**numbers, relieving=relieving is not None and relieving.value)
+
+
+def _present(parameter_set: ParameterSet, section: str) -> tuple[Quantity, ...]:
+    """Return the quantities of a section that the actuator of the set has."""
+    absent = declaration.OF_SECOND_CHAMBER if parameter_set.has_one_chamber else frozenset()
+    members = declaration.members(section, parameter_set.actuator_kind)
+    return tuple(member for member in members if f"{section}.{member.name}" not in absent)
+
+
 def _actuator(parameter_set: ParameterSet, read: Reader) -> Actuator:
     """Return the actuator: a vane, or one of another kind with its settings."""
-    leak, kind = _orifice(parameter_set, read, "actuator.leak"), ACTUATORS[parameter_set.actuator_kind]
-    quantities = declaration.actuator_quantities(parameter_set.actuator_kind)
-    numbers = read("actuator", quantities)
+    kind = ACTUATORS[parameter_set.actuator_kind]
+    numbers = read("actuator", _present(parameter_set, "actuator"))
+    has_one_chamber = parameter_set.has_one_chamber
     actuator = Actuator(
         torque_constant=numbers.get("torque_constant", 0.0),
         displacement_per_radian=numbers.get("displacement_per_radian", 0.0),
         angle_min=numbers["angle_min"],
         angle_max=numbers["angle_max"],
         dead_volume_1=numbers["dead_volume_1"],
-        dead_volume_2=numbers["dead_volume_2"],
+        dead_volume_2=_UNUSED_VOLUME if has_one_chamber else numbers["dead_volume_2"],
         restitution=numbers["restitution"],
-        leak=leak,
+        leak=_NO_LEAK if has_one_chamber else _orifice(parameter_set, read, "actuator.leak"),
         kind=parameter_set.actuator_kind,
         settings={} if kind.name == VANE else {quantity.name: numbers[quantity.name] for quantity in kind.quantities},
         table=parameter_set.actuator_table,
@@ -257,10 +280,11 @@ def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:
     needed = [
         f"{name}.{member.name}"
         for name in _FLAT_SECTIONS
-        for member in declaration.members(name, parameter_set.actuator_kind)
+        for member in _present(parameter_set, name)
         if member.default is None
     ]
-    for section in ("actuator.leak", f"valves.{valve}"):
+    leaks = () if parameter_set.has_one_chamber else ("actuator.leak",)
+    for section in (*leaks, f"valves.{valve}"):
         sonic = _uses_sonic_form(parameter_set, section)
         form = declaration.SONIC_FORM if sonic else declaration.AREA_FORM
         needed += [f"{section}.{member.name}" for member in form]

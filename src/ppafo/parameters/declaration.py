@@ -72,6 +72,17 @@ SECTIONS: dict[str, tuple[Quantity, ...]] = {
     "reported": REPORTED,
 }
 
+OF_SECOND_CHAMBER = frozenset(
+    {
+        "actuator.dead_volume_2",
+        "supply.dorsiflexion_pressure",
+        "initial.pressure_2",
+        *(f"actuator.leak.{quantity.name}" for quantity in ORIFICE),
+    }
+)
+"""Paths of the numbers that an actuator with one chamber does not have."""
+WHY_ONE_CHAMBER = "the actuator has one chamber (its file has no column volume_2)"
+
 _ALTERNATIVE_UNITS = {"N m s/rad": ("N m s",)}
 
 
@@ -99,16 +110,23 @@ def members(section: str, actuator_kind: str) -> tuple[Quantity, ...]:
 
 
 def quantities(
-    valve_kinds: Mapping[str, str], actuator_kind: str = VANE.name, species: str = ""
+    valve_kinds: Mapping[str, str],
+    actuator_kind: str = VANE.name,
+    species: str = "",
+    has_one_chamber: bool = False,
 ) -> Mapping[str, Quantity]:
     """Return the declarations of all numbers by path, for the valves of a set by name, its actuator and its gas."""
     # Effects are part of the key: another package's may be loaded between two calls.
-    return _by_path(tuple(valve_kinds.items()), actuator_kind, species, device_effects())
+    return _by_path(tuple(valve_kinds.items()), actuator_kind, species, has_one_chamber, device_effects())
 
 
 @functools.lru_cache(maxsize=32)
 def _by_path(
-    valve_kinds: tuple[tuple[str, str], ...], actuator_kind: str, species: str, effects: tuple[Effect, ...]
+    valve_kinds: tuple[tuple[str, str], ...],
+    actuator_kind: str,
+    species: str,
+    has_one_chamber: bool,
+    effects: tuple[Effect, ...],
 ) -> Mapping[str, Quantity]:
     sections = [(section, members(section, actuator_kind)) for section in SECTIONS]
     sections += [(effect.section, effect.quantities_in(species)) for effect in effects]
@@ -118,7 +136,8 @@ def _by_path(
     declared = (
         replace(quantity, name=f"{section}.{quantity.name}") for section, items in sections for quantity in items
     )
-    return MappingProxyType({quantity.name: quantity for quantity in declared})
+    absent = OF_SECOND_CHAMBER if has_one_chamber else frozenset()
+    return MappingProxyType({quantity.name: quantity for quantity in declared if quantity.name not in absent})
 
 
 def fits(unit: str, si_unit: str) -> bool:

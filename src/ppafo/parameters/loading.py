@@ -23,7 +23,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION
 from ppafo.parameters import declaration
 from ppafo.parameters.building import build_device
-from ppafo.parameters.declaration import alternatives
+from ppafo.parameters.declaration import OF_SECOND_CHAMBER, WHY_ONE_CHAMBER, alternatives
 from ppafo.parameters.device import VANE, Device
 from ppafo.parameters.joint import ANKLE, OPPOSITES, JointNames
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
@@ -260,6 +260,8 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
     chosen_valve(parameter_set, None)
     declared = parameter_set.declarations()
     for path, entry in parameter_set.numbers.items():
+        if path in OF_SECOND_CHAMBER and parameter_set.has_one_chamber:
+            raise ParameterError(f"{parameter_set.file}: {path}: {WHY_ONE_CHAMBER}; remove it")
         # Only what is reported of a valve by name can be undeclared: the layout of the file knows all other paths.
         if path not in declared:
             valve = path.split(".")[2]

@@ -12,7 +12,14 @@ from ppafo.arguments import Name, Overrides, checked
 from ppafo.errors import ParameterError, PpafoError, UnitError
 from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.gas import SPECIES
-from ppafo.parameters.declaration import AREA_FORM, RELIEVING_PATH, SONIC_FORM, SPECIES_PATH
+from ppafo.parameters.declaration import (
+    AREA_FORM,
+    OF_SECOND_CHAMBER,
+    RELIEVING_PATH,
+    SONIC_FORM,
+    SPECIES_PATH,
+    WHY_ONE_CHAMBER,
+)
 from ppafo.parameters.graph import ATMOSPHERE_PATH, acting
 from ppafo.parameters.parameter_set import (
     SOURCE,
@@ -223,6 +230,8 @@ def with_overrides(parameter_set: ParameterSet, overrides: Iterable[Override], v
 def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
     find_effects([path])
     declared = parameter_set.declarations()
+    if path in OF_SECOND_CHAMBER and parameter_set.has_one_chamber:
+        raise ParameterError(f"override '{override}': {parameter_set.file}: {WHY_ONE_CHAMBER}; remove the override")
     if path not in declared:
         # So that the hint knows the values of effects that no set of this run has named.
         EFFECTS.load_own()

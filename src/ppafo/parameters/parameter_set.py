@@ -11,6 +11,7 @@ from pydantic import Field
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import StrictTable, Text, Texts
 from ppafo.errors import ParameterError, UnitError, refused_as
+from ppafo.model.catalog import ACTUATORS
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import SPECIES_PATH, alternatives, fits, is_within, quantities, range_rule
 from ppafo.parameters.graph import (
@@ -136,7 +137,13 @@ class ParameterSet:
     def declarations(self) -> Mapping[str, Quantity]:
         """Return the declarations of all numbers that this set may contain, by path."""
         species = self.texts.get(SPECIES_PATH)
-        return quantities(self.valve_kinds, self.actuator_kind, "" if species is None else species.value)
+        name = "" if species is None else species.value
+        return quantities(self.valve_kinds, self.actuator_kind, name, self.has_one_chamber)
+
+    @property
+    def has_one_chamber(self) -> bool:
+        """True if the actuator has one chamber, so that the set has no numbers of a second one."""
+        return self.actuator_table is not None and ACTUATORS[self.actuator_kind].has_one_chamber(self.actuator_table)
 
 
 _SPEAKING = {
@@ -232,8 +239,9 @@ def links_of_set(
     """Return the links of a set: gauge pressures follow the atmosphere, the second regulator follows the first.
 
     The second regulator follows the first if the set has the same pressure for both, unless ``set_paths`` contains only
-    the second. The pressures are compared at ``atmosphere`` [Pa absolute], by default the set's. The displacement of a
-    vane per radian follows its torque constant, by virtual work, unless the set states it.
+    the second; of an actuator with one chamber it follows the atmosphere. The pressures are compared at ``atmosphere``
+    [Pa absolute], by default the set's. The displacement of a vane per radian follows its torque constant, by virtual
+    work, unless the set states it.
     """
     numbers = parameter_set.numbers
     links = {
@@ -241,7 +249,10 @@ def links_of_set(
         for path in (PRESSURE_PATH, SECOND_PRESSURE_PATH)
         if path in numbers
     }
-    if SECOND_PRESSURE_PATH not in numbers:
+    if parameter_set.has_one_chamber:
+        # A port between two atmospheres passes nothing, as one that is plugged.
+        links[SECOND_PRESSURE_PATH] = (follows(ATMOSPHERE_PATH),)
+    elif SECOND_PRESSURE_PATH not in numbers:
         links[SECOND_PRESSURE_PATH] = (follows(PRESSURE_PATH),)
     elif has_one_pressure(parameter_set, atmosphere) and not (
         SECOND_PRESSURE_PATH in set_paths and PRESSURE_PATH not in set_paths
@@ -272,7 +283,7 @@ def with_followers(parameter_set: ParameterSet) -> ParameterSet:
     """
     pressure, constant = (parameter_set.numbers.get(path) for path in (PRESSURE_PATH, TORQUE_CONSTANT_PATH))
     followers = {}
-    if pressure is not None:
+    if pressure is not None and not parameter_set.has_one_chamber:
         note = f"follows {PRESSURE_PATH}"
         followers[SECOND_PRESSURE_PATH] = pressure.model_copy(update={"note": note, "key": ""})
     if constant is not None and DISPLACEMENT_PATH in parameter_set.declarations():

@@ -120,7 +120,17 @@ CHANNELS: dict[str, ChannelKind] = {
     "repetition": ChannelKind(PLAIN_NUMBER, "number of the repetition", is_held=True),
 }
 """Known channels. To add one: one line here. A recording may also have channels that are not listed."""
-OF_SECOND_CHAMBER = frozenset({"pressure_2", "mass_2", "temperature_2", "leaked_mass", "pressure_difference"})
+OF_SECOND_CHAMBER = frozenset(
+    {
+        "pressure_2",
+        "mass_2",
+        "temperature_2",
+        "leaked_mass",
+        "pressure_difference",
+        "line_pressure_2",
+        "dorsiflexion_pressure",
+    }
+)
 """Channels that are missing in runs of an actuator with one chamber."""
 
 

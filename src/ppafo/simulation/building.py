@@ -9,7 +9,8 @@ from typing import Any
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.errors import ParameterError, ScenarioError
 from ppafo.model.controlled import CONTROLLED, TORQUE
-from ppafo.parameters.device import Device, Supply
+from ppafo.parameters.declaration import WHY_ONE_CHAMBER
+from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph, LinkedDefault, follows, gauge_link
 from ppafo.simulation.assumptions import assumed_lines, read_assumptions
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, read_clock
@@ -87,7 +88,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         section = MOTIONS[kind_at(document, "motion")].section
         assert section is not None, "walks are built from another layout"
         motion = section.read(reading, device, times.duration, times.step, request.folder)
-        initial, initial_links = _initial(reading, device.supply)
+        initial, initial_links = _initial(reading, device)
         sensors = _sensors(reading, times)
         supply_line = read_supply_line(reading, device)
         controlled = _controlled(reading)
@@ -144,12 +145,13 @@ def origin_of(request: ScenarioRequest, document: Mapping[str, Any], valve: str,
     return Origin(request.path, document["device"]["set"], valve, overrides, request.content)
 
 
-def _initial(reading: DocumentReader, supply: Supply) -> tuple[Initial, Graph]:
+def _initial(reading: DocumentReader, device: Device) -> tuple[Initial, Graph]:
     """Return the initial chamber pressures [Pa absolute] and their links to the supply pressures that they follow.
 
     Each pressure is given as a number or as a word: a word stands for the supply pressure that it names, and a gauge
-    pressure is relative to the atmosphere.
+    pressure is relative to the atmosphere. A second chamber that the actuator lacks is at atmosphere.
     """
+    supply = device.supply
     pressures: list[float] = []
     links: dict[str, tuple[LinkedDefault, ...]] = {}
     for quantity in INITIAL:
@@ -167,6 +169,8 @@ def _initial(reading: DocumentReader, supply: Supply) -> tuple[Initial, Graph]:
             raise reading.refusal(path, f"is neither a pressure such as '50 psi_g' nor one of {words}{hint}")
         pressures.append(reading.number(path, quantity, supply.atmospheric_pressure))
         links[path] = gauge_link(path, *split_quantity(str(word)))
+    if device.actuator.has_one_chamber and pressures[1] != supply.atmospheric_pressure:
+        raise reading.refusal("initial.pressure_2", f"{WHY_ONE_CHAMBER}; leave it out, or write '{AT_REST}'")
     return Initial(*pressures), {path: links for path, links in links.items() if links}
 
 

@@ -106,7 +106,7 @@ def request_of_dict(content: Mapping[str, Any], overrides: Iterable[str]) -> Sce
     """Return the request for a scenario of nested dictionaries; ScenarioError for other data or too deep nesting."""
     if not isinstance(content, Mapping):
         raise ScenarioError(f"a scenario is a dictionary laid out as a scenario file, not a {type(content).__name__}")
-    file = _called(content)
+    file = _name_in_messages(content)
     FILE.check_depth(content, file)
     # A copy: the scenario is loaded anew from it, whatever becomes of the caller's dictionaries.
     document = copy.deepcopy(dict(content))
@@ -116,11 +116,11 @@ def request_of_dict(content: Mapping[str, Any], overrides: Iterable[str]) -> Sce
 def request_again(origin: Origin) -> ScenarioRequest:
     """Return the request from which a scenario was built."""
     file, content = origin.file, origin.content
-    name, folder = (_called(content), Path()) if file is None else (label(file), Path(file).parent)
+    name, folder = (_name_in_messages(content), Path()) if file is None else (label(file), Path(file).parent)
     return ScenarioRequest(name, file, folder, content, read_overrides(origin.overrides, ScenarioError))
 
 
-def _called(content: Mapping[str, Any]) -> str:
+def _name_in_messages(content: Mapping[str, Any]) -> str:
     """Return the name in messages of a document without a file."""
     name = content.get("name")
     return f"scenario '{label(name)}'" if isinstance(name, str) else "scenario"

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Collection, Mapping
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, TypeVar
 
 from ppafo.arguments.conversion import taken_number
 from ppafo.arguments.values import shown
@@ -12,7 +12,15 @@ from ppafo.model.catalog import VALVES, device_effects
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
-from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, is_within, members, range_rule
+from ppafo.parameters.declaration import (
+    AREA_FORM,
+    OF_SECOND_CHAMBER,
+    ORIFICE,
+    SONIC_FORM,
+    is_within,
+    members,
+    range_rule,
+)
 from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.effects import number_under, part_of
 from ppafo.parameters.graph import Graph, holding, in_other_forms, left, paths_in, resolved
@@ -30,6 +38,7 @@ from ppafo.simulation.scenario import (
     SupplyLine,
 )
 
+_Item = TypeVar("_Item")
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 _OF_DEVICE = (*_DEVICE_SECTIONS, "valve", EFFECT_SETTINGS)
 ORIFICES = {"valve": ("device", "valve", "orifice"), "actuator.leak": ("device", "actuator", "leak")}
@@ -37,11 +46,6 @@ ORIFICES = {"valve": ("device", "valve", "orifice"), "actuator.leak": ("device",
 WHOLE_NUMBERS = ("sensors.seed", "wearer.person")
 """Paths of index-like numbers: a random seed, and a person of the population."""
 _RATE, _PERIOD = "controller.rate", "controller.period"
-
-
-def chosen_path(path: str, scenario: Scenario) -> str:
-    """Return the path with ``valve.`` in place of ``valves.NAME.`` if NAME is the valve of the scenario."""
-    return one_path(path, scenario.device.valve_name)
 
 
 _OF_JOINT = ("actuator.", "friction.", "foot_plate.")
@@ -61,10 +65,13 @@ _PARTS = {
     "links": Mapping,
 }
 """Class of each part of a scenario, for any kind of motion; two of them may be None."""
-
-
 _ACCEPTED: deque[Scenario] = deque(maxlen=16)
 """Scenarios checked last: they are frozen, so that repeated simulation needs no new check."""
+
+
+def chosen_path(path: str, scenario: Scenario) -> str:
+    """Return the path with ``valve.`` in place of ``valves.NAME.`` if NAME is the valve of the scenario."""
+    return one_path(path, scenario.device.valve_name)
 
 
 def check_parts(scenario: Scenario) -> None:
@@ -72,8 +79,8 @@ def check_parts(scenario: Scenario) -> None:
     if any(scenario is accepted for accepted in _ACCEPTED):
         return
 
-    def refusal(path: str, value: Any, must: str) -> ScenarioError:
-        return ScenarioError(f"{scenario.name}: {path} = {shown(value)}: {must}")
+    def refusal(path: str, value: Any, rule: str) -> ScenarioError:
+        return ScenarioError(f"{scenario.name}: {path} = {shown(value)}: {rule}")
 
     for name, kind in _PARTS.items():
         part = getattr(scenario, name)
@@ -85,17 +92,17 @@ def check_parts(scenario: Scenario) -> None:
         raise refusal("motion", scenario.motion, "must be a motion, such as FreeMotion")
     if not isinstance(scenario.controlled, str) or scenario.controlled not in CONTROLLED:
         raise refusal("controlled", scenario.controlled, f"must be one of {', '.join(CONTROLLED)}")
-    absent = {f"{section}.{name}" for section in ORIFICES for name in other_form(scenario.device, section)} | {_RATE}
-    take, named = taken_number(), scenario.device.effects
+    absent = _numbers_of_other_form(scenario.device) | {_RATE}
+    to_float, named_effects = taken_number(), scenario.device.effects
     for path, quantity in declared_numbers(scenario).items():
         section, _, name = path.partition(".")
         # An effect that the device does not name has its defaults.
-        if path in absent or (section == EFFECT_SETTINGS and name.partition(".")[0] not in named):
+        if path in absent or (section == EFFECT_SETTINGS and name.partition(".")[0] not in named_effects):
             continue
         value = number_under(scenario, _attributes(path, scenario))
         try:
             # An ankle without its device has no actuator, friction or plate, as no file can say.
-            is_good = is_within(take(value), quantity) or (value == 0.0 and path.startswith(_OF_JOINT))
+            is_good = is_within(to_float(value), quantity) or (value == 0.0 and path.startswith(_OF_JOINT))
         except ValueError:
             is_good = False
         if not is_good:
@@ -105,7 +112,14 @@ def check_parts(scenario: Scenario) -> None:
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declarations of all numbers of a scenario and its device, by path; both forms of each orifice."""
-    return device_numbers(scenario.device) | scenario.motion.motion_kind.quantities(scenario)
+    device = scenario.device
+    return device_numbers(device) | of_its_chambers(scenario.motion.motion_kind.quantities(scenario), device)
+
+
+def of_its_chambers(by_path: Mapping[str, _Item], device: Device) -> dict[str, _Item]:
+    """Return items by path without those of a second chamber that the actuator does not have."""
+    absent = OF_SECOND_CHAMBER if device.actuator.has_one_chamber else frozenset()
+    return {path: item for path, item in by_path.items() if path not in absent}
 
 
 def device_numbers(device: Device) -> dict[str, Quantity]:
@@ -117,7 +131,7 @@ def device_numbers(device: Device) -> dict[str, Quantity]:
         (effect.section, quantity) for effect in device_effects() for quantity in effect.quantities_in(species)
     ]
     declared += [("valve", quantity) for quantity in (*ORIFICE, *VALVES[device.valve.kind].quantities)]
-    return {f"{section}.{quantity.name}": quantity for section, quantity in declared}
+    return of_its_chambers({f"{section}.{quantity.name}": quantity for section, quantity in declared}, device)
 
 
 def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
@@ -163,7 +177,7 @@ def links_that_hold(scenario: Scenario) -> Graph:
 
 def _numbers_of_graph(scenario: Scenario) -> dict[str, Any]:
     """Return the numbers that the links of a scenario name, keyed by path; for an orifice, of its present form."""
-    absent = {f"{section}.{name}" for section in ORIFICES for name in other_form(scenario.device, section)}
+    absent = _numbers_of_other_form(scenario.device)
     present = (path for path in paths_in(scenario.graph) if path not in absent)
     return {path: number_under(scenario, _attributes(path, scenario)) for path in present}
 
@@ -177,6 +191,11 @@ def other_form(device: Device, section: str) -> tuple[str, ...]:
     """Return the names of the numbers in the form that an orifice (``valve`` or ``actuator.leak``) does not have."""
     orifice = device.valve.orifice if section == "valve" else device.actuator.leak
     return tuple(quantity.name for quantity in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM))
+
+
+def _numbers_of_other_form(device: Device) -> set[str]:
+    """Return the paths of the numbers of orifices in the form that these do not have."""
+    return {f"{section}.{name}" for section in ORIFICES for name in other_form(device, section)}
 
 
 def _changing_form(scenario: Scenario, paths: Collection[str]) -> list[str]:

@@ -176,22 +176,22 @@ def _build(parsed: declared.StudyFile, document: dict[str, Any], source: StudySo
 
 def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Configuration]) -> None:
     """Raise an error for a value that is set in a configuration in which the value (in any form) also varies."""
-    for each, loaded in zip(parsed.configurations, configurations, strict=True):
-        given = read_overrides(each.overrides, StudyError)
-        override = override_set(given, StudyError, valve=loaded.scenario.device.valve_name)
+    for section, configuration in zip(parsed.configurations, configurations, strict=True):
+        overrides = read_overrides(section.overrides, StudyError)
+        set_values = override_set(overrides, StudyError, valve=configuration.scenario.device.valve_name)
         for entry in parsed.vary:
-            path = chosen_path(entry.path, loaded.scenario)
+            if entry.only and section.name not in entry.only:
+                continue
+            path = chosen_path(entry.path, configuration.scenario)
             # The varied column replaces the value in every run, whichever form of it (area or conductance) is set.
-            unused = [other for other in (path, *other_forms(path)) if other in override]
-            if (
-                not unused
-                or (entry.kind == "stated" and unused[0] == path)
-                or (entry.only and each.name not in entry.only)
-            ):
+            ignored = next((form for form in (path, *other_forms(path)) if form in set_values), None)
+            # A stated uncertainty is about the value that is set.
+            if ignored is None or (entry.kind == "stated" and ignored == path):
                 continue
             raise StudyError(
-                f"configuration '{each.name}': '{override[unused[0]]}' is set and '{entry.path}' is varied, so the set "
-                "value would be ignored; omit one, or restrict the [[vary]] to the other configurations with 'only'"
+                f"configuration '{section.name}': '{set_values[ignored]}' is set and '{entry.path}' is varied, so the "
+                "set value would be ignored; omit one, or restrict the [[vary]] to the other configurations with "
+                "'only'"
             )
 
 
@@ -226,21 +226,21 @@ def _common_path(
             hint = nearest_name(name, names)
             raise StudyError(f"vary '{entry.path}': only: there is no configuration '{name}'{hint}")
     with refused_as(StudyError, f"vary '{entry.path}'", ScenarioError):
-        first, *others = (varied_path(entry.path, each.scenario) for each in _varying(entry, configurations))
-    if any(other != first for other in others):
+        varied, *others = (varied_path(entry.path, each.scenario) for each in _varying(entry, configurations))
+    if any(other != varied for other in others):
         raise StudyError(
             f"vary '{entry.path}': has different units, limits or atmospheres in different "
             f"configurations; restrict it with 'only'"
         )
-    first = given_in(first, texts_of(entry))
+    varied = given_in(varied, texts_of(entry))
     # Where the atmosphere is fixed, gauge is a constant away from absolute; where it varies, each run has its own zero.
     if isinstance(entry, declared.SameAs) or ATMOSPHERE_PATH not in {other.path for other in parsed.vary}:
-        return first
+        return varied
     with refused_as(StudyError, f"vary '{entry.path}'", UnitError):
         if isinstance(entry, declared.Stated):
-            _, unit = stated_normal(first, _varying(entry, configurations)[0].scenario)
-            return in_its_unit(first, [f"0 {unit}"])
-        return in_its_unit(first, texts_of(entry))
+            _, unit = stated_normal(varied, _varying(entry, configurations)[0].scenario)
+            return in_its_unit(varied, [f"0 {unit}"])
+        return in_its_unit(varied, texts_of(entry))
 
 
 def _axis_or_drawn(

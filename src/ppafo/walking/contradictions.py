@@ -247,7 +247,8 @@ def _of_pressures(scenario: Scenario) -> Iterator[_Contradiction]:
     """Yield the checks of a controller's pressures against atmosphere, supply and compression by a moving foot."""
     settings, supply = scenario.controller.settings, scenario.device.supply
     atmosphere, filled = supply.atmospheric_pressure, settings["filled_pressure"]
-    lower_supply = smaller(supply.pressure, supply.dorsiflexion_pressure)
+    has_one_chamber = scenario.device.actuator.has_one_chamber
+    lower_supply = supply.pressure if has_one_chamber else smaller(supply.pressure, supply.dorsiflexion_pressure)
     compressed = larger(supply.pressure, supply.dorsiflexion_pressure) * COMPRESSION
     yield _Contradiction(
         "controller.lowest_pressure",

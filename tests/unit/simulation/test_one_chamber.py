@@ -1,15 +1,25 @@
-"""An actuator with one chamber: its second port is a dead volume, of which nothing is measured or shown."""
+"""An actuator with one chamber: nothing of a second one is asked for, supplied, measured or shown."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import ppafo
-from ppafo.errors import ScenarioError
+from ppafo.errors import PpafoError, ScenarioError
+from ppafo.metrics import METRICS
+from ppafo.parameters.building import build_device
+from ppafo.parameters.declaration import OF_SECOND_CHAMBER as NUMBERS_OF_SECOND_CHAMBER
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.ensemble.columns import check_columns
+from ppafo.simulation.ensemble.planning import plan_ensemble
+from ppafo.simulation.ensemble.running import lacking, offered
+from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import Scenario
+from tests.actuators.soft import OF_SECOND_CHAMBER as SECOND_CHAMBER
+from tests.actuators.soft import soft
 
 BLADDER = Path(__file__).parents[2] / "actuators" / "measured-bladder.toml"
 
@@ -48,3 +58,61 @@ def test_a_single_chamber_takes_no_reference_of_the_other() -> None:
 def test_its_recording_without_the_second_pressure_is_replayed(bladder: Scenario) -> None:
     validated = ppafo.validate(str(BLADDER), [ppafo.simulate(bladder).recording], motion="locked")
     assert validated.found.passes
+
+
+@pytest.mark.parametrize(
+    "path", ["actuator.dead_volume_2=3 cm^3", "actuator.leak.area=0.5 mm^2", "supply.dorsiflexion_pressure=20 psi_g"]
+)
+def test_numbers_of_a_second_chamber_are_refused(path: str) -> None:
+    with pytest.raises(PpafoError, match="the actuator has one chamber"):
+        ppafo.load_device(BLADDER, overrides=[path])
+
+
+def test_a_set_with_one_chamber_refuses_the_numbers_of_another(tmp_path: Path) -> None:
+    soft(tmp_path, 1)
+    file = tmp_path / "soft.toml"
+    file.write_text(file.read_text(encoding="utf-8") + SECOND_CHAMBER, encoding="utf-8")
+    with pytest.raises(PpafoError, match=r"actuator.dead_volume_2: the actuator has one chamber .*; remove it"):
+        ppafo.load_parameter_set(file)
+
+
+def test_a_second_chamber_takes_no_pressure_at_the_start() -> None:
+    for text in ("20 psi_g", "supply"):
+        with pytest.raises(ScenarioError, match=r"one chamber.*leave it out"):
+            ppafo.load_scenario("torque-task-proportional", [f"device.set={BLADDER}", f"initial.pressure_2={text}"])
+
+
+def test_chambers_that_are_joined_by_a_valve_are_two() -> None:
+    vane, bladder = ppafo.load_parameter_set("ppafo2011"), ppafo.load_parameter_set(BLADDER)
+    name = next(name for name, kind in vane.valve_kinds.items() if kind == "solenoid_recycling")
+    numbers = {path: entry for path, entry in vane.numbers.items() if path.startswith(f"valves.{name}.")}
+    joined = replace(bladder, valve_kinds={name: "solenoid_recycling"}, numbers={**bladder.numbers, **numbers})
+    with pytest.raises(PpafoError, match="joins two chambers"):
+        build_device(joined, name)
+
+
+def test_a_command_towards_the_second_chamber_takes_no_gas() -> None:
+    away = ("reference.start_level=-5 N m", "reference.level=-30 N m", "run.duration=0.2 s")
+    result = ppafo.simulate(ppafo.load_scenario("torque-task-proportional", [f"device.set={BLADDER}", *away]))
+    assert result.recording["command"].min() < -0.1
+    assert result.metrics["gas_supplied"].value == 0.0
+
+
+def test_the_second_port_stays_at_the_atmosphere_where_this_varies(bladder: Scenario) -> None:
+    columns = check_columns(bladder, {"supply.atmospheric_pressure": np.array([1.012e5, 1.016e5])})
+    assert columns.values["supply.dorsiflexion_pressure"].tolist() == [1.012e5, 1.016e5]
+    assert len(plan_ensemble(columns).batches) == 1
+    with pytest.raises(ScenarioError, match="cannot vary: the actuator has one chamber"):
+        check_columns(bladder, {"actuator.dead_volume_2": np.array([1.0e-6])})
+
+
+def test_no_number_of_a_second_chamber_varies(bladder: Scenario) -> None:
+    assert not [path for path in declared_numbers(bladder) if path in NUMBERS_OF_SECOND_CHAMBER]
+    assert "one chamber" in lacking(bladder, METRICS["gas_leaked"])
+    assert "gas_imbalance" not in offered(bladder)
+
+
+def test_the_audit_asks_for_no_second_chamber() -> None:
+    findings = {finding.id: finding for finding in ppafo.audit(str(BLADDER)).found.findings}
+    assert "missing-values" not in findings
+    assert "With its chamber at supply or at atmosphere" in findings["torque-ceiling"].paragraph

@@ -207,7 +207,11 @@ def valve_flag(
     valve_times = state.valve_times
     # No pressure although the chamber was filled for longer than any device needs.
     no_rise_1 = (valve_times.filling_1 > rules.fill_time) & (measurement.pressure_1 < rules.filled_pressure)
-    no_rise_2 = (valve_times.filling_2 > rules.fill_time) & (measurement.pressure_2 < rules.filled_pressure)
+    # A second port without a supply, as of an actuator with one chamber, fills nothing.
+    fills_2 = (valve_times.filling_2 > rules.fill_time) & (
+        rules.nominal.nominal_dorsiflexion_pressure > rules.filled_pressure
+    )
+    no_rise_2 = fills_2 & (measurement.pressure_2 < rules.filled_pressure)
     stands = (phase.phase == MID_STANCE) & (phase.heel.loaded > 0.5)
     expected_1, expected_2 = state.observer.chamber_1.pressure, state.observer.chamber_2.pressure
     constant = fault_checks.holds_pressure(rules, measurement.pressure_1, expected_1, state.slow_pressure_1)

@@ -1,6 +1,7 @@
 """Export of a scenario as a C99 library, with an example and make files."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 
 from ppafo.control.catalog import CONTROLLERS
@@ -15,7 +16,7 @@ from ppafo.exports.c_library.library import Library, Switch, c_identifier
 from ppafo.exports.c_library.preparation import VANE_PREPARATION
 from ppafo.exports.c_library.prepared import Preparation
 from ppafo.exports.c_library.readme import words_of, words_of_walk
-from ppafo.exports.c_library.settings import relations_of, settings_of
+from ppafo.exports.c_library.settings import relations_of, second_chamber, settings_of
 from ppafo.model.catalog import ordered_effects
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effects_of
@@ -54,7 +55,9 @@ def scenario_library(scenario: Scenario) -> Library:
     program = exported(batch_of(plan_run(scenario)).program)
     settings = settings_of(scenario)
     # Settings that follow others as long as nobody changes them.
+    absent = second_chamber(scenario)
     links = {**links_that_hold(scenario), **links_of_times(time_texts(scenario))}
+    links = {path: followed for path, followed in links.items() if c_identifier(path) not in absent}
     of_sensors = [
         (("sensors_delay",), program.program.late_signals),
         (_FLAWS, not program.program.ideal_sensors),
@@ -77,7 +80,7 @@ def scenario_library(scenario: Scenario) -> Library:
         other_program=((f"({interval} != (double)(int64_t){interval}) != {was_inside}", "run_output_interval"),),
         words=words_of(scenario, links),
         further=partial(prepare_entry, Preparation(scenario, program.program), VANE_PREPARATION, settings),
-        following=partial(follow_entry, settings, links) if links else None,
+        following=partial(follow_entry, settings, links, absent) if links else None,
         links=links,
         rules=RULES_OF_TIMES,
     )
@@ -98,7 +101,8 @@ def walk_library(configuration: Scenario) -> Library:
     # Before anything is planned: what cannot be exported should be said at once.
     check_can_be_exported(configuration)
     program = exported(batch_of(plan_walk(configuration)).program)
-    settings, links = settings_of_walk(configuration), links_of_walk(configuration)
+    settings, absent = settings_of_walk(configuration), second_chamber(configuration)
+    links = links_of_walk(configuration)
     failing = {sensor: fault for sensor, fault in walk_of(configuration).faults.items() if fault.kind}
     # A sensor that fails is never ideal, whatever the settings are.
     of_readings = [] if failing else [((*_FLAWS, *_FLAWS_OF_WALK), not program.program.ideal_sensors)]
@@ -113,7 +117,7 @@ def walk_library(configuration: Scenario) -> Library:
         other_program=((f"(prepared->counts.signal_delay > 0.0) != {was_late}", "controller_period"),),
         words=words_of_walk(configuration, links, failing),
         further=partial(prepare_entry, Preparation(configuration, program.program), WALK_PREPARATION, settings),
-        following=partial(follow_entry, settings, links) if links else None,
+        following=partial(follow_entry, settings, links, absent) if links else None,
         links=links,
         defaults=frozenset(c_identifier(path) for path in links if not path.startswith("supply.")),
     )
@@ -129,7 +133,8 @@ def library_of(scenario: Scenario) -> Library:
             f"{scenario.name}: a Python object cannot be exported as a controller; export the plant alone, or write "
             f"the law as a controller kind"
         )
-    return _LIBRARIES[scenario.motion.motion_kind.layout](scenario)
+    library = _LIBRARIES[scenario.motion.motion_kind.layout](scenario)
+    return replace(library, joint=scenario.device.joint, actuator=scenario.device.actuator.kind)
 
 
 def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> tuple[Switch, ...]:

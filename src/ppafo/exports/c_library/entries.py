@@ -1,7 +1,7 @@
 """Entries of an exported module that prepare a run: source lines that wrap the preparation functions."""
 
 import ast
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ppafo.engine.definitions import place_of
 from ppafo.engine.entries import indent, parse_expression
@@ -14,6 +14,7 @@ from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.library import ExportParameter, c_identifier
 from ppafo.exports.c_library.prepared import Preparation
+from ppafo.exports.c_library.settings import second_chamber
 from ppafo.model.declaration import PlainFunction, quantities_of
 from ppafo.parameters.graph import Graph, LinkFunction
 
@@ -50,6 +51,7 @@ def prepare_entry(
             last = place_of(functions[-1])
             raise ProgramError(f"{last}: no function of preparation gives '{name}', a {row.__name__} of the program")
     cells = {setting.name: boundary.cell("settings", place, setting.name) for place, setting in enumerate(settings)}
+    cells |= {name: cells.get(text, text) for name, text in second_chamber(preparation.scenario).items()}
 
     class FromSettings(ast.NodeTransformer):
         def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
@@ -72,27 +74,38 @@ def prepare_entry(
 
 
 def follow_entry(
-    settings: Sequence[ExportParameter], links: Graph, collector: SourceCollector, boundary: Boundary
+    settings: Sequence[ExportParameter],
+    links: Graph,
+    absent: Mapping[str, str],
+    collector: SourceCollector,
+    boundary: Boundary,
 ) -> str:
-    """Return the source of ``follow``: settings at their default follow other settings; see ``Graph``."""
+    """Return the source of ``follow``: settings at their default follow other settings; see ``Graph``.
+
+    ``absent`` are numbers that links name and the library does not set, as text by name.
+    """
     places = {setting.path: index for index, setting in enumerate(settings)}
 
     def cell(array: str, path: str) -> str:
         return boundary.cell(array, places[path], c_identifier(path))
 
     used = {source for follows in links.values() for link in follows for source in link.sources}
+    used |= {path for path in places if c_identifier(path) in absent.values()}
     rows: list[str] = []
     lines = [f"{c_identifier(path)} = {cell('settings', path)}" for path in places if path in used - set(links)]
+    lines += [f"{name} = {text}" for name, text in absent.items()]
     for path, follows in links.items():
         name, own = c_identifier(path), cell("settings", path)
         text = own
         # The first link that holds wins, so it is the outermost choice.
         for link in reversed(follows):
             number = " + ".join([*(_term(term, rows, collector) for term in link.terms), repr(link.gap)])
-            source = link.sources[0]
-            # Compared with the default to the bit: a value that was written again counts as not set.
-            is_set = f"{cell('settings', source)} != {settings[places[source]].value!r}"
-            text = f"(({number}) if {is_set} else {text})" if link.when_set else f"({number})"
+            text_of_link, source = f"({number})", link.sources[0]
+            if link.when_set:
+                # Compared with the default to the bit: a value that was written again counts as not set.
+                is_set = f"{cell('settings', source)} != {settings[places[source]].value!r}"
+                text_of_link = f"({text_of_link} if {is_set} else {text})"
+            text = text_of_link
         lines.append(f"{name} = {text} if {own} == {settings[places[path]].value!r} else {own}")
         lines.append(f"{cell('followed', path)} = {name}")
     head = boundary.head("follow", dict.fromkeys(("settings", "followed"), "float64[::1]"))

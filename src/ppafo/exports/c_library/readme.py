@@ -89,7 +89,9 @@ def _followers(links: Graph) -> str:
 def _fixed_of_device(scenario: Scenario) -> list[str]:
     """Return README lines on device properties that no setting changes."""
     device = scenario.device
-    forms = {"valve": device.valve.orifice, "leak": device.actuator.leak}
+    forms = {"valve": device.valve.orifice}
+    if not device.actuator.has_one_chamber:
+        forms["leak"] = device.actuator.leak
     lines = "with lines behind the regulators" if scenario.supply_lines is not None else "constant supply pressures"
     effects = ", ".join(f"`{effect.name}`" for effect in effects_of(device) if effect.switch)
     gas = "thermal" if scenario.gas_model is not None else "isothermal"

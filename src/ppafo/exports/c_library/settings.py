@@ -7,7 +7,9 @@ from ppafo.exports.c_library.library import ExportParameter, Relation, c_identif
 from ppafo.model.catalog import device_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import consistency
+from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.effects import effects_of
+from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.clock import step_unless_given, step_with_output, time_texts
 from ppafo.simulation.declaration import LOCKED_ANGLE
 from ppafo.simulation.document import value_at
@@ -75,6 +77,7 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
         rules.append((start_angle, "at most", "actuator.angle_max", TOLERANCE))
     if scenario.supply_lines is not None:
         rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure", 0.0))
+    rules = [rule for rule in rules if c_identifier(rule[0]) not in second_chamber(scenario)]
     of_steps = (
         Relation("run_step", "at most", longer, TOLERANCE, is_share=True)
         for longer in ("controller_period", "run_output_interval")
@@ -83,6 +86,25 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
         *(Relation(c_identifier(path), relation, c_identifier(other), slack) for path, relation, other, slack in rules),
         *of_steps,
     )
+
+
+def second_chamber(scenario: Scenario) -> dict[str, str]:
+    """Return numbers of a second chamber that the actuator does not have, as text by name in C.
+
+    The pressures are those of the atmosphere, so that no gas flows; all other numbers are constants.
+    """
+    return {
+        c_identifier(path): c_identifier(ATMOSPHERE_PATH) if "pressure" in path else repr(number)
+        for path, number in numbers_of_second_chamber(scenario).items()
+    }
+
+
+def numbers_of_second_chamber(scenario: Scenario) -> dict[str, float]:
+    """Return numbers [SI] of a second chamber by path if the actuator does not have it, else none."""
+    if not scenario.device.actuator.has_one_chamber:
+        return {}
+    unused = {f"actuator.leak.{name}" for name in other_form(scenario.device, "actuator.leak")}
+    return {path: number_at(scenario, path) for path in sorted(OF_SECOND_CHAMBER - unused)}
 
 
 def declared_settings(scenario: Scenario) -> dict[str, Quantity]:

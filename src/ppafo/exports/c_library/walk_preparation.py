@@ -18,7 +18,7 @@ from ppafo.exports.c_library.preparation import (
     start,
 )
 from ppafo.exports.c_library.prepared import Preparation, PreparedLane, names_of
-from ppafo.exports.c_library.settings import declared_settings, export_parameters
+from ppafo.exports.c_library.settings import declared_settings, export_parameters, numbers_of_second_chamber
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
 from ppafo.model.sensors import NOTHING_SEEN
@@ -130,7 +130,7 @@ def links_of_walk(configuration: Scenario) -> Graph:
     recorded = {"run.output_interval": (LinkedDefault((LinkFunction(("run.duration",), record_interval),)),)}
     # A plant alone has no settings of the controller that its walk had.
     links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
-    return holding(links, known)
+    return holding(links, known | numbers_of_second_chamber(configuration))
 
 
 def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:

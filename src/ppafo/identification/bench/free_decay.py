@@ -52,7 +52,7 @@ _SLOWEST = 1.0e-9
 """Lower bound of the deceleration as a fraction of the largest [-]: without Coulomb friction there is no standstill."""
 
 
-class _Slowing(NamedTuple):
+class Slowing(NamedTuple):
     """Damping and dynamic friction, divided by inertia [1/s, rad/s^2], and rise of the friction near standstill.
 
     ``rise`` is the ratio of friction at rest to dynamic friction, minus 1 [-]. At ``rise_velocity`` [rad/s] half of the
@@ -81,7 +81,7 @@ class _DecayCurve(NamedTuple):
     speed: Floats
 
 
-def course_to_standstill(speed: float, slowing: _Slowing) -> _DecayCurve:
+def course_to_standstill(speed: float, slowing: Slowing) -> _DecayCurve:
     """Return the decay from a speed [rad/s] to standstill, by Gauss quadrature of dt = -dw / deceleration over w."""
     # Cubed, for the slowing near standstill, where a seal grips, needs the shortest steps.
     speeds = speed * np.linspace(1.0, 0.0, _STEPS + 1) ** 3
@@ -95,7 +95,7 @@ def course_to_standstill(speed: float, slowing: _Slowing) -> _DecayCurve:
     return _DecayCurve(np.concatenate(([0.0], np.cumsum(times))), np.concatenate(([0.0], np.cumsum(swept))), speeds)
 
 
-def course(times: Floats, speed: float, slowing: _Slowing) -> _DecayCurve:
+def course(times: Floats, speed: float, slowing: Slowing) -> _DecayCurve:
     """Return swept angle and speed at times [s] after a start at ``speed`` [rad/s]; zero speed after standstill."""
     from scipy.interpolate import CubicHermiteSpline
 
@@ -144,8 +144,8 @@ def free_decay(
     # An inertia of 1 kg m^2 stands for none.
     stated_inertia = inertia or 1.0
 
-    def slowing_at(at: Values, moved: float) -> _Slowing:
-        return _Slowing(
+    def slowing_at(at: Values, moved: float) -> Slowing:
+        return Slowing(
             damping_rate=max(at[damping.path], 0.0) / moved,
             deceleration=max(at[friction.path], 0.0) / moved,
             rise=math.expm1(at.get(_RISE, 0.0)),
@@ -234,7 +234,7 @@ def _readings(sources: tuple[RecordingSource, ...], decays: tuple[FreeDecay, ...
     return PooledReadings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
 
 
-def _panels(decays: tuple[FreeDecay, ...], model: Floats, slowing: _Slowing) -> tuple[Panel, Panel]:
+def _panels(decays: tuple[FreeDecay, ...], model: Floats, slowing: Slowing) -> tuple[Panel, Panel]:
     """Return two panels: angle over time, and acceleration over velocity with the straight line of equation (1)."""
     angles, rates, place = list[Mark](), list[Mark](), 0
     measured, fitted, fastest = "measured", "fitted", 0.0

@@ -62,7 +62,7 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
         declared |= {f"motion.{quantity.name}": quantity for quantity in (FREE if leg is None else LEG)}
         shank = () if leg is None else shank_settings(leg.shank.kind)
         declared |= {f"motion.shank.{quantity.name}": quantity for quantity in shank}
-    declared |= {f"initial.{quantity.name}": quantity for quantity in INITIAL}
+    declared |= numbers.of_its_chambers({f"initial.{quantity.name}": quantity for quantity in INITIAL}, device)
     return declared | {f"recording.{quantity.name}": quantity for quantity in RECORDING}
 
 

@@ -91,6 +91,7 @@ def _ceiling_by_angle(evidence: Evidence) -> Iterator[AuditFinding]:
         device = build_device(evidence.parameter_set)
     except ParameterError:
         return
+    chambers = "its chamber at supply or" if device.actuator.has_one_chamber else "one chamber at supply and the other"
     lowest, highest = float(device.actuator.angle_min), float(device.actuator.angle_max)
     angles = [lowest + (highest - lowest) * number / _ANGLES for number in range(_ANGLES + 1)]
     downward, upward = zip(*(torque_reach(device, angle) for angle in angles), strict=True)
@@ -113,8 +114,8 @@ def _ceiling_by_angle(evidence: Evidence) -> Iterator[AuditFinding]:
         values=evidence.values_of(*_SUPPLIES, _STATIC),
         sides=tuple(sides),
         paragraph=(
-            f"With one chamber at supply and the other at atmosphere the actuator gives {' and '.join(texts)}, before "
-            f"friction. {'Static friction is more: the joint cannot move.' if sticks else _LIMIT}"
+            f"With {chambers} at atmosphere the actuator gives {' and '.join(texts)}, before friction. "
+            f"{'Static friction is more: the joint cannot move.' if sticks else _LIMIT}"
         ),
     )
 

@@ -10,6 +10,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
+from ppafo.parameters.declaration import OF_SECOND_CHAMBER, WHY_ONE_CHAMBER
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import either, in_two_forms
 from ppafo.simulation.declaration import TEXTS, WALL_AREA
@@ -88,7 +89,9 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
     if heat_varies and WALL_AREA not in values and gas is not None and gas.wall_area_per_volume == 0.0:
         raise ScenarioError(f"{base.name}: its heat transfer varies, and '{WALL_AREA}' is 0: give the area")
     varied = moving_together(base, absolute(base, values, gauge))
-    return ScenarioColumns(base, varied, {path: declared[path] for path in varied}, frozenset(values))
+    # A number of a second chamber that the actuator does not have may follow, and nothing declares it.
+    in_force = {path: declared[path] for path in varied if path in declared}
+    return ScenarioColumns(base, varied, in_force, frozenset(values))
 
 
 def absolute(base: Scenario, columns: Mapping[str, Floats], gauge: Collection[str]) -> dict[str, Floats]:
@@ -106,5 +109,7 @@ def _why_not(base: Scenario, typed: str, path: str, declared: Mapping[str, Quant
             f"'{typed}' cannot vary: a Python object has no declared settings; "
             "a module with a KIND has them (docs/how-to/extend.md)"
         )
+    if path in OF_SECOND_CHAMBER and base.device.actuator.has_one_chamber:
+        return f"'{typed}' cannot vary: {WHY_ONE_CHAMBER}"
     hint = nearest_name(path, declared) or f"; for example {', '.join(list(declared)[:6])}"
     return f"there is no number '{typed}' that could vary{hint}"

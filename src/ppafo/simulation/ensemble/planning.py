@@ -80,7 +80,7 @@ class ValidRuns:
 def screen_columns(columns: ScenarioColumns) -> ValidRuns:
     """Runs whose values are in range and consistent."""
     valid = ValidRuns(columns, np.arange(columns.runs), {})
-    for path in columns.values:
+    for path in columns.declared:
         # A default that follows others goes where they lead it, as it does in a single run.
         if path in columns.given or not columns.declared[path].follows:
             valid.refuse(*_out_of_range(valid.columns, path))

@@ -137,13 +137,14 @@ class _MeteredBatch:
 
 def lacking(scenario: Scenario, kind: MetricKind) -> str:
     """Reason why no run of a scenario can have a metric; "" if runs have it."""
+    if scenario.device.actuator.has_one_chamber and not OF_SECOND_CHAMBER.isdisjoint(kind.channels):
+        return f"'{scenario.device.name}' has one chamber"
     return scenario.motion.motion_kind.lacks(scenario, kind)
 
 
 def offered(scenario: Scenario) -> dict[str, MetricKind]:
     """Metrics that runs of a scenario have, for messages: a vane alone has no metrics of walks, and vice versa."""
     missing: frozenset[str] = frozenset() if scenario.gas_model is not None else WITH_ENERGY_BALANCE
-    missing |= OF_SECOND_CHAMBER if scenario.device.actuator.has_one_chamber else frozenset()
     return {
         name: kind
         for name, kind in METRICS.items()

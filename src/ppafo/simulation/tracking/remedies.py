@@ -11,7 +11,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import SonicOrifice
 from ppafo.report.display_units import metric_change, metric_level
 from ppafo.simulation.gains import settings_of, terms_of
-from ppafo.simulation.numbers import declared_numbers, number_at
+from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chambers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import LARGEST_SHARE, SettledPart
 
@@ -52,7 +52,7 @@ class Remedy:
 
 def remedy(scenario: Scenario, numbers: Mapping[str, float]) -> Remedy:
     """Remedy with its overrides in the units of the device."""
-    declared = declared_numbers(scenario)
+    declared, numbers = declared_numbers(scenario), of_its_chambers(numbers, scenario.device)
     overrides = (
         f"{path}={level_text(declared[path].unit, number)}"
         for path, number in numbers.items()

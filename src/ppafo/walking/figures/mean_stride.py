@@ -22,6 +22,7 @@ WITH, WITHOUT, HEALTHY = BLUE, VERMILION, BLACK
 STRIDE = Kind("Stride", "1", "fraction")
 ANGLE = Kind("Ankle angle, 0 neutral, dorsiflexion positive", "rad", "angle")
 PRESSURE = Kind("Gauge pressures; dashed: dorsiflexion chamber", "Pa_d", "pressure change")
+ONE_PRESSURE = Kind("Gauge pressure", "Pa_d", "pressure change")
 TOES = Kind("Toe height above ground; below -1 the toes drag", "m", "body length")
 _CHANNELS = {
     ANGLE: ("angle",),
@@ -42,6 +43,7 @@ def walk_figure(walks: Mapping[str, Any]) -> "Figure":
     gait = walk_of(first.scenario).gait
     ankle = clinical_angle(gait.ankle_angle.values_at(PHASES))
     healthy = {ANGLE: (ankle, gait.ankle_angle.deviation), TOES: (healthy_toe_height(first.scenario), 0.0)}
+    has_one_chamber = first.scenario.device.actuator.has_one_chamber
     panels: list[Panel] = []
 
     def whole_stride(axes: "Axes") -> None:
@@ -73,7 +75,8 @@ def walk_figure(walks: Mapping[str, Any]) -> "Figure":
             look = {"linewidth": 1.2, "linestyle": (0, (1, 1.2))}
             marks.append(Mark("line", PHASES, mean, label="healthy gait", colour=HEALTHY, style=look))
             marks.append(replace(_band(mean, deviation, GREY, 0.15), label="band: standard deviation"))
-        panels.append(Panel(STRIDE, kind, marks, legend="", then=whole_stride, shares_x=True))
+        shown = ONE_PRESSURE if kind is PRESSURE and has_one_chamber else kind
+        panels.append(Panel(STRIDE, shown, marks, legend="", then=whole_stride, shares_x=True))
     panels[0] = replace(panels[0], legend="figure")
     return draw_panels(
         panels,
