@@ -73,9 +73,7 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
             elif others or not bare:
                 remedy = others or "; does the line end with a comma?"
             else:
-                named = argument_text("columns", "FILE.toml:NAME")
-                remedy = f"; other columns are read through a column map: validate {named}, or columns = 'NAME' in a "
-                remedy += "problem file of identify"
+                remedy = _column_map_remedy()
             raise DataError(
                 f"the header must name columns as 'name [unit]', separated by commas; '{one_line(shown)}' is not one"
                 f"{remedy}"
@@ -89,11 +87,20 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
         columns.append(HeaderColumn(name, unit, between))
     names = [column.name for column in columns]
     if names[0] != TIME:
-        raise DataError(f"the first column must be '{TIME} [{TIME_UNIT}]', it is '{names[0]}'")
+        raise DataError(f"the first column must be '{TIME} [{TIME_UNIT}]', it is '{names[0]}'{_column_map_remedy()}")
     twice = first_twice(names)
     if twice is not None:
         raise DataError(f"there are two columns '{twice}'")
     return columns
+
+
+def _column_map_remedy() -> str:
+    """Return the end of a message on columns of other names: a column map reads them."""
+    named = argument_text("columns", "FILE.toml:NAME")
+    return (
+        f"; other columns are read through a column map: validate {named}, or columns = 'NAME' in a problem file of "
+        "identify"
+    )
 
 
 def is_of_frame(cells: Sequence[str]) -> bool:

@@ -7,6 +7,7 @@ import ctypes
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,11 +17,13 @@ import pytest
 
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of, batches_of
-from ppafo.exports.c_library import c_library, scenario_library
-from ppafo.exports.c_library.library import c_identifier
-from ppafo.exports.c_library.plant import plant_library
+from ppafo.exports.c_library import c_library, library_of, scenario_library
+from ppafo.exports.c_library.files import library_files
+from ppafo.exports.c_library.library import Library, c_identifier
+from ppafo.exports.c_library.plant import plant_library, plant_of, with_api
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import Readings
+from ppafo.parameters.joint import JointNames
 from ppafo.processor.firmware import firmware
 from ppafo.running import simulate
 from ppafo.signals.meter import (
@@ -505,3 +508,16 @@ def test_c_makes_the_numbers_of_a_run_that_python_makes(name: str, overrides: tu
             assert counts.tolist() == list(map(float, expected))
             compared += 1
     assert compared == RUNS
+
+
+@pytest.mark.parametrize("make", [library_of, lambda scenario: with_api(plant_of(scenario)).library])
+def test_a_header_speaks_of_the_joint_and_the_actuator_of_its_set(make: Callable[[Scenario], Library]) -> None:
+    scenario = load_scenario("step-response", ["device.set=cylinder-lever"])
+    elbow = JointNames("elbow", "flexion", "extension")
+    library = make(replace(scenario, device=replace(scenario.device, joint=elbow)))
+    header = library_files(library)[f"{library.name}.h"].decode()
+    # The author's own description stays as it is.
+    summaries = [line.split("/*")[1] for line in header.splitlines() if line.startswith("    double ")]
+    assert any("angle of the cylinder, 90 deg neutral, growing in flexion" in summary for summary in summaries)
+    assert any("elbow angle, growing in flexion" in summary for summary in summaries)
+    assert not any(re.search("ankle|vane|plantar|dorsi", summary) for summary in summaries)

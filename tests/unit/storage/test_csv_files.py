@@ -92,6 +92,7 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
         ("\ntime [s]\n0\n", "the header must come first, line 1 is empty"),
         ("time [s],angle [rad]\n0,1\n\n1,2\n", "line 3 has 0 values for 2 columns"),
         ("angle [rad],time [s]\n0,1\n", "the first column must be 'time \\[s\\]', it is 'angle'"),
+        ("Zeit [s],angle [rad]\n0,1\n", "it is 'Zeit'; other columns are read through a column map"),
         ("time [s],angle [rad],angle [deg]\n0,1,1\n", "two columns 'angle'"),
         ("time [s],angle [m]\n0,1\n", "column 'angle \\[m\\]': unit 'm' does not fit: an angle is needed"),
         ("time [s],pressure_1 [psi]\n0,1\n", "column 'pressure_1 \\[psi\\]': 'psi' does not say which pressure"),

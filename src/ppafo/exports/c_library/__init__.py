@@ -1,6 +1,7 @@
 """Export of a scenario as a C99 library, with an example and make files."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 
 from ppafo.control.catalog import CONTROLLERS
@@ -132,7 +133,8 @@ def library_of(scenario: Scenario) -> Library:
             f"{scenario.name}: a Python object cannot be exported as a controller; export the plant alone, or write "
             f"the law as a controller kind"
         )
-    return _LIBRARIES[scenario.motion.motion_kind.layout](scenario)
+    library = _LIBRARIES[scenario.motion.motion_kind.layout](scenario)
+    return replace(library, joint=scenario.device.joint, actuator=scenario.device.actuator.kind)
 
 
 def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> tuple[Switch, ...]:

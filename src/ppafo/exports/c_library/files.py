@@ -96,11 +96,16 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "description": "\n * ".join(textwrap.wrap(in_comment(library.description), 110)),
         "about": in_markdown(library.description),
         "version": __version__,
-        "settings": _members((setting.name, setting.quantity.unit, _meaning(setting.quantity)) for setting in settings),
-        "outputs": _members(
-            (("time", "s", "since the start"), *((output, *OUTPUTS[output]) for output in program.outputs))
+        "settings": _members(
+            (setting.name, setting.quantity.unit, library.worded(_meaning(setting.quantity))) for setting in settings
         ),
-        "metrics": _members((kind.name, kind.unit, kind.summary) for kind in program.metrics),
+        "outputs": _members(
+            (
+                ("time", "s", "since the start"),
+                *((output, OUTPUTS[output][0], library.worded(OUTPUTS[output][1])) for output in program.outputs),
+            )
+        ),
+        "metrics": _members((kind.name, kind.unit, library.worded(kind.summary)) for kind in program.metrics),
         "table": "\n".join(table),
         "relations": _returning((f"!({condition})", setting) for condition, setting in relations),
         "is_whole": _IS_WHOLE if any("is_whole(" in condition for condition, _ in relations) else "",
@@ -109,7 +114,8 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "csv_form": ",".join(["%.17g"] * len(outputs)),
         "csv_values": ",\n".join(f"            outputs.{output}" for output in outputs),
         "print_metrics": "\n".join(
-            f'        print_metric("{kind.name}", metrics.{kind.name}, "{kind.unit}", "{kind.summary}");'
+            f'        print_metric("{kind.name}", metrics.{kind.name}, "{kind.unit}", '
+            f'"{library.worded(kind.summary)}");'
             for kind in program.metrics
         ),
         "example": f"{pressure.name} = {pressure.value!r};",

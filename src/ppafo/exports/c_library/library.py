@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 
 from ppafo.exports.c_library.exported import ExportedProgram, Further
 from ppafo.model.declaration import Quantity
+from ppafo.parameters.device import VANE
 from ppafo.parameters.graph import Graph
+from ppafo.parameters.joint import ANKLE, JointNames
 
 _OWN_FILES = {"main", "expected", "unit", "plugin", "fmi2", "fmi3", "makefile", "readme", "license"}
 _OWN_TARGETS = {"all", "check", "clean", "test"}
@@ -74,6 +76,10 @@ LOOP = LibraryApi("interface.h", "main.c", "README.md", "loop.c")
 """API of the closed loop, which advances from sample to sample."""
 
 
+_VANE = re.compile(r"\bvane\b")
+"""The word for the actuator in summaries."""
+
+
 @dataclass(frozen=True, slots=True)
 class Library:
     """Library to be written: program, settings, outputs, metrics and texts.
@@ -83,7 +89,7 @@ class Library:
     with the setting to report. ``rules`` are conditions between times, as in a file. ``following`` adds the function by
     which settings follow others; None if none does. ``defaults`` names the settings whose default follows others; these
     have no range. ``links`` maps followers to their sources. ``words`` are template variables of the README. ``api`` is
-    the interface of the library.
+    the interface of the library. ``joint`` and ``actuator`` are the names of the joint and of the kind of actuator.
     """
 
     title: str
@@ -100,6 +106,12 @@ class Library:
     links: Graph = field(default_factory=dict)
     api: LibraryApi = LOOP
     rules: tuple[Rule, ...] = ()
+    joint: JointNames = ANKLE
+    actuator: str = VANE
+
+    def worded(self, summary: str) -> str:
+        """Return a summary about a vane on an ankle in the words of this actuator and joint."""
+        return self.joint.said(summary if self.actuator == VANE else _VANE.sub(self.actuator, summary))
 
     @property
     def name(self) -> str:

@@ -178,7 +178,7 @@ def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -
     name, summary, load = "external_torque", "T_ex, above 0 against plantarflexion", ""
     start = motion.external_torque
     if motion.leg is not None:
-        name, summary, load = "ankle_torque", "T_2, above 0 plantarflexes", "-"
+        name, summary, load = "ankle_torque", "T_2, above 0 towards plantarflexion", "-"
         start = motion.leg.ankle_torque
     limits = settings[f"motion.{name}"].quantity
     torque = Input(name, "N m", f"torque on the ankle, {summary}", start, limits.minimum, limits.maximum)
@@ -214,8 +214,9 @@ def with_api(alone: _PlantAlone) -> _PlantAlone:
     by_name = {name: name for name in names}
     # An example whose command does something.
     example = [EXAMPLE if variable.name == "command" else variable.start for variable in alone.inputs]
-    comments = [f" * {variable.name}, {variable.summary} [{variable.unit}]" for variable in alone.inputs]
-    entries = [f"- `{variable.name}` [{variable.unit}]: {variable.summary}." for variable in alone.inputs]
+    summaries = [(variable, alone.library.worded(variable.summary)) for variable in alone.inputs]
+    comments = [f" * {variable.name}, {summary} [{variable.unit}]" for variable, summary in summaries]
+    entries = [f"- `{variable.name}` [{variable.unit}]: {summary}." for variable, summary in summaries]
     are_numbers = [f"{name} - {name} == 0.0" for name in names]
     if "angle" in names and alone.library.program.program.actuator.shape is None:
         # Both chambers of a prescribed vane have a volume, now and at the end of the step: beyond where

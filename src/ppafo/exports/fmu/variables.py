@@ -78,19 +78,23 @@ def variables_of(interface: Interface) -> tuple[FmuVariable, ...]:
         if tuning != "hidden":
             ends = (quantity.minimum, quantity.maximum)
             limits = (limit if abs(limit) < _LARGEST_LIMIT else None for limit in ends)
-            meaning = quantity.summary or quantity.name
+            meaning = library.worded(quantity.summary or quantity.name)
             variables.append(
                 FmuVariable(setting.path, number, quantity.unit, meaning, "parameter", tuning, setting.value, *limits)
             )
     first_output = len(library.settings)
     for number, name in enumerate(program.outputs, start=first_output):
-        variables.append(FmuVariable(name, number, *OUTPUTS[name], "output", variability_of(name)))
+        unit, summary = OUTPUTS[name]
+        variables.append(FmuVariable(name, number, unit, library.worded(summary), "output", variability_of(name)))
     first_metric = first_output + len(program.outputs)
     for number, metric in enumerate(program.metrics, start=first_metric):
         variables.append(
-            FmuVariable(f"metrics.{metric.name}", number, metric.unit, metric.summary, "local", "continuous")
+            FmuVariable(
+                f"metrics.{metric.name}", number, metric.unit, library.worded(metric.summary), "local", "continuous"
+            )
         )
     for number, item in enumerate(interface.inputs, start=first_metric + len(program.metrics)):
         values = item.start, item.minimum, item.maximum
-        variables.append(FmuVariable(item.name, number, item.unit, item.summary, "input", "continuous", *values))
+        meaning = library.worded(item.summary)
+        variables.append(FmuVariable(item.name, number, item.unit, meaning, "input", "continuous", *values))
     return tuple(variables)
