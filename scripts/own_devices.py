@@ -14,6 +14,7 @@ controller stopped. All of it is synthetic.
 
 import argparse
 import random
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,9 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
 from scripts.drawn_joints import KINDS, angle_text, counts_of, run_joints, table_text
 
 LAWS = (

@@ -39,14 +39,6 @@ class ComposedFrom(NamedTuple):
     named_defaults: dict[str, Any]
 
 
-def composed_lines(lines: Iterable[str], needs: Mapping[str, tuple[str, ...]]) -> list[str]:
-    """Lines of the text around a module, in which calls pass the rows of effects that functions need."""
-    if not needs:
-        return list(lines)
-    calls = re.compile(rf"\b({'|'.join(map(re.escape, needs))})\(")
-    return [calls.sub(lambda call: f"{call[0]}{', '.join(needs[call[1]])}, ", line) for line in lines]
-
-
 @dataclass(slots=True)
 class MadeFrom:
     """Names read and functions composed for a text, which determine whether the text is up to date."""
@@ -193,6 +185,14 @@ class SourceCollector:
                 f"{place_of(function)}: '{called.__name__}' is the law of an effect: call its port instead"
             )
         return self.add(called)
+
+
+def composed_lines(lines: Iterable[str], needs: Mapping[str, tuple[str, ...]]) -> list[str]:
+    """Lines of the text around a module, in which calls pass the rows of effects that functions need."""
+    if not needs:
+        return list(lines)
+    calls = re.compile(rf"\b({'|'.join(map(re.escape, needs))})\(")
+    return [calls.sub(lambda call: f"{call[0]}{', '.join(needs[call[1]])}, ", line) for line in lines]
 
 
 def _compose_parameters(composer: Composer, tree: ast.FunctionDef, rows: tuple[str, ...]) -> None:
