@@ -112,6 +112,8 @@ export interface Bottle {
 export interface Content {
   readonly version: string;
   readonly title: string;
+  /** The joint that the devices turn. */
+  readonly joint: string;
   readonly form: "page" | "block";
   readonly tabs: readonly Tab[];
   readonly bottle: Bottle;

@@ -62,14 +62,14 @@ export class Drawing {
   show(run: Run, frame: Frame, at: number): void {
     const value = (name: string, other = 0) => run.channels.get(name)?.[at] ?? other;
     const angle = value("angle", Math.PI / 2);
-    const pressures = [value("pressure_1", frame.atmosphere), value("pressure_2", frame.atmosphere)];
+    const pressures = ["pressure_1", "pressure_2"].map((name) => run.channels.get(name)?.[at] ?? null);
     this.showChambers(angle, pressures, frame);
     this.showValve(value("command"));
     this.showLeg(angle, value("shank_angle"), value("torque"), run.channels.has("shank_angle"));
     say(this.words, `${frame.text("angle", angle).replace(/ deg$/, "°")} · ${frame.text("torque", value("torque"))}`);
   }
 
-  private showChambers(angle: number, pressures: readonly number[], frame: Frame): void {
+  private showChambers(angle: number, pressures: readonly (number | null)[], frame: Frame): void {
     const middle = (frame.lowest + frame.highest) / 2;
     const edge = 0.17;
     const at = (given: number) => given - middle - Math.PI / 2;
@@ -78,7 +78,10 @@ export class Drawing {
       [at(angle), at(frame.highest + edge)],
     ];
     ends.forEach(([from, to], place) => {
-      const pressure = pressures[place] ?? 0;
+      const pressure = pressures[place] ?? null;
+      for (const drawn of [this.chambers[place], this.ways[place], this.texts[place]]) drawn?.toggleAttribute("hidden", pressure === null);
+      // A device of one chamber has no other one.
+      if (pressure === null) return;
       const share = (pressure - frame.atmosphere) / Math.max(1, frame.supply - frame.atmosphere);
       this.chambers[place]?.setAttribute("d", sector(from, to));
       this.chambers[place]?.setAttribute("fill", `rgb(${shade(0.12 + 0.8 * share).join()})`);

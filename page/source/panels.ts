@@ -236,7 +236,8 @@ export class Panels {
   }
 
   private titleOf(panel: Panel): string {
-    return `${panel.title}${panel.note ?? ""}`;
+    const isOneChamber = panel.title === "Pressures" && !this.shown.some(({ run }) => run.channels.has("pressure_2"));
+    return `${panel.title.replace("ankle", this.content.joint)}${isOneChamber ? "" : (panel.note ?? "")}`;
   }
 
   private axisOf(panel: Panel): string {

@@ -172,9 +172,10 @@ function written(value: number, isLow: boolean): string {
     .replace(/\B(?=(\d{3})+(?!\d)(?<!\.\d*))/g, ",");
 }
 
-/** A value as a control shows it, without its unit. */
+/** A value as a control shows it, without its unit: what nobody has written, as a share of the stature, has no more digits than are read. */
 export function shownNumber(content: Content, setting: Setting, value: number, atmosphere: number): string {
-  return plain(shownValue(content, setting, value, atmosphere), 6);
+  const isWritten = setting.origin !== "default" || value !== setting.value;
+  return plain(shownValue(content, setting, value, atmosphere), isWritten ? 6 : 4);
 }
 
 /** The first pair of settings that contradict each other, as one line; empty where there is none. */

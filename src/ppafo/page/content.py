@@ -11,15 +11,18 @@ from importlib.resources import files
 from typing import Any
 
 from ppafo.errors import ScenarioError, UnitError
+from ppafo.model.controlled import CONTROLLED
 from ppafo.page.motions import declared_content, page_look, relations_in_files, usual_changes, with_limits
 from ppafo.page.wasm import WasmModule
 from ppafo.page.wasm.description import display_of
 from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.parameters.overrides import over, read_overrides
 from ppafo.report.display_units import metric_quantity
-from ppafo.report.setting_names import label_of
+from ppafo.report.setting_names import REFERENCE_LEVELS, label_of
 from ppafo.simulation.declaration import PRESSURE_WORDS
 from ppafo.simulation.overrides import apply_overrides, is_of_device
+from ppafo.simulation.profiles import limits_of
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import conversion, from_si, parse_quantity, to_si
 from ppafo.units.shown import QUANTITIES, shown_in
@@ -49,8 +52,6 @@ _UNITS: dict[str, tuple[str, ...]] = {
 }
 """Units accepted for typed values, in addition to the display unit and the SI unit."""
 _GAUGES = ("psi_g", "kPa_g", "bar_g", "Pa_g")
-_ABSOLUTE = ("largest_pressure",)
-"""Metrics that are absolute pressures."""
 _NICE = (1.0, 2.0, 2.5, 5.0, 10.0)
 
 
@@ -71,7 +72,7 @@ class PageSimulation:
 
 def program_content(simulated: PageSimulation, module: str, intervals: Mapping[str, Interval]) -> dict[str, Any]:
     """Return the page's data on a scenario; ``module`` is the id of the HTML element with its program."""
-    described = simulated.module.description
+    described, joint = simulated.module.description, simulated.scenario.device.joint
     gauge = _gauge_texts(simulated.scenario, described["settings"])
     keys = {setting["key"] for setting in described["settings"]}
     # The file of a scenario or walk with the overrides in it; overrides of the device stay overrides.
@@ -83,7 +84,7 @@ def program_content(simulated: PageSimulation, module: str, intervals: Mapping[s
             known = {**entry, "display": {**display, "unit": f"{display['unit'][:-2]}_a", "zero": 0.0}}
         else:
             known = with_limits(entry, scenario)
-        settings.append(_setting(known, gauge, intervals, scenario.device.supply.atmospheric_pressure))
+        settings.append(_setting(known, gauge, intervals, scenario))
     overridden = read_overrides(described["overrides"], ScenarioError)
     changed = apply_overrides(described["document"], overridden, described["name"], declared_content(scenario))
     document, own = changed.document, changed.device
@@ -113,8 +114,8 @@ def program_content(simulated: PageSimulation, module: str, intervals: Mapping[s
             for relation in described["relations"]
         ]
         + relations_in_files(keys, scenario),
-        "channels": [_shown(entry) for entry in described["channels"] if entry["name"] != "time"],
-        "metrics": [_shown(entry) for entry in described["metrics"]],
+        "channels": [_shown(entry, joint) for entry in described["channels"] if entry["name"] != "time"],
+        "metrics": [_shown(entry, joint) for entry in described["metrics"]],
         # Only of an actuator that makes its torque of a pressure so.
         "sustained": dict(_SUSTAINED) if keys >= set(_SUSTAINED.values()) else None,
         "module": module,
@@ -136,9 +137,13 @@ def usual_values(scenario: Scenario) -> dict[str, float]:
 
 
 def page_content(
-    title: str, form: str, tabs: Sequence[Mapping[str, Any]], programs: Sequence[Mapping[str, Any]]
+    title: str,
+    form: str,
+    tabs: Sequence[Mapping[str, Any]],
+    programs: Sequence[Mapping[str, Any]],
+    joint: str = ANKLE.name,
 ) -> dict[str, Any]:
-    """Return all data of a page except its modules."""
+    """Return all data of a page except its modules; ``joint`` is the joint in the titles of its plots."""
     shown = {
         (entry["unit"], entry["shown"])
         for program in programs
@@ -161,6 +166,7 @@ def page_content(
     return {
         "version": __version__,
         "title": title,
+        "joint": joint,
         "form": form,
         "tabs": list(tabs),
         "bottle": json.loads(files("ppafo.page").joinpath("minutes.json").read_text(encoding="utf-8")),
@@ -172,8 +178,9 @@ def page_content(
 
 
 def _setting(
-    entry: Mapping[str, Any], gauge: Mapping[str, str], intervals: Mapping[str, Interval], atmosphere: float
+    entry: Mapping[str, Any], gauge: Mapping[str, str], intervals: Mapping[str, Interval], scenario: Scenario
 ) -> dict[str, Any]:
+    device, followed = scenario.device, CONTROLLED[scenario.controlled]
     key, half = entry["key"], entry["half_width"]
     interval = intervals.get(key) if half is None else (entry["value"] - half, entry["value"] + half)
     # An interval speaks of the value of the set; one that was put there by somebody is known to them.
@@ -186,10 +193,13 @@ def _setting(
     value = (entry["value"] - zero) / factor
     low, high = ((end - zero) / factor if end is not None else None for end in (entry["minimum"], entry["maximum"]))
     slider = words()["sliders"].get(entry["key"])
-    if slider is not None:
+    if key in REFERENCE_LEVELS and followed.reach is not None:
+        limits = limits_of(device, followed)
+        begin, end = (float(f"{(limit - zero) / factor:.2g}") for limit in (limits.lowest, limits.highest))
+    elif slider is not None:
         begin, end = float(slider[0]), float(slider[1])
         with shown_in({}):
-            usual = display_of(entry["unit"], atmosphere, is_absolute=key == ATMOSPHERE_PATH)
+            usual = display_of(entry["unit"], device.supply.atmospheric_pressure, is_absolute=key == ATMOSPHERE_PATH)
         if usual["unit"] != display["unit"]:
             # The file has its ends in the package's own units.
             sizes = [(usual["zero"] + usual["factor"] * each - zero) / factor for each in (begin, end)]
@@ -210,7 +220,7 @@ def _setting(
     end = end if high is None else min(end, high)
     return {
         "key": key,
-        "label": label_of(key),
+        "label": device.joint.said(label_of(key, followed.words)),
         "unit": _bare(entry["unit"]),
         "shown": _typed(_bare(entry["display"]["unit"]), entry["unit"]),
         "low": entry["minimum"],
@@ -223,7 +233,7 @@ def _setting(
         "words": {word: f"supply.{name}" for word, name in PRESSURE_WORDS.items()} if is_initial else {},
         "kept": entry["kept"] or "",
         "slider": (min(begin, value), max(end, value)),
-        "summary": entry["description"],
+        "summary": device.joint.said(entry["description"]),
         "origin": entry["origin"],
         "source": entry["source"],
         "note": entry["note"],
@@ -236,14 +246,14 @@ def _bare(unit: str) -> str:
     return "" if unit == "1" else unit
 
 
-def _shown(entry: Mapping[str, Any]) -> dict[str, str]:
+def _shown(entry: Mapping[str, Any], joint: JointNames) -> dict[str, str]:
     unit = _LEVEL if entry["unit"] == "Pa" else _bare(entry["unit"])
-    text, shown = entry["description"], entry["display"]["unit"]
+    text = entry["description"]
     return {
         "name": entry["name"],
         "unit": unit,
-        "shown": f"{shown[:-2]}_a" if entry["name"] in _ABSOLUTE else _bare(shown),
-        "label": text[:1].upper() + text[1:],
+        "shown": _bare(entry["display"]["unit"]),
+        "label": joint.said(text[:1].upper() + text[1:]),
     }
 
 

@@ -6,6 +6,7 @@ from html import escape
 from typing import Any, NamedTuple
 
 from ppafo.model.controlled import CONTROLLED
+from ppafo.parameters.joint import ANKLE
 from ppafo.report.display_units import axis_unit, display_value
 from ppafo.report.style import BLACK, GREY, PAGE_COLOURS
 from ppafo.units.shown import quantity_of_unit
@@ -44,7 +45,10 @@ class _Axes(NamedTuple):
 
 
 def still_of(
-    tab: Mapping[str, Any], openings: Sequence[Mapping[str, Any]], programs: Sequence[Mapping[str, Any]]
+    tab: Mapping[str, Any],
+    openings: Sequence[Mapping[str, Any]],
+    programs: Sequence[Mapping[str, Any]],
+    joint: str = ANKLE.name,
 ) -> str:
     """Return the first panel of a tab as SVG text: a curve for each configuration, and the reference.
 
@@ -66,7 +70,7 @@ def still_of(
     unused = [number for number in range(1, len(PAGE_COLOURS) + 1) if number not in looks]
     numbers = [look if look and looks.index(look) == index else unused.pop(0) for index, look in enumerate(looks)]
     colours = [PAGE_COLOURS[number - 1] for number in numbers]
-    label = f"{_NAMES[channel]} ({axis_unit(quantity)})"
+    label = f"{_NAMES[channel].replace(ANKLE.name, joint)} ({axis_unit(quantity)})"
     parts = _frame(axes, label)
     parts += [
         _line(axes, curve, f'stroke="{colour}" stroke-width="2"')

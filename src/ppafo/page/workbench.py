@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.arguments import Overrides, checked
-from ppafo.errors import PpafoError, ScenarioError
+from ppafo.errors import PpafoError, ScenarioError, UnitError
 from ppafo.loading import load_scenario
 from ppafo.page.content import Interval, PageSimulation, page_content, program_content, usual_values, words
 from ppafo.page.html import block_of, packed_once, page_of
@@ -17,12 +17,15 @@ from ppafo.page.motions import is_walk, tab_title, usual_changes
 from ppafo.page.opening import computed_opening, first_settings, opening_like, opening_of
 from ppafo.page.still import still_of
 from ppafo.page.wasm import module_of
+from ppafo.parameters.joint import ANKLE
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.finding import LivePart
 from ppafo.simulation.scenario import Scenario
-from ppafo.units.shown import shown_in
+from ppafo.units import from_si, parse_quantity, split_pressure_kind
+from ppafo.units.shown import shown_in, shown_unit
 
 TITLE = "The powered ankle-foot orthosis, live"
+"""Title of a page of devices on the ankle."""
 DEFAULT = ("torque-task-solenoid", "torque-task-proportional", "step-response", "solenoid")
 MOST_SCENARIOS = 24
 _OPEN = 2
@@ -64,7 +67,7 @@ def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides
     """
     name_plugins(plugins)
     content, modules, still = _content([str(scenario) for scenario in scenarios], tuple(overrides), "page")
-    return page_of(TITLE, content, modules, still)
+    return page_of(content["title"], content, modules, still)
 
 
 def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
@@ -117,7 +120,9 @@ def _content(
         name = names.setdefault(packed_once(program.module.wasm), f"module-{len(names) + 1}")
         with shown_in(program.scenario.device.shown):
             programs.append(program_content(program, name, intervals))
-    content = page_content(TITLE, form, _tabs(simulated), programs)
+    joints = {program.scenario.device.joint.name for program in simulated}
+    joint = joints.pop() if len(joints) == 1 else "joint"
+    content = page_content(_title(joint), form, _tabs(simulated), programs, joint)
     by_name = {program.scenario.name: program for program in simulated}
     described = {program["name"]: program for program in programs}
     stills = []
@@ -132,13 +137,18 @@ def _content(
             for program in started
         ]
         tab["first"] = first_settings(openings, shown)
-        # A question is asked where one of the programs has all the settings that it changes.
-        settings = [{entry["key"] for entry in program["settings"] if entry["kept"] != "zero"} for program in shown]
+        # A question is asked where one of the programs has all the settings that it changes, in their units.
+        units = [
+            {entry["key"]: entry["unit"] for entry in program["settings"] if entry["kept"] != "zero"}
+            for program in shown
+        ]
         tab["questions"] = [
-            question for question in tab["questions"] if any(set(question["changes"]) <= keys for keys in settings)
+            question
+            for question in tab["questions"]
+            if any(_fits(question["changes"], units_of_program) for units_of_program in units)
         ]
         with shown_in(started[0].scenario.device.shown):
-            stills.append(still_of(tab, openings, shown))
+            stills.append(still_of(tab, openings, shown, joint))
     return content, {name: text for text, name in names.items()}, stills[0]
 
 
@@ -165,6 +175,37 @@ def known_intervals() -> Mapping[str, Interval]:
     return {path: (low, high) for path, (low, high) in described.items()}
 
 
+def _title(joint: str) -> str:
+    if joint == ANKLE.name:
+        return TITLE
+    return "Powered orthoses, live" if joint == "joint" else f"The powered {joint} orthosis, live"
+
+
+def _fits(changes: Mapping[str, str], units: Mapping[str, str]) -> bool:
+    """Return True if all changed settings are among ``units`` [SI], and the changes are in units of these."""
+    if not changes.keys() <= units.keys():
+        return False
+    try:
+        for key, text in changes.items():
+            parse_quantity(text, units[key] or "1")
+    except UnitError:
+        return False
+    return True
+
+
+def _question(question: Mapping[str, Any], atmosphere: float) -> dict[str, Any]:
+    """Return text and changes of a question, its supply pressure in the display unit of pressures."""
+    text, changes = question["text"], dict(question["changes"])
+    key, unit = "supply.pressure", shown_unit("Pa_a")
+    bare, kind = split_pressure_kind(unit)
+    if key in changes:
+        # Rounded: a supply of 65 psi is one of 4.5 bar.
+        level = from_si(parse_quantity(changes[key], "Pa_a", atmosphere), unit, "Pa_a", atmosphere)
+        changes[key] = f"{level:.2g} {unit}"
+        text = text.replace(f"{{{key}}}", f"{level:.2g} {bare}{' abs' if kind == 'a' else ''}")
+    return {"text": text, "changes": changes}
+
+
 def _tabs(simulated: Sequence[PageSimulation]) -> list[dict[str, Any]]:
     groups: dict[str, list[PageSimulation]] = {}
     for program in simulated:
@@ -173,7 +214,13 @@ def _tabs(simulated: Sequence[PageSimulation]) -> list[dict[str, Any]]:
     for title, group in groups.items():
         alone = " ".join(group[0].scenario.description.split()).replace("psi_g", "psi") if len(group) == 1 else ""
         starts = [program.scenario for program in group[:_OPEN]]
-        asked = [question for question in words()["questions"] if title in question["tabs"]]
+        device = group[0].scenario.device
+        with shown_in(device.shown):
+            questions = [
+                _question(question, device.supply.atmospheric_pressure)
+                for question in words()["questions"]
+                if title in question["tabs"]
+            ]
         tabs.append(
             {
                 "title": title,
@@ -181,7 +228,7 @@ def _tabs(simulated: Sequence[PageSimulation]) -> list[dict[str, Any]]:
                 "programs": [program.scenario.name for program in group],
                 "start": [{"program": scenario.name, "changes": usual_changes(scenario)} for scenario in starts],
                 "claims": words()["claims_of_walks" if is_walk(starts[0]) else "claims"],
-                "questions": [{"text": question["text"], "changes": question["changes"]} for question in asked],
+                "questions": questions,
             }
         )
     return tabs

@@ -5,6 +5,8 @@ from functools import cache
 from importlib.resources import files
 
 _PREFIXES = {"sensors": "Sensors: ", "supply_line": "Line: "}
+REFERENCE_LEVELS = {"reference.level": "to hold", "reference.start_level": "before the ramp"}
+"""Settings in the unit of the controlled quantity, by what follows its name."""
 
 
 @cache
@@ -13,8 +15,13 @@ def setting_names() -> dict[str, str]:
     return tomllib.loads(files("ppafo.report").joinpath("setting_names.toml").read_text(encoding="utf-8"))
 
 
-def label_of(path: str) -> str:
-    """Return the display name of a setting; the default is the last part of its path."""
+def label_of(path: str, controlled: str = "torque") -> str:
+    """Return the display name of a setting; the default is the last part of its path.
+
+    ``controlled`` names the quantity that a reference prescribes, in words.
+    """
+    if path in REFERENCE_LEVELS:
+        return f"{controlled[:1].upper()}{controlled[1:]} {REFERENCE_LEVELS[path]}"
     group, _, name = path.rpartition(".")
     said = name.replace("_", " ")
     prefix = _PREFIXES.get(group.partition(".")[0], "")

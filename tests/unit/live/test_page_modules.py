@@ -132,3 +132,13 @@ def _near_zero_and_beyond(unit: str, draw: random.Random) -> list[float]:
     usual = 101325.0 if unit == "Pa_a" else 0.0
     near = [usual + zero * share for share in (-3.0, -0.9, -0.1, 0.1, 0.9, 3.0)]
     return [usual, *near, *(usual + draw.uniform(-2.0, 2.0) * 10.0 ** draw.uniform(-6.0, 5.0) for _ in range(40))]
+
+
+def test_a_value_that_nobody_wrote_has_four_digits_and_a_written_one_six() -> None:
+    work = """({ shownNumber }) => {
+        const setting = { unit: "m", shown: "mm", value: 1.869923 };
+        const content = { zeros: {}, units: { m: [{ unit: "mm", scale: "0.001", offset: "0", isGauge: false }] } };
+        const shown = (origin, value) => shownNumber(content, { ...setting, origin }, value, 101325);
+        return [shown("default", 1.869923), shown("default", 1.75125), shown("published", 1.869923)];
+    }"""
+    assert told("settings", work) == ["1870", "1751.25", "1869.92"]

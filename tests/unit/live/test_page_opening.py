@@ -18,6 +18,7 @@ from ppafo.page.content import words
 from ppafo.page.opening import LEAST_CHANGE, MOST_FIRST, _key
 from ppafo.page.workbench import DEFAULT, openings_of, workbench
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
+from ppafo.parameters.joint import JointNames
 from ppafo.report.style import PAGE_COLOURS
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
@@ -53,6 +54,29 @@ def test_a_pressure_loop_is_shown_in_bar_as_its_file_is_and_keeps_its_gains() ->
     # The page has the rules of a loop of torque: a gain in 1/Pa made by them would be refused.
     assert gain["made"]["terms"][0]["rule"].startswith("pressure_1.")
     assert gain["value"] < 1.0e-3
+
+
+def test_a_task_of_another_quantity_is_in_its_words_and_between_its_ends() -> None:
+    content = workbench_module._content(["pressure-loop", "swing-foot-angle"], (), "page")[0]
+    loop, swing = ({entry["key"]: entry for entry in program["settings"]} for program in content["programs"])
+    assert loop["reference.level"]["label"] == "Chamber 1 pressure to hold"
+    assert loop["reference.start_level"]["label"] == "Chamber 1 pressure before the ramp"
+    assert loop["reference.level"]["slider"] == pytest.approx((0.0, 3.4))
+    assert swing["reference.level"]["label"] == "Angle to hold"
+    largest = {entry["name"]: entry["shown"] for entry in content["programs"][0]["metrics"]}["largest_pressure"]
+    assert largest == "bar_g"
+    tab = next(tab for tab in content["tabs"] if "pressure-loop" in tab["programs"])
+    questions = {question["text"]: question["changes"] for question in tab["questions"]}
+    assert questions["What if the supply had 4.5 bar?"] == {"supply.pressure": "4.5 bar_g"}
+    assert not any("required" in text for text in questions)
+
+
+def test_a_page_is_called_after_the_joint_of_its_devices() -> None:
+    knee = load_scenario("step-response")
+    knee = replace(knee, device=replace(knee.device, joint=JointNames("knee", "flexion", "extension")))
+    content = workbench_module._content([knee], (), "page")[0]
+    assert (content["title"], content["joint"]) == ("The powered knee orthosis, live", "knee")
+    assert not [text for text in (entry["label"] for entry in content["programs"][0]["settings"]) if "ankle" in text]
 
 
 @pytest.mark.parametrize("name", ["torque-task-proportional", "swing-foot-angle"])
