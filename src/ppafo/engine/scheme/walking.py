@@ -284,18 +284,16 @@ def depart_in_walk(
 ) -> tuple[WalkEnd, HeldChambers]:
     """End and chambers of a step [s] with a stop, reversal or start of motion; otherwise both are unchanged."""
     angle, rate = depart_free(plant, state, ahead, begun.free, ended.motion, step, parts=parts)
-    departs, slid = ended.motion.departs > 0.5, ended.motion
+    slid = ended.motion
+    departs = slid.departs > 0.5
     there = held_chambers(plant, angle, parts=parts)
     held = HeldChambers(
         per_mass_1=there.per_mass_1 if departs else ahead.per_mass_1,
         per_mass_2=there.per_mass_2 if departs else ahead.per_mass_2,
         angle=there.angle if departs else ahead.angle,
     )
-    moved = FreeEnd(
-        torque=slid.torque,
-        angle=angle if departs else slid.angle,
-        angular_velocity=rate if departs else slid.angular_velocity,
-        departs=slid.departs,
+    moved = slid._replace(
+        angle=angle if departs else slid.angle, angular_velocity=rate if departs else slid.angular_velocity
     )
     return WalkEnd(ended.torque, ended.foot, moved), held
 
