@@ -81,6 +81,11 @@ class RequestedTorqueSums(NamedTuple):
     samples: float
 
 
+def is_torque_requested(command: float, task: float) -> bool:
+    """Tell whether a walking controller requests a torque: not in mid-stance, and not while it vents."""
+    return command <= VENTS_ABOVE and task != MID_STANCE
+
+
 def start_requested_torque(_course: ReferenceSummary, _sample: Sample) -> RequestedTorqueSums:
     """Zero sums at the start of a walk."""
     return RequestedTorqueSums(0.0, 0.0, 0.0)
@@ -89,9 +94,8 @@ def start_requested_torque(_course: ReferenceSummary, _sample: Sample) -> Reques
 def update_requested_torque(
     state: RequestedTorqueSums, _course: ReferenceSummary, sample: Sample
 ) -> RequestedTorqueSums:
-    """Add a sample to the sums if a torque is requested: not in mid-stance, and not while the controller vents."""
-    error = sample.reference - sample.torque
-    counts = sample.command <= VENTS_ABOVE and sample.stride.phase != MID_STANCE
+    """Add a sample to the sums if a torque is requested."""
+    error, counts = sample.reference - sample.torque, is_torque_requested(sample.command, sample.stride.phase)
     return RequestedTorqueSums(
         state.squares + (error * error if counts else 0.0),
         state.requested + (sample.reference * sample.reference if counts else 0.0),

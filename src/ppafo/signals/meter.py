@@ -121,7 +121,13 @@ def advance_course(course: ReferenceSummary, sample: Sample) -> ReferenceSummary
     """Summary of a monotone reference after one more sample: first away from its last value, then at rest."""
     # Sample by sample, because a run is not kept; the last value and the largest are known from the profile before.
     away = is_away(sample.reference, course.last, course.tolerance)
-    return course._replace(hold_start=sample.number + 1.0 if away else course.hold_start)
+    return ReferenceSummary(
+        last=course.last,
+        largest=course.largest,
+        tolerance=course.tolerance,
+        hold_start=sample.number + 1.0 if away else course.hold_start,
+        samples=course.samples,
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -376,7 +376,8 @@ def still_change(plant: PlantParameters, begun: StillGas, second: Flows, step: f
     """Mass changes [kg] in one step [s] with a vane at rest, from both stages."""
     change = both_stages(begun.first, second, step)
     # Only a leak can push gas towards the source here, hardly any: what would go back counts as vented.
-    return change._replace(supplied=admitted_flow(change.supplied, plant.relieving))
+    supplied = admitted_flow(change.supplied, plant.relieving)
+    return GasChange(mass_1=change.mass_1, mass_2=change.mass_2, supplied=supplied, leaked=change.leaked)
 
 
 def moving_change(plant: PlantParameters, begun: StillGas, second: Flows, step: float) -> GasChange:
@@ -390,7 +391,9 @@ def moving_change(plant: PlantParameters, begun: StillGas, second: Flows, step: 
     kept = supplied - change.supplied
     # The slope of a fed chamber's draw is below 0, the other's is 0.
     to_1 = kept if begun.linear.supplied_by_1 < begun.linear.supplied_by_2 else 0.0
-    return change._replace(mass_1=change.mass_1 + to_1, mass_2=change.mass_2 + (kept - to_1), supplied=supplied)
+    return GasChange(
+        mass_1=change.mass_1 + to_1, mass_2=change.mass_2 + (kept - to_1), supplied=supplied, leaked=change.leaked
+    )
 
 
 def gas_error(

@@ -75,8 +75,10 @@ def with_lines(linear: Linearisation, share_1: float, share_2: float) -> Lineari
     more_1, more_2 = linear.supplied_by_1 * share_1, linear.supplied_by_2 * share_2
     a, d = linear.a - more_1, linear.d - more_2
     scale = 1.0 / (a * d - linear.b * linear.c)
-    return linear._replace(
+    return Linearisation(
         a=a,
+        b=linear.b,
+        c=linear.c,
         d=d,
         scale=scale,
         supplied_by_1=linear.supplied_by_1 + more_1,
@@ -158,7 +160,12 @@ def with_line(flow: PortFlowSlopes, fraction: float) -> PortFlowSlopes:
     """Flow of a port with derivatives that include the gas lost by its line; ``fraction`` as in ``with_lines``."""
     # A chamber that draws lowers its own supply: the flow responds more strongly.
     more = flow.source_slope * fraction
-    return flow._replace(total_slope=flow.total_slope + more, source_slope=flow.source_slope + more)
+    return PortFlowSlopes(
+        total=flow.total,
+        total_slope=flow.total_slope + more,
+        from_source=flow.from_source,
+        source_slope=flow.source_slope + more,
+    )
 
 
 def mass_from_source(thermal: ThermalParameters, flow: float, state: PlantState, masses: ThermalState) -> float:

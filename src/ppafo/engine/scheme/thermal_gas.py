@@ -519,14 +519,16 @@ def thermal_change(
     to_1 = kept if begun.matrix.slopes.supplied_by_1 < begun.matrix.slopes.supplied_by_2 else 0.0
     to_2 = kept - to_1
     carries = enthalpy_flow_ratio(1.0, thermal.heat_capacity_ratio)
-    return change._replace(
+    return ThermalFlows(
         content_1=change.content_1 + to_1 * carries * begun.matrix.slopes.kept_1,
         content_2=change.content_2 + to_2 * carries * begun.matrix.slopes.kept_2,
         mass_1=change.mass_1 + to_1,
         mass_2=change.mass_2 + to_2,
         supplied=supplied,
+        leaked=change.leaked,
         source_content=change.source_content + kept * carries,
         port_content=change.port_content + kept * carries,
+        heat=change.heat,
     )
 
 
@@ -575,9 +577,14 @@ def after_motion(
     mean_1, mean_2 = 0.5 * (volume_1 + assumed_1), 0.5 * (volume_2 + assumed_2)
     work_1, work_2 = half * (volume_1 - assumed_1), half * (volume_2 - assumed_2)
     # The isentrope between two near volumes, to third order in their difference.
-    return state._replace(
+    return PlantState(
+        angle=state.angle,
+        angular_velocity=state.angular_velocity,
         mass_1=state.mass_1 * (mean_1 - work_1) / (mean_1 + work_1),
         mass_2=state.mass_2 * (mean_2 - work_2) / (mean_2 + work_2),
+        supplied_mass=state.supplied_mass,
+        vented_mass=state.vented_mass,
+        leaked_mass=state.leaked_mass,
     )
 
 
@@ -585,19 +592,22 @@ def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlo
     """State, true masses and totals after adding the changes [kg] of one step, without the work of the gas."""
     vented = change.supplied - change.mass_1 - change.mass_2
     return (
-        state._replace(
+        PlantState(
+            angle=state.angle,
+            angular_velocity=state.angular_velocity,
             mass_1=state.mass_1 + change.content_1,
             mass_2=state.mass_2 + change.content_2,
             supplied_mass=state.supplied_mass + change.supplied,
             vented_mass=state.vented_mass + vented,
             leaked_mass=state.leaked_mass + abs(change.leaked),
         ),
-        masses._replace(
+        ThermalState(
             mass_1=masses.mass_1 + change.mass_1,
             mass_2=masses.mass_2 + change.mass_2,
             supplied_content=masses.supplied_content + change.source_content,
             vented_content=masses.vented_content + change.source_content - change.port_content,
             heat_content=masses.heat_content + change.heat,
+            gas_work=masses.gas_work,
         ),
     )
 
@@ -608,8 +618,14 @@ def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, 
     after_1, after_2 = chamber_pressures(plant, after.angle, after.mass_1, after.mass_2)
     # The mean of the pressures at both ends, over the motion that happened: the trapezoidal rule, as for the vane.
     difference = 0.5 * (before_1 - before_2 + after_1 - after_2)
-    turned = after.angle - before.angle
-    return masses._replace(gas_work=masses.gas_work + difference * plant.displacement_per_radian * turned)
+    return ThermalState(
+        mass_1=masses.mass_1,
+        mass_2=masses.mass_2,
+        supplied_content=masses.supplied_content,
+        vented_content=masses.vented_content,
+        heat_content=masses.heat_content,
+        gas_work=masses.gas_work + difference * plant.displacement_per_radian * (after.angle - before.angle),
+    )
 
 
 def masses_at_start(

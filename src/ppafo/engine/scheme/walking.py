@@ -284,16 +284,18 @@ def depart_in_walk(
 ) -> tuple[WalkEnd, HeldChambers]:
     """End and chambers of a step [s] with a stop, reversal or start of motion; otherwise both are unchanged."""
     angle, rate = depart_free(plant, state, ahead, begun.free, ended.motion, step, parts=parts)
-    slid = ended.motion
-    departs = slid.departs > 0.5
+    departs, slid = ended.motion.departs > 0.5, ended.motion
     there = held_chambers(plant, angle, parts=parts)
     held = HeldChambers(
         per_mass_1=there.per_mass_1 if departs else ahead.per_mass_1,
         per_mass_2=there.per_mass_2 if departs else ahead.per_mass_2,
         angle=there.angle if departs else ahead.angle,
     )
-    moved = slid._replace(
-        angle=angle if departs else slid.angle, angular_velocity=rate if departs else slid.angular_velocity
+    moved = FreeEnd(
+        torque=slid.torque,
+        angle=angle if departs else slid.angle,
+        angular_velocity=rate if departs else slid.angular_velocity,
+        departs=slid.departs,
     )
     return WalkEnd(ended.torque, ended.foot, moved), held
 

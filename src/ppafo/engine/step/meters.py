@@ -38,10 +38,6 @@ def make_sample(parts: Program, lane: Lane, elapsed: float, index: int, interval
     pressure_1, pressure_2 = present_pressures(parts, lane)
     torque = parts.actuator.torque(lane.plant, lane.state.angle, pressure_1, pressure_2)
     time = elapsed * lane.timing.step
-    temperature_1, temperature_2 = 0.0, 0.0
-    if parts.is_thermal:
-        temperature_1 = temperature(lane.thermal, lane.state.mass_1, lane.masses.mass_1)
-        temperature_2 = temperature(lane.thermal, lane.state.mass_2, lane.masses.mass_2)
     # Extremes over the chambers are of chamber 1 where it is the only one.
     lane.sample = Sample(
         number=float(index),
@@ -53,8 +49,8 @@ def make_sample(parts: Program, lane: Lane, elapsed: float, index: int, interval
         command=lane.result.command,
         value=parts.controlled_value(lane.state.angle, pressure_1, pressure_2, torque),
         reference=set_point_at(parts, lane, time),
-        temperature_1=temperature_1,
-        temperature_2=temperature_1 if parts.has_one_chamber else temperature_2,
+        temperature_1=temperature(lane.thermal, lane.state.mass_1, lane.masses.mass_1) if parts.is_thermal else 0.0,
+        temperature_2=temperature_of_chamber_2(parts, lane) if parts.is_thermal else 0.0,
         gas=gas_sample(parts, lane),
         energy=energy_sample(parts, lane),
         foot=parts.foot.sample(parts, lane, time) if parts.foot is not None and parts.is_on_gait else NO_FOOT,
@@ -65,6 +61,13 @@ def make_sample(parts: Program, lane: Lane, elapsed: float, index: int, interval
 def temperature(thermal: ThermalParameters, content: float, mass: float) -> float:
     """Temperature of the gas in a chamber [K], from its energy content [kg] and its true mass [kg]."""
     return thermal.temperature * (content / mass)
+
+
+def temperature_of_chamber_2(parts: Program, lane: Lane) -> float:
+    """Temperature of the gas in chamber 2, or in the only chamber [K]."""
+    if parts.has_one_chamber:
+        return temperature(lane.thermal, lane.state.mass_1, lane.masses.mass_1)
+    return temperature(lane.thermal, lane.state.mass_2, lane.masses.mass_2)
 
 
 def gas_sample(parts: Program, lane: Lane) -> GasSample:
