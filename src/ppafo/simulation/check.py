@@ -242,7 +242,13 @@ def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstima
             errors[signal.unit] = MARGIN * float(np.max(differences))
         for name in result.metrics:
             metric_errors[name] = MARGIN * abs(_difference(_value(fine, name), _value(result, name)))
-    shares = _relative_errors(result, metric_errors)
+    # Relative to the metric's value or, if larger, to the range of its quantity.
+    scales = {
+        name: max(abs(metric.value), _metric_range(result, name, metric.unit))
+        for name, metric in result.metrics.items()
+        if math.isfinite(metric.value)
+    }
+    shares = {name: metric_errors[name] / scale for name, scale in scales.items() if 0.0 < scale < math.inf}
     worst = max(shares, key=lambda name: shares[name], default="")
     over_promise = max(
         errors[signal.unit] / (signal.promised_error * _signal_range(result, signal.unit)) for signal in signals
@@ -285,16 +291,6 @@ def _pressure_range(result: RecordedResult) -> float:
     constant = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
     chambers = [result.recording[name] for name in ("pressure_1", "pressure_2") if name in result.recording]
     return float(np.ptp(np.concatenate([*chambers, constant]))) or supply.atmospheric_pressure
-
-
-def _relative_errors(result: RecordedResult, errors: Mapping[str, float]) -> dict[str, float]:
-    """Relative errors of metrics [-]: divided by the metric's value or, if larger, the range of its quantity."""
-    scales = {
-        name: max(abs(metric.value), _metric_range(result, name, metric.unit))
-        for name, metric in result.metrics.items()
-        if math.isfinite(metric.value)
-    }
-    return {name: errors[name] / scale for name, scale in scales.items() if 0.0 < scale < math.inf}
 
 
 def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:

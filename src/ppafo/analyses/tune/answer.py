@@ -134,7 +134,7 @@ def finding_of(tuned: Tuned) -> Finding[Tuned]:
     listed = ", ".join(json.dumps(line, ensure_ascii=False) for line in tuned.overrides)
     pasted = (
         f"# {tuned.verdict}\n\n# on the command line\n{options}\n\n# in a study file\noverrides = [{listed}]\n\n"
-        f"# in Python\n{motion_kind.python_call(name, listed)}\n"
+        f"# in Python\n{motion_kind.python_call.format(name=name, overrides=listed)}\n"
     )
     return Finding(
         name="tune",
