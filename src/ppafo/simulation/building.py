@@ -42,7 +42,7 @@ from ppafo.simulation.document import (
     kind_at,
     value_at,
 )
-from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
+from ppafo.simulation.following import numbers_of_lines, read_followers
 from ppafo.simulation.hardware import device_error, read_device, read_hardware
 from ppafo.simulation.law_signals import LEG_PATHS, MOVED, PERIOD_PATH, seen_in_scenario
 from ppafo.simulation.motion_kind import MOTIONS, RunTimes
@@ -192,8 +192,8 @@ def _control(
     )
     lines = None if supply_line is None else supply_line.row(device.supply)
     terms = nominal_terms(device, lines) | loop_terms(device, CONTROLLERS[kind], signals, controlled)
-    sensor_numbers = {quantity.name: getattr(sensors, quantity.name) for quantity in SENSORS}
-    sources = numbers_of_sensors(sensor_numbers) | numbers_of_lines(lines) | {PERIOD_PATH: period}
+    sources = {f"sensors.{quantity.name}": getattr(sensors, quantity.name) for quantity in SENSORS}
+    sources |= numbers_of_lines(lines) | {PERIOD_PATH: period}
     sources |= {f"reference.{name}": number for name, number in reference.settings.items()}
     if is_locked:
         sources[LOCKED_ANGLE] = motion.locked_angle

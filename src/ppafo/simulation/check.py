@@ -314,7 +314,15 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
     results = rerun([planned for _, planned in runs])
     repeats = [(kind, repeat) for (kind, _), repeat in zip(runs, results, strict=True)]
     signals = _recorded_signals(result)
-    courses = tuple(_signal_check(name, signal, repeats, result) for name, signal in signals.items())
+    courses = []
+    for name, signal in signals.items():
+        extent = _signal_range(result, signal.unit)
+        changes = _largest_changes(
+            (kind, float(np.max(_largest_differences(repeat.recording, recording, signal.channels))))
+            for kind, repeat in repeats
+        )
+        promised = signal.promised_error * extent / MARGIN
+        courses.append(NumberCheck(name, signal.unit, extent, ALLOWED_PARTING * extent, changes, promised))
     separations = [repeat.status.time for repeat in results if repeat.status.time is not None]
     for course in courses:
         for repeat in results:
@@ -324,7 +332,7 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
     return Check(
         scenario=scenario.name,
         metrics=_metric_checks(result, repeats),
-        courses=courses,
+        courses=tuple(courses),
         error=estimated_error(result, results[0]),
         parts_at=min(separations, default=None),
         failed=tuple(dict.fromkeys(kind for kind, repeat in repeats if not repeat.status.is_completed)),
@@ -437,16 +445,3 @@ def _largest_differences(recording: Recording, other: Recording, channels: Itera
     # A repeat that diverged is shorter.
     count = min(len(recording), len(other))
     return np.asarray(np.max([np.abs(recording[name][:count] - other[name][:count]) for name in channels], axis=0))
-
-
-def _signal_check(
-    name: str, signal: _ComparedSignal, repeats: list[tuple[str, RecordedResult]], result: RecordedResult
-) -> NumberCheck:
-    """Largest changes of a signal over time."""
-    extent = _signal_range(result, signal.unit)
-    changes = _largest_changes(
-        (kind, float(np.max(_largest_differences(repeat.recording, result.recording, signal.channels))))
-        for kind, repeat in repeats
-    )
-    promised = signal.promised_error * extent / MARGIN
-    return NumberCheck(name, signal.unit, extent, ALLOWED_PARTING * extent, changes, promised)

@@ -43,7 +43,7 @@ def task_panels(before: GainResult, after: GainResult) -> list[Panel]:
     controlled = controlled_in(recording) or CONTROLLED[TORQUE]
     words, unit = controlled.words, controlled.level.unit
     level = Kind(words[:1].upper() + words[1:], unit, quantity_of_unit(unit))
-    followed = _traces(controlled.channel, before, after)
+    followed = _traces(controlled.name, before, after)
     if controlled.reference in recording:
         dashed = {"linestyle": "--", "linewidth": 1.2}
         reference = recording[controlled.reference]
