@@ -53,6 +53,10 @@ _OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
     angle_loop.REST_DISTANCE: angle_loop.rest_distance,
 }
 """Rule for each number that depends on torque loop and joint."""
+GAIN_TERMS = frozenset(
+    (*_OF_LOOP, *_OF_REACH, *_OF_JOINT, torque_loop.OPENING, torque_loop.INTEGRAL_GAIN, torque_loop.LEARNING_GAIN)
+) - {torque_loop.REACH, RATE, DEAD_TIME}
+"""Names of the numbers that are gains of a controller, and not numbers of the device."""
 
 
 class _GainParts(NamedTuple):

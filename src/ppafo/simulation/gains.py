@@ -2,47 +2,19 @@
 
 from dataclasses import dataclass
 
-from ppafo.control import angle_loop, torque_loop
 from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.ports import load_torque
 from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import LinkFunction
 from ppafo.simulation.declaration import law_settings
-from ppafo.simulation.default_gains import DEAD_TIME, RATE, loop_terms
+from ppafo.simulation.default_gains import DEAD_TIME, GAIN_TERMS, RATE, loop_terms
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
 
-_OF_LOOP = frozenset(
-    (
-        torque_loop.PROPORTIONAL_GAIN,
-        torque_loop.INTEGRAL_GAIN,
-        torque_loop.INTEGRAL_RATE,
-        torque_loop.BOUNDARY,
-        torque_loop.CONVERGENCE,
-        torque_loop.DEAD_ZONE,
-        torque_loop.RELEASE,
-        torque_loop.OPENING,
-        torque_loop.LEARNING_GAIN,
-        torque_loop.LEAD,
-        angle_loop.ANGLE_STIFFNESS,
-        angle_loop.ANGLE_DAMPING,
-        angle_loop.RATE_FILTER,
-        angle_loop.INNER_GAIN,
-        angle_loop.GRAVITY,
-        angle_loop.INERTIA,
-        angle_loop.FRICTION,
-        angle_loop.STATIC_FRICTION,
-        angle_loop.LOAD_TIME,
-        angle_loop.TORQUE_LAG,
-        angle_loop.TOLERANCE,
-        angle_loop.REST_DISTANCE,
-    )
-)
-
 
 @dataclass(frozen=True, slots=True)
-class Gain:
+class _Gain:
     """Controller gain in use: name, unit and value [SI]; ``computed`` if derived from the device, otherwise given."""
 
     name: str
@@ -59,7 +31,7 @@ class Gains:
     time of the loop [s].
     """
 
-    gains: tuple[Gain, ...]
+    gains: tuple[_Gain, ...]
     torque_rate: float
     dead_time: float
     unit: str = "N m"
@@ -88,12 +60,14 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     """Return the gains in use of a scenario's torque controller; None for a controller without such gains."""
     if scenario.controller.is_outside:
         return None
-    items = [quantity for quantity in law_settings(law, scenario.controlled) if _OF_LOOP.intersection(quantity.follows)]
+    items = [
+        quantity for quantity in law_settings(law, scenario.controlled) if GAIN_TERMS.intersection(quantity.follows)
+    ]
     if not items:
         return None
     links, terms = scenario.links, terms_of(scenario, law)
     gains = tuple(
-        Gain(
+        _Gain(
             quantity.name,
             quantity.unit,
             float(scenario.controller.settings[quantity.name]),

@@ -155,7 +155,7 @@ def shaped_growth(settings: Any, stops: Range, around: Surroundings, *, parts: _
     return mean_growth(parts.shape(settings, stops), stops, gauge, parts.chambers)
 
 
-class ChambersOf(NamedTuple):
+class _ChambersOf(NamedTuple):
     """Functions of an actuator for its ``MeanChambers`` at the usual angle, at any angle, and for its mean ``growth``.
 
     ``sources`` are the paths of their arguments and ``rows`` the types into which these are grouped. ``at`` takes the
@@ -169,7 +169,7 @@ class ChambersOf(NamedTuple):
     rows: tuple[type, ...]
 
 
-def chambers_of(device: Device) -> ChambersOf:
+def chambers_of(device: Device) -> _ChambersOf:
     """Return the functions that compute the mean chambers of a device from its numbers."""
     actuator = device.actuator
     kind = ACTUATORS[actuator.kind]
@@ -183,7 +183,7 @@ def chambers_of(device: Device) -> ChambersOf:
     )
     if actuator.kind == VANE:
         usual = made_of(usual_chambers, "usual_chambers_of_vane", _ChamberParts(vane_at))
-        return ChambersOf(function=usual, at=vane_at, growth=vane_growth, sources=sources, rows=rows)
+        return _ChambersOf(function=usual, at=vane_at, growth=vane_growth, sources=sources, rows=rows)
     name, model, shape = actuator.kind, kind.model, kind.model.prepare
     if actuator.table is not None:
         shape = made_of(measured_shape_of, f"shape_of_{name}", _MeasuredParts(model.prepare, actuator.table))
@@ -191,7 +191,7 @@ def chambers_of(device: Device) -> ChambersOf:
     at = made_of(shaped_at, f"chambers_at_of_{name}", shaped)
     middle = made_of(usual_chambers, f"usual_chambers_of_{name}", _ChamberParts(at))
     growth = made_of(shaped_growth, f"growth_of_{name}", shaped)
-    return ChambersOf(function=middle, at=at, growth=growth, sources=sources, rows=rows)
+    return _ChambersOf(function=middle, at=at, growth=growth, sources=sources, rows=rows)
 
 
 def quicker_at(device: Device, angle: float, controlled: str) -> float:

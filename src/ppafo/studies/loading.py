@@ -106,7 +106,7 @@ def load_study(
 
 
 @dataclass(frozen=True, slots=True)
-class StudySource:
+class _StudySource:
     """Source of a study: its name in messages, folder of its relative paths, and text in bytes, None for data."""
 
     file: str
@@ -114,12 +114,12 @@ class StudySource:
     text: bytes
 
 
-def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], StudySource]:
+def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], _StudySource]:
     """Return a document that may be modified, and its source: a file of a kind, by name or path, or data."""
     if isinstance(named, Mapping):
         kind.check_depth(named, kind.noun)
-        return copy.deepcopy(dict(named)), StudySource(kind.noun, Path(), b"")
-    source = StudySource(label(str(named)), Path(named).parent, kind.read(named))
+        return copy.deepcopy(dict(named)), _StudySource(kind.noun, Path(), b"")
+    source = _StudySource(label(str(named)), Path(named).parent, kind.read(named))
     return kind.parse(source.text, source.file), source
 
 

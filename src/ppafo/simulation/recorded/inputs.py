@@ -52,12 +52,15 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
     command = _values_at_steps(inputs, COMMAND, run) if COMMAND in inputs.names else None
     # The parameters that follow a recording [SI], for every step.
     followed: dict[str, Floats] = {}
-    if SUPPLY in inputs.names:
-        followed |= dict.fromkeys(supply_paths(device), _values_at_steps(inputs, SUPPLY, run))
-    if DORSIFLEXION_SUPPLY in inputs.names:
-        followed[_DORSIFLEXION_PATH] = _values_at_steps(inputs, DORSIFLEXION_SUPPLY, run)
-    if EXTERNAL_TORQUE in inputs.names:
-        followed["plant.external_torque"] = _values_at_steps(inputs, EXTERNAL_TORQUE, run)
+    # Later ones prevail: a regulator with a recording of its own does not follow the supply.
+    paths_of_channel = {
+        SUPPLY: supply_paths(device),
+        DORSIFLEXION_SUPPLY: (_DORSIFLEXION_PATH,),
+        EXTERNAL_TORQUE: ("plant.external_torque",),
+    }
+    for channel, paths in paths_of_channel.items():
+        if channel in inputs.names:
+            followed |= dict.fromkeys(paths, _values_at_steps(inputs, channel, run))
     if ANGLE in inputs.names:
         # The straight segment in effect at each step; after the last sample the vane stands still.
         time = inputs.recording.time - inputs.start

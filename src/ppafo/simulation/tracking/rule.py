@@ -248,7 +248,7 @@ def failure_of_walk(settled: SettledPart, turning: float, limit: float) -> Failu
     return "overshoots" if limit > 0.0 and settled.peak > LARGEST_PEAK_WALK * limit else "does not follow"
 
 
-class TaskExcess(NamedTuple):
+class _TaskExcess(NamedTuple):
     """Numbers of a task, each divided by its limit.
 
     ``off`` is the remaining error, ``swings`` the oscillation of the value, ``peak`` the overshoot, and ``still`` the
@@ -275,7 +275,7 @@ def largest_error(settled: SettledPart, only_switches: bool) -> Floats:
     return limit
 
 
-def excess_of_task(settled: SettledPart, only_switches: bool) -> TaskExcess:
+def excess_of_task(settled: SettledPart, only_switches: bool) -> _TaskExcess:
     """Numbers of a task divided by their limits, apart from command reversals: the task follows if none is above 1.
 
     ``only_switches`` is true for a controller without gradual openings. The numbers of ``settled`` may be arrays
@@ -305,7 +305,7 @@ def excess_of_task(settled: SettledPart, only_switches: bool) -> TaskExcess:
     peak = np.where(is_counted, settled.peak / (LARGEST_PEAK * settled.wanted), 0.0)
     is_still = (share > LARGEST_SHARE) & (settled.moved <= SMALLEST_MOVE * settled.wanted)
     still = np.where(is_still, share / LARGEST_SHARE, 0.0)
-    return TaskExcess(off=off, swings=swings, peak=peak, still=still)
+    return _TaskExcess(off=off, swings=swings, peak=peak, still=still)
 
 
 def failure_of_task(settled: SettledPart, turning: float, only_switches: bool) -> Failure | None:
