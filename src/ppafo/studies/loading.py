@@ -123,7 +123,7 @@ def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[
     return kind.parse(source.text, source.file), source
 
 
-def _build(parsed: declared.StudyFile, document: dict[str, Any], source: StudySource) -> Study:
+def _build(parsed: declared.StudyFile, document: dict[str, Any], source: _StudySource) -> Study:
     """Return the study of a file, with everything in SI units; StudyError for a study that cannot be run.
 
     ``document`` is the file as plain data, which the study keeps.
