@@ -278,15 +278,13 @@ def _recorded_signals(result: RecordedResult) -> dict[str, _ComparedSignal]:
 
 
 def _signal_range(result: RecordedResult, unit: str) -> float:
-    """Range of the angle [rad] or of the pressures [Pa], or the gas temperature [K]."""
+    """Range of the angle [rad] or of the pressures [Pa], or the gas temperature [K].
+
+    Pressures are those of chambers, supplies and atmosphere; the atmospheric pressure if their range is 0.
+    """
     actuator = result.scenario.device.actuator
-    if unit == "Pa":
-        return _pressure_range(result)
-    return actuator.angle_max - actuator.angle_min if unit == "rad" else result.scenario.device.gas.temperature
-
-
-def _pressure_range(result: RecordedResult) -> float:
-    """Range of the chamber, supply and atmospheric pressures [Pa]; the atmospheric pressure if the range is 0."""
+    if unit != "Pa":
+        return actuator.angle_max - actuator.angle_min if unit == "rad" else result.scenario.device.gas.temperature
     supply = result.scenario.device.supply
     constant = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
     chambers = [result.recording[name] for name in ("pressure_1", "pressure_2") if name in result.recording]
@@ -310,7 +308,7 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
     starts = [start_moved(run, move, opposite) for opposite in (1.0, -1.0) for move in (MOVE, -MOVE)]
     runs = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]
     if not run.program.ideal_sensors:
-        runs += [(MOVED_MEASUREMENT, noisy) for noisy in _measurement_moved(run, _pressure_range(result))]
+        runs += [(MOVED_MEASUREMENT, noisy) for noisy in _measurement_moved(run, _signal_range(result, "Pa"))]
     results = rerun([planned for _, planned in runs])
     repeats = [(kind, repeat) for (kind, _), repeat in zip(runs, results, strict=True)]
     signals = _recorded_signals(result)
