@@ -197,7 +197,7 @@ def chambers_of(device: Device) -> _ChambersOf:
 def quicker_at(device: Device, angle: float, controlled: str) -> float:
     """Rate of a torque or pressure at an angle [rad], divided by the rate at the angle used for the gains [-].
 
-    A rate is that of the faster chamber per volume flow at full opening [N m/m^3 or Pa/m^3].
+    Rates are per volume flow at full opening of the valve [N m/m^3 or Pa/m^3], for the faster chamber.
     """
     actuator, supply = device.actuator, device.supply
     plant, torque, model = plant_parameters(device), static_torque(device), ACTUATORS[actuator.kind].model
