@@ -109,7 +109,7 @@ def load_configuration(
 
 def _load(
     document: dict[str, Any],
-    source: "StudySource",
+    source: "_StudySource",
     changes: tuple[str, ...],
     draws: int | None = None,
     seed: int | None = None,
