@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -84,14 +83,14 @@ class ReadAt:
 
     def __call__(self, readings: Readings) -> Floats:
         """Metric of runs without recording (runs,)."""
-        row: Any = readings
-        numbers = [reduce(_entry, place.split("."), row) for place in self.places]
+        numbers = []
+        for place in self.places:
+            number: Any = readings
+            for name in place.split("."):
+                number = number[name] if isinstance(number, Mapping) else getattr(number, name)
+            numbers.append(number)
         found: Floats = numbers[0] if self.function is None else self.function(*numbers)
         return found
-
-
-def _entry(row: Any, name: str) -> Any:
-    return row[name] if isinstance(row, Mapping) else getattr(row, name)
 
 
 def less(number: Floats, other: Floats) -> Floats:
@@ -158,7 +157,7 @@ def for_each_reference(kinds: tuple[MetricKind, ...], rename: Callable[[str, str
             name=rename(kind.name, name),
             unit=controlled.difference if kind.unit == "N m" else kind.unit,
             summary=kind.summary.replace("torque", controlled.words).replace("the largest reference", _WAY),
-            channels=(controlled.channel, controlled.reference),
+            channels=(controlled.name, controlled.reference),
             of_reference=name,
         )
         for name, controlled in CONTROLLED.items()
@@ -180,7 +179,7 @@ def reference_of(recording: Recording) -> Floats:
 
 def followed(recording: Recording) -> tuple[Floats, Floats]:
     """Return the reference in a recording, which must have one, and the controlled quantity."""
-    channel = next(kind.channel for kind in CONTROLLED.values() if kind.reference in recording)
+    channel = next(kind.name for kind in CONTROLLED.values() if kind.reference in recording)
     return reference_of(recording), recording[channel]
 
 
