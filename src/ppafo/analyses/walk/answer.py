@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
@@ -12,7 +12,6 @@ from ppafo.analyses.walk.bottle import bottle_data, bottle_parts
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes, versions, walk_document
 from ppafo.analyses.walk.task_sequence import (
     segments_csv,
-    task_sequence_data,
     task_sequence_parts,
     task_sequence_pictures,
     trust_remark,
@@ -110,6 +109,13 @@ class _WalkPair:
     def json_document(self) -> dict[str, Any]:
         """Return the metrics (with the device, without it, healthy) and the events as plain data in SI units."""
         worn, bare, verdict = self.comparison.with_device, self.comparison.without_device, self.tracking
+        sequence, segments = walk_of(worn.scenario).task_sequence, {}
+        if sequence is not None:
+            segments = {
+                "task_sequence": sequence.name,
+                "segments": [asdict(segment) for segment in worn.segments],
+                "segments_off": [asdict(segment) for segment in bare.segments],
+            }
         return {
             "format": WALK_FORMAT,
             "schema_version": SCHEMA_VERSION,
@@ -125,7 +131,7 @@ class _WalkPair:
             "tracking": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
             "gains": plain(gains_of(worn.scenario, law_of(worn.scenario))),
             "minutes": float(worn.recording.time[-1]) / 60.0,
-            **task_sequence_data(self.comparison),
+            **segments,
             **bottle_data(worn),
             "metrics_vented": plain(dict(worn.vented_metrics)),
             "healthy": plain(dict(self.comparison.healthy)),

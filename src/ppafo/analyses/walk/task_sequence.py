@@ -1,9 +1,8 @@
-"""Task sequence in the report of a walk: table of the segments, remarks, data, files and figures."""
+"""Task sequence in the report of a walk: table of the segments, remarks, file of the segments and figures."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, fields
 from functools import partial
-from typing import Any
 
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes
 from ppafo.errors import DataError
@@ -118,19 +117,6 @@ def segments_csv(segments: Sequence[SegmentResult]) -> bytes:
     names = [field.name for field in fields(SegmentResult) if field.name != "title"]
     heads = {name: f"{name} [{units[name]}]" if name in units else name for name in names}
     return csv_of({head: [getattr(segment, name) for segment in segments] for name, head in heads.items()})
-
-
-def task_sequence_data(comparison: WalkComparison) -> dict[str, Any]:
-    """Return the segments as data in SI units; {} for a walk without a task sequence."""
-    worn, bare = comparison.with_device, comparison.without_device
-    sequence = walk_of(worn.scenario).task_sequence
-    if sequence is None:
-        return {}
-    return {
-        "task_sequence": sequence.name,
-        "segments": [asdict(segment) for segment in worn.segments],
-        "segments_off": [asdict(segment) for segment in bare.segments],
-    }
 
 
 def trust_remark(configuration: Scenario) -> str:
