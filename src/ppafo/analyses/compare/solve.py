@@ -164,7 +164,7 @@ def compared(
     remarks = remarks_of(comparison)
     if study is not None and study.drawn and draws.requested is None and study.sample.runs != draws.count:
         remarks.append(
-            f"the {study.sample.runs:,} runs of study '{study.name}' belong to 'ppafo sweep'; 'compare' takes "
+            f"the {study.sample.runs:,} runs of study '{study.name}' are for 'ppafo sweep'; 'compare' takes "
             f"{draws.count:,} draws, or as many as --draws says"
         )
     return replace(comparison, remarks=remarks)

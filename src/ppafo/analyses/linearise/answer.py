@@ -17,7 +17,7 @@ from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Initial, with_control
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, with_control
 from ppafo.units.shown import in_units, quantity_of_unit
 
 if TYPE_CHECKING:
@@ -95,10 +95,11 @@ def _value_at_point(model: LinearModel, name: str) -> float:
 
 def _torque(model: LinearModel, command: float) -> Floats:
     """Torque [N m] (times,) of a run from the steady state under another constant command [-]."""
+    start = {state.name: state.value for state in model.states if state.name.startswith("pressure")}
     scenario = replace(
         with_control(model.scenario, Control(PYTHON_CONTROLLER, {}, INTERVAL)),
         run=replace(model.scenario.run, duration=DURATION, step=INTERVAL, output_interval=INTERVAL),
-        initial=Initial(_value_at_point(model, "pressure_1"), _value_at_point(model, "pressure_2")),
+        initial=replace(model.scenario.initial, **start),
     )
     run = plan_run(scenario)
     record = replay(batch_of(run), StepInputs(np.full(run.step_count, command), {})).record[:, :, 0]
@@ -289,7 +290,7 @@ def steps_panels(model: LinearModel) -> list[Panel]:
             replace(TIME, words="Time after the step"),
             Kind("Change of torque per command", "N m"),
             [*over_time, linear],
-            legend="inside",
+            legend="above",
         ),
         Panel(
             Kind("Largest change of torque in a step", "N m"),

@@ -78,7 +78,8 @@ class LinearisedPlant:
         more = (
             ("angle", "angular_velocity") if self.direction is None else ("external_torque",) if self.direction else ()
         )
-        return ("command", "supply_pressure", "dorsiflexion_pressure", *more)
+        supplies = DRIVEN[:1] if self.run.program.has_one_chamber else DRIVEN[:2]
+        return ("command", *supplies, *more)
 
     def at(self, values: Mapping[str, float]) -> _PlantValues:
         """Return time derivatives and outputs for values of all states and inputs by name [SI].

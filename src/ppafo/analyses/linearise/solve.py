@@ -24,6 +24,7 @@ from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError, UnitError, refused_as
 from ppafo.model.orifice import FlowCurve
 from ppafo.parameters.joint import JointNames
+from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import parse_quantity
@@ -47,7 +48,10 @@ def sides_of(run: Run, point: Point, joint: JointNames) -> dict[str, str]:
         "chamber 2 to atmosphere": (pressure_2, atmosphere, openings.vent_2),
     }
     regimes = {name: _regime(plant.valve_curve, *values) for name, values in paths.items()}
-    regimes["leak over the vane"] = _regime(plant.leak_curve, pressure_1, pressure_2, 1.0)
+    if run.program.has_one_chamber:
+        regimes = {name: regime for name, regime in regimes.items() if "chamber 2" not in name}
+    else:
+        regimes["leak over the vane"] = _regime(plant.leak_curve, pressure_1, pressure_2, 1.0)
     motion = {
         None: "prescribed",
         0.0: "at rest",
@@ -112,7 +116,9 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     here = plant.at(values)
     slopes = {name: _both_slopes(plant, values, name) for name in (*here.rates, *plant.inputs)}
     # What the valve takes from its command at once is no state: nothing but the output that shows it asks for it.
-    rows, idle = [*(f"rate of {state}" for state in here.rates), *here.outputs], []
+    rows = [*(f"rate of {state}" for state in here.rates), *here.outputs]
+    # A second chamber that the actuator lacks stays at the atmosphere, without any slope.
+    idle = [name for name in here.rates if run.program.has_one_chamber and name in OF_SECOND_CHAMBER]
     for name in (name for name in here.rates if name.startswith(VALVE)):
         other_rows = [row != name for row in rows]
         if not any(np.any(side[other_rows]) for side in slopes[name][:2]):
@@ -124,6 +130,8 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     count = len(states)
     a, b, c, d = near[:count, :count], near[:count, count:], near[count:, :count], near[count:, count:]
     sides = sides_of(run, point, scenario.device.joint)
+    if point.direction is None and scenario.motion.locked_angle is not None:
+        sides[scenario.device.joint.name] = "locked"
     if not np.any(b[:, 0]) and not np.any(d[:, 0]):
         sides["valve"] += f"; {DEAF}"
     sizes = np.array([size_of(name) for name in columns])

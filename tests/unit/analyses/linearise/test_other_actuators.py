@@ -79,3 +79,12 @@ def test_a_load_has_the_slopes_of_its_formula_on_every_actuator() -> None:
         more = (model.a - without.a)[row]
         assert more[by_angle] == pytest.approx(-8.0 / inertia, rel=1e-4), case
         assert more[row] == pytest.approx(-2.0 * 0.05 * abs(rate) / inertia, rel=1e-4), case
+
+
+def test_the_linear_model_of_one_chamber_has_one_pressure() -> None:
+    scenario = load_scenario(ACTUATORS / "torque-task-measured-bladder.toml")
+    model = linear_model(scenario, "equilibrium")
+    assert [state.name for state in model.states] == ["pressure_1"]
+    assert "dorsiflexion_pressure" not in [signal.name for signal in model.inputs]
+    assert not [name for name in model.sides if "chamber 2" in name or "leak" in name]
+    assert model.sides["ankle"] == "locked"
