@@ -1,7 +1,8 @@
 """Comparison of configurations: nominal runs, and runs over the same draws of uncertain values."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import NamedTuple
 
 from ppafo.analyses.compare.answer import ComparisonResult, ConfigurationResult, TaskComparison, front_of, remarks_of
@@ -224,9 +225,17 @@ def _task_result(
 ) -> TaskComparison:
     """Return the results of a task; with draws, also paired statistics and probabilities of being the best."""
     base = next(case for case in cases if case.configuration == baseline)
-    pairs = {
-        case.configuration: list(_paired_metrics(base, case, metrics, confidence)) for case in cases if case is not base
-    }
+    pairs: dict[str, list[PairedMetric]] = {case.configuration: [] for case in cases if case is not base}
+    for case, name in product(cases, metrics):
+        if case is base or base.rows is None or case.rows is None:
+            continue
+        noise = None
+        if base.renoised is not None and case.renoised is not None:
+            noise = base.renoised[name], case.renoised[name]
+        pair = compare_pairs(name, base.rows[name], case.rows[name], COMPARED[name], confidence, noise)
+        # Without a pair of values a metric has no statistics.
+        if pair is not None:
+            pairs[case.configuration].append(pair)
     # A case that does not follow its reference is not among the best.
     following = [case for case in cases if case.follows]
     rows = [case.rows for case in following if case.rows is not None]
@@ -239,18 +248,3 @@ def _task_result(
             shares = best_probabilities([row[name] for row in rows], better, confidence)
             best[name] = dict(zip([case.configuration for case in following], shares, strict=False))
     return TaskComparison(task, list(overrides), cases, front_of(cases), pairs, best)
-
-
-def _paired_metrics(
-    base: ConfigurationResult, other: ConfigurationResult, metrics: Sequence[str], confidence: float
-) -> Iterator[PairedMetric]:
-    """Yield the paired statistics of two configurations for each metric with a pair of values; none without draws."""
-    if base.rows is None or other.rows is None:
-        return
-    for name in metrics:
-        noise = None
-        if base.renoised is not None and other.renoised is not None:
-            noise = base.renoised[name], other.renoised[name]
-        pair = compare_pairs(name, base.rows[name], other.rows[name], COMPARED[name], confidence, noise)
-        if pair is not None:
-            yield pair

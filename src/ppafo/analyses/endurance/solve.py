@@ -82,22 +82,18 @@ def endurance_of_gas_use(
         recording, run = read_recording(Path(str(use))), Path(str(use)) / RUN_FILE
         document = read_json(run) if run.is_file() else {}
         units = dict(stated_units(run, document)) if document else {}
-        _check_gas(run, document, full)
+        # A device that was fed with another gas than the bottle holds says nothing of this bottle.
+        gas_data: Any = document
+        for key in ("scenario", "device", "gas"):
+            gas_data = gas_data.get(key) if isinstance(gas_data, dict) else None
+        molar_mass, fluid = gas_data.get("molar_mass") if isinstance(gas_data, dict) else None, full.fluid.name
+        if isinstance(molar_mass, float) and not is_of_bottle(molar_mass, full):
+            raise DataError(
+                f"{run}: its device is fed with gas of {1.0e3 * molar_mass:.4g} g/mol, and bottle '{full.name}' holds "
+                f"{fluid}: take a bottle of that gas (ppafo bottle --list), or simulate with gas.species={fluid}"
+            )
     endurance = follow_bottle(full, demand_of_recording(recording, stride_time), schedule)
     return replace(endurance, is_of_recording=stride_time is None, device_units=units)
-
-
-def _check_gas(run: Path, document: Any, bottle: Bottle) -> None:
-    """Raise DataError for a run whose device was fed with another gas than the bottle holds."""
-    gas: Any = document
-    for key in ("scenario", "device", "gas"):
-        gas = gas.get(key) if isinstance(gas, dict) else None
-    molar_mass, fluid = gas.get("molar_mass") if isinstance(gas, dict) else None, bottle.fluid.name
-    if isinstance(molar_mass, float) and not is_of_bottle(molar_mass, bottle):
-        raise DataError(
-            f"{run}: its device is fed with gas of {1.0e3 * molar_mass:.4g} g/mol, and bottle '{bottle.name}' holds "
-            f"{fluid}: take a bottle of that gas (ppafo bottle --list), or simulate with gas.species={fluid}"
-        )
 
 
 @checked

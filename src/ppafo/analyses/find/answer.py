@@ -97,7 +97,7 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
             value=None if index is None else float(tried["value"][index]),
             metric_at_value=None if index is None else float(tried["metric"][index]),
             not_met_at=neighbour,
-            changes=_changes(outcome),
+            changes=int(np.count_nonzero(np.diff(outcome.is_met))),
             met=met,
             remarks=remarks,
             noise_streams=outcome.noise_streams,
@@ -108,11 +108,6 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
         ),
         passed=index is not None,
     )
-
-
-def _changes(outcome: FindResult) -> int:
-    """Return the number of changes between met and not met along the tried values."""
-    return int(np.count_nonzero(np.diff(outcome.is_met)))
 
 
 def _not_followed(outcome: FindResult) -> int:
@@ -153,7 +148,7 @@ def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
         f"{evenly} values from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])}, evenly, then "
         f"{tried.size - evenly} more in the bracket; the condition is met {where}"
     )
-    if (changes := _changes(outcome)) > 1:
+    if (changes := np.count_nonzero(np.diff(is_met))) > 1:
         side = "below" if outcome.highest else "above"
         yield (
             f"the condition changes {changes} times over the range, so it is not met everywhere {side} this "

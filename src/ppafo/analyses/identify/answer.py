@@ -1,7 +1,7 @@
 """Report of an identification: estimates and checks in the units of the parameter set, new set, figures."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -37,6 +37,8 @@ _MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
 """Range of the number of digits; more than the minimum only for narrow intervals."""
 _FAR_FROM_SET = 5.0
 """Ratio to the previous value above which a wrong unit is suspected: 6.89 is psi read as kPa, 8.85 N m as lbf in."""
+_ROW_HEAD = ("",) * 4
+"""Column heads of the rows of ``estimate_row``, which need none."""
 _KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
 _CHANNELS = {
     "angle": (Kind("Vane angle", "rad", "angle"), ACTUAL),
@@ -144,10 +146,20 @@ def finding_of(identification: Identification) -> Finding[Identification]:
         remarks = [
             *_conflict(result.conflict),
             *(f"{estimate.path}: {estimate.explanation}" for estimate in result.estimates),
-            *_far_from(before, result.estimates),
-            *(f"remark: {remark}" for remark in result.remarks),
         ]
-        parts.append(_table(f"{result.procedure}{kind}: {result.summary}", result.estimates, before, remarks))
+        for estimate in result.estimates:
+            entry = before.numbers.get(estimate.path)
+            value, unit = in_set_unit(estimate.value, estimate.path, estimate.unit, before)
+            if entry is None or not estimate.is_usable or not (entry.value > 0.0 and value > 0.0):
+                continue
+            ratio = value / entry.value
+            if not 1.0 / _FAR_FROM_SET < ratio < _FAR_FROM_SET:
+                times = f"{ratio:.3g} times the value before, {entry.value:.4g} {unit}".rstrip()
+                remarks.append(f"remark: {estimate.path} is {times}: check the units of the recording")
+        remarks += [f"remark: {remark}" for remark in result.remarks]
+        rows = [estimate_row(estimate, before) for estimate in result.estimates]
+        heading = f"{result.procedure}{kind}: {result.summary}"
+        parts.append(Section(heading, columns_of(_ROW_HEAD, rows), remarks=remarks))
     if identification.trajectory is not None:
         parts.append(_trajectory_part(identification.trajectory, before))
     written, fitted = new_set.written, new_set.fitted
@@ -170,27 +182,6 @@ def finding_of(identification: Identification) -> Finding[Identification]:
         # A set without a new value would be the one before under another name.
         files={f"{name}.toml": lambda: parameter_set_toml(new_set.parameter_set).encode()} if written or fitted else {},
     )
-
-
-def _table(heading: str, estimates: Iterable[Estimate], before: ParameterSet, remarks: Sequence[str]) -> Section:
-    """Return a table with a row for each estimate in the units of the previous set, with remarks below."""
-    rows = (estimate_row(estimate, before) for estimate in estimates)
-    return Section(heading, columns_of(("",) * 4, rows), remarks=tuple(remarks))
-
-
-def _far_from(before: ParameterSet, estimates: Iterable[Estimate]) -> Iterator[str]:
-    """Yield a remark on each estimate that differs from its previous value by a large factor."""
-    for estimate in estimates:
-        entry = before.numbers.get(estimate.path)
-        value, unit = in_set_unit(estimate.value, estimate.path, estimate.unit, before)
-        if entry is None or not estimate.is_usable or not (entry.value > 0.0 and value > 0.0):
-            continue
-        ratio = value / entry.value
-        if not 1.0 / _FAR_FROM_SET < ratio < _FAR_FROM_SET:
-            yield (
-                f"remark: {estimate.path} is {ratio:.3g} times the value before, {entry.value:.4g} {unit}".rstrip()
-                + ": check the units of the recording"
-            )
 
 
 def _conflict(sentence: str) -> tuple[str, ...]:
@@ -223,7 +214,8 @@ def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Sectio
         f"trajectory{origin}: {count_of(len(fit.estimates), 'number')} fitted to "
         f"{count_of(len(fit.measurements), 'recording')}, {count_of(len(fit.known), 'tolerance')}"
     )
-    return _table(heading, fit.estimates, before, remarks)
+    rows = [estimate_row(estimate, before) for estimate in fit.estimates]
+    return Section(heading, columns_of(_ROW_HEAD, rows), remarks=remarks)
 
 
 def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> list[str]:

@@ -165,6 +165,20 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
             f"the plant has a kink at this point: the column of `{edge.name}` is valid {side} "
             f"{_value_at_point(model, edge.name):.5g} only; its slope differs {other} it"
         )
+    matrices = []
+    # The output matrices appear only on the page.
+    for name, values, rows, columns, is_detail in (
+        ("A", model.a, model.states, model.states, False),
+        ("B", model.b, model.states, model.inputs, False),
+        ("C", model.c, model.outputs, model.states, True),
+        ("D", model.d, model.outputs, model.inputs, True),
+    ):
+        numbers = [
+            Column(variable.name, column, Kind(form=".5g"))
+            for variable, column in zip(columns, values.T.tolist(), strict=True)
+        ]
+        table = [Column("", [variable.name for variable in rows]), *numbers]
+        matrices.append(Section(f"Matrix {name} (SI)", table, is_detail=is_detail))
     return Finding(
         name="linearise",
         kicker="Linear model",
@@ -174,7 +188,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
             _point(model),
             Section("Which side was taken", facts(model.sides.items()), remarks=remarks),
             _poles(model),
-            *_matrices(model),
+            *matrices,
             *([validity] if can_step(model) else []),
         ],
         found=model,
@@ -220,24 +234,6 @@ def _poles(model: LinearModel) -> Section:
         caption=_FREQUENCY_CAPTION,
         size=(5.4, 2.2),
     )
-
-
-def _matrices(model: LinearModel) -> list[Section]:
-    """Return a table for each matrix; the output matrices appear only on the page."""
-    parts = []
-    for name, values, rows, columns, is_detail in (
-        ("A", model.a, model.states, model.states, False),
-        ("B", model.b, model.states, model.inputs, False),
-        ("C", model.c, model.outputs, model.states, True),
-        ("D", model.d, model.outputs, model.inputs, True),
-    ):
-        numbers = [
-            Column(variable.name, column, Kind(form=".5g"))
-            for variable, column in zip(columns, values.T.tolist(), strict=True)
-        ]
-        table = [Column("", [variable.name for variable in rows]), *numbers]
-        parts.append(Section(f"Matrix {name} (SI)", table, is_detail=is_detail))
-    return parts
 
 
 def frequency_panels(model: LinearModel) -> list[Panel]:

@@ -50,6 +50,7 @@ _CURVES = (
 _EVENT: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (4, 3)), "alpha": 0.7, "zorder": 0.5}
 _LEVEL: dict[str, Any] = {"linewidth": 0.9, "linestyle": (0, (1, 2)), "zorder": 0.9}
 _WORDS: dict[str, Any] = {"fontsize": 8.5, "va": "center"}
+_THIN: dict[str, Any] = {"linestyle": "-", "linewidth": 0.8, "zorder": 2}
 _SMALL_WORDS: dict[str, Any] = {"fontsize": 7.5, "va": "center"}
 
 
@@ -80,7 +81,14 @@ def step_response_figure(
         marks, then = [model, *marked, *named], partial(_enlarge, frame, ends)
         if synthetic is not None and measured_curves is not None:
             times, measured = _MILLISECONDS * synthetic.time, measured_curves[index]
-            marks[1:1] = _measurement(times, measured)
+            # A line, and a band from the smallest to the largest readings.
+            starts = np.flatnonzero(np.diff(np.floor(times / _BIN), prepend=-np.inf) > 0.0)
+            band = np.minimum.reduceat(measured, starts), np.maximum.reduceat(measured, starts)
+            middles, pale = times[starts] + 0.5 * _BIN, {"alpha": 0.3, "zorder": 1}
+            marks[1:1] = [
+                Mark("line", times, measured, (), "synthetic measurement", EXPERIMENT.colour, _THIN),
+                Mark("band", middles, band, colour=EXPERIMENT.colour, style=pale),
+            ]
             apart = measured - np.interp(synthetic.time, recording.time, values)
             differences = [
                 Mark("line", times, apart, colour=EXPERIMENT.colour, style={"linewidth": 0.9}),
@@ -102,17 +110,6 @@ def _curves(recording: Recording, levels: SupplyLevels) -> tuple[Floats, ...]:
     first, second = recording["pressure_1"], recording["pressure_2"]
     gauge = ((pressure - levels.atmosphere) / PASCALS_PER_PSI for pressure in (first, second))
     return (np.degrees(recording["angle"]), (first - second) / PASCALS_PER_PSI, *gauge)
-
-
-def _measurement(times: Floats, values: Floats) -> list[Mark]:
-    """Return marks for a measurement over time [ms]: a line, and a band from smallest to largest readings."""
-    starts = np.flatnonzero(np.diff(np.floor(times / _BIN), prepend=-np.inf) > 0.0)
-    ends = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
-    thin = {"linestyle": "-", "linewidth": 0.8, "zorder": 2}
-    return [
-        Mark("line", times, values, label="synthetic measurement", colour=EXPERIMENT.colour, style=thin),
-        Mark("band", times[starts] + 0.5 * _BIN, ends, colour=EXPERIMENT.colour, style={"alpha": 0.3, "zorder": 1}),
-    ]
 
 
 def _enlarge(frame: tuple[float, float, float, float], ends: tuple[float, float], axes: "Axes") -> None:

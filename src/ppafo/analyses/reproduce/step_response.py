@@ -104,12 +104,6 @@ class _Step:
     def milliseconds(self, index: int) -> str:
         return f"{1e3 * self.recording.time[index]:.0f} ms"
 
-    def standing(self, name: str) -> Floats:
-        return self.recording[name][: self.events.breakaway + 1]
-
-    def at_stop(self, name: str) -> Floats:
-        return self.recording[name][self.events.stop :]
-
     def is_same(self, pressure: float, other: float) -> bool:
         return bool(abs(pressure - other) < _SAME * self.levels.range)
 
@@ -126,7 +120,8 @@ def _turns(step: _Step) -> tuple[bool, str]:
 
 
 def _rises(step: _Step) -> tuple[bool, str, str]:
-    before, breakaway, levels = step.standing("pressure_1"), step.events.breakaway, step.levels
+    breakaway, levels = step.events.breakaway, step.levels
+    before = step.recording["pressure_1"][: breakaway + 1]
     holds = step.only_rises(before) and before[-1] - before[0] > _CLEAR * levels.range
     fraction = (before[-1] - levels.atmosphere) / levels.range
     has_torque = "torque" in step.recording
@@ -173,7 +168,7 @@ def _falls_in_motion(step: _Step) -> tuple[bool, str, str]:
 
 
 def _to_supply(step: _Step) -> tuple[bool, str]:
-    after = step.at_stop("pressure_1")
+    after = step.recording["pressure_1"][step.events.stop :]
     holds = step.only_rises(after) and step.is_same(after[-1], step.levels.supply)
     return holds, (
         f"from {step.gauge(after[0])} psig at the stop ({step.milliseconds(step.events.stop)}) to "
@@ -182,7 +177,7 @@ def _to_supply(step: _Step) -> tuple[bool, str]:
 
 
 def _falls(step: _Step) -> tuple[bool, str]:
-    before = step.standing("pressure_2")
+    before = step.recording["pressure_2"][: step.events.breakaway + 1]
     holds = step.is_same(before[0], step.levels.supply) and bool(np.all(np.diff(before) < 0.0))
     return holds, f"from {step.gauge(before[0])} to {step.gauge(before[-1])} psig until breakaway"
 
@@ -211,7 +206,7 @@ def _slows(step: _Step) -> tuple[bool, str, str]:
 
 
 def _to_atmosphere(step: _Step) -> tuple[bool, str]:
-    last = float(step.at_stop("pressure_2")[-1])
+    last = float(step.recording["pressure_2"][-1])
     return step.is_same(last, step.levels.atmosphere), f"{step.levels.gauge(last):.2f} psig at the end"
 
 

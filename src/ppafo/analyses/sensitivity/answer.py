@@ -1,7 +1,6 @@
 """Report of a sensitivity analysis: a table for each metric, and panels of the indices and their convergence."""
 
 import math
-from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -46,7 +45,7 @@ def finding_of(influences: Influences) -> Finding[Influences]:
         )
     figure = Section(
         "Indices and their convergence",
-        panels=partial(_panels, influences),
+        panels=lambda: [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)],
         name="sensitivity",
         caption=_CAPTION.format(
             filled=_TITLES[method.shown[0]], open="".join(f", {_TITLES[name]} open" for name in method.shown[1:])
@@ -63,11 +62,6 @@ def finding_of(influences: Influences) -> Finding[Influences]:
         parts=(*(_part(influences, metric) for metric in influences.metrics), figure),
         found=influences,
     )
-
-
-def _panels(influences: Influences) -> list[Panel]:
-    """Return two panels for each metric: sensitivity indices, and their convergence."""
-    return [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)]
 
 
 def _part(influences: Influences, metric: MetricSensitivity) -> Section:

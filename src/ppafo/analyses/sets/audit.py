@@ -156,15 +156,13 @@ def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Sect
     if hidden:
         concern = "concerns" if hidden == 1 else "concern"
         summary += f"; {hidden} of them {concern} no changed value: --all"
-    return [*parts, *(Section(said=_lines(finding)) for finding in listed), Section(said=[f"{name}: {summary}"])]
-
-
-def _lines(finding: AuditFinding) -> list[str]:
-    lines = [f"{finding.severity}: {finding.title} [{finding.id}]"]
-    for value in finding.values:
-        text = value.value if isinstance(value.value, str) else f"{value.value:.6g} {value.unit}".rstrip()
-        lines.append(f"{_INDENT}{value.path} = {text} ({value.origin})")
-    accepted = [f"Accepted by the set: {finding.accepted}"] if finding.accepted else []
-    for paragraph in (finding.paragraph, *accepted):
-        lines += textwrap.wrap(paragraph, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
-    return lines
+    for finding in listed:
+        lines = [f"{finding.severity}: {finding.title} [{finding.id}]"]
+        for value in finding.values:
+            text = value.value if isinstance(value.value, str) else f"{value.value:.6g} {value.unit}".rstrip()
+            lines.append(f"{_INDENT}{value.path} = {text} ({value.origin})")
+        accepted = [f"Accepted by the set: {finding.accepted}"] if finding.accepted else []
+        for paragraph in (finding.paragraph, *accepted):
+            lines += textwrap.wrap(paragraph, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
+        parts.append(Section(said=lines))
+    return [*parts, Section(said=[f"{name}: {summary}"])]

@@ -2,13 +2,14 @@
 
 import textwrap
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.parameter_set import with_followers
 from ppafo.report.finding import Finding, Section, columns_of
 
-_WIDTH = 110
+_wrapped = partial(textwrap.wrap, width=110)
 _SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow", "effects", "valves", "reported")
 _COLUMNS = ("path", "value", "unit", "origin", "source")
 
@@ -82,7 +83,3 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
         kind="measured",
         command="sets show",
     )
-
-
-def _wrapped(text: str) -> list[str]:
-    return textwrap.wrap(text, _WIDTH)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from ppafo.analyses.sweep.figure import figure_of
 from ppafo.analyses.sweep.results import SUMMARY, StudyResults, metric_kind
@@ -17,7 +17,7 @@ from ppafo.study.folder import study_folder
 from ppafo.study.manifest import MANIFEST, read_manifest
 from ppafo.units.shown import in_units
 
-# The summary of a study that is read again: what everybody may rely on in it, and that it fits its study.
+# The summary of a study that is read again: what everybody may rely on in it, beside additional keys.
 
 _Count = Annotated[int, Field(ge=0)]
 
@@ -29,13 +29,7 @@ def _fraction(text: str) -> str:
     return text
 
 
-class _OpenTable(BaseModel):
-    """Table of a JSON file in which additional keys are allowed."""
-
-    model_config = ConfigDict(strict=True)
-
-
-class _Described(_OpenTable):
+class _Described(BaseModel, strict=True):
     """Statistics of a metric over the runs of a configuration; ``count`` is the number of runs with a value."""
 
     count: _Count
@@ -50,7 +44,7 @@ class _Described(_OpenTable):
         return self
 
 
-class _Failure(_OpenTable):
+class _Failure(BaseModel, strict=True):
     """Failed run, with the reason."""
 
     run: _Count
@@ -58,7 +52,7 @@ class _Failure(_OpenTable):
     reason: str
 
 
-class _Summary(_OpenTable):
+class _Summary(BaseModel, strict=True):
     """Guaranteed fields of a study summary."""
 
     completed: _Count
@@ -91,6 +85,14 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
     for number in document["study"].get("vary", ()):
         keys = [f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")]
         rows.append((number["path"], number["kind"], ", ".join(keys)))
+    sampling = [
+        f"Correlation of {pair['between'][0]} with {pair['between'][1]}: {pair['coefficient']}, of their normal scores."
+        for pair in document["study"].get("correlations", ())
+    ]
+    sample = document["study"].get("sample")
+    if sample:
+        method, seed = sample["method"].replace("_", " "), sample.get("seed", 1)
+        sampling.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
     return Finding(
         name="sweep",
         kicker="Study",
@@ -101,7 +103,7 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
             *(_metrics(results, name, metrics) for name, metrics in results.metrics.items()),
             Section("How to read it", said=[quantile], is_detail=True),
             Section("What varied" if rows else "", columns_of(("path", "kind", ""), rows), left=3, is_detail=True),
-            Section(said=_sampling(document["study"]), is_detail=True),
+            Section(said=sampling, is_detail=True),
             _assumed(document["scenarios"]),
             Section("Files", facts(files), is_detail=True),
         ),
@@ -128,19 +130,6 @@ def _useless_runs(results: StudyResults) -> list[str]:
         for name, count in summary.get(key, {}).items()
         if count
     ]
-
-
-def _sampling(study: Mapping[str, Any]) -> list[str]:
-    """Return sentences on the correlations and the sampling method of a study."""
-    sentences = [
-        f"Correlation of {pair['between'][0]} with {pair['between'][1]}: {pair['coefficient']}, of their normal scores."
-        for pair in study.get("correlations", ())
-    ]
-    sample = study.get("sample")
-    if sample:
-        method, seed = sample["method"].replace("_", " "), sample.get("seed", 1)
-        sentences.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
-    return sentences
 
 
 def _assumed(scenarios: Mapping[str, Any]) -> Section:

@@ -1,9 +1,9 @@
 """Figure of a study: a panel for each metric over the varied values, and bands of channels over time."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,12 +13,11 @@ from ppafo.report.kind import TIME, Kind, of_channel, of_path
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
-from ppafo.signals.recording import CHANNELS, Floats
+from ppafo.signals.recording import CHANNELS
 from ppafo.studies.sampling import NOISE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
 
 FIGURE = "figure"
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, GREY)
@@ -68,7 +67,11 @@ def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence
     is_mapped = 2 in (len(grid), len(varied))
     title = f"{results.name}, {results.summary['completed']:,} runs"
     if not is_mapped and len(varied) > 1:
-        title += f" over {len(varied)} values: {_listed(varied)}"
+        labels = [label_of(path) for path in varied[:_NAMED]]
+        # Within the sentence a label is in lower case, but for abbreviations.
+        labels = [label if label[:2].isupper() else label[:1].lower() + label[1:] for label in labels]
+        more = f" and {len(varied) - _NAMED} more" if len(varied) > _NAMED else ""
+        title += f" over {len(varied)} values: {', '.join(labels)}{more}"
     # Panels over two paths of several configurations have a row for each metric.
     is_compared = is_mapped and len(names) > 1
     count = len(metrics) + len(study["outputs"].get("bands", ()))
@@ -83,14 +86,6 @@ def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence
         title=title,
         is_detail=True,
     )
-
-
-def _listed(paths: Sequence[str]) -> str:
-    """Return a list of path labels for use within a sentence, in lower case except for abbreviations."""
-    labels = [label_of(path) for path in paths[:_NAMED]]
-    labels = [label if label[:2].isupper() else label[:1].lower() + label[1:] for label in labels]
-    more = f" and {len(paths) - _NAMED} more" if len(paths) > _NAMED else ""
-    return f"{', '.join(labels)}{more}"
 
 
 def _panels(
@@ -165,62 +160,35 @@ def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(rows.size, columns.size)
     kind = metric_kind(results, metric)
     declared = {number["path"]: number for number in results.document["study"]["vary"]}
-    axis_x = _MapAxis(_kind(results, grid[0]), columns, declared[grid[0]])
-    axis_y = _MapAxis(_kind(results, grid[1]), rows, declared[grid[1]])
+    kinds = [_kind(results, path) for path in grid]
+    # Values of a list are drawn side by side, in cells of equal size, with their values at the ticks.
+    are_listed = [declared[path]["kind"] == "list" for path in grid]
+    places = [
+        np.arange(float(levels.size)) if is_listed else levels
+        for levels, is_listed in zip((columns, rows), are_listed, strict=True)
+    ]
 
     def mark_axes(axes: "Axes") -> None:
         """Set ticks for the values of a list, and logarithmic scales."""
-        axes.grid(visible=False)
-        axis_x.mark(axes.xaxis, axes.set_xscale)
-        axis_y.mark(axes.yaxis, axes.set_yscale)
-
-    marks = (Mark("map", axis_x.places, axis_y.places, kind.values(mean)),)
-    title = name if is_compared else ""
-    return Panel(axis_x.shown_kind, axis_y.shown_kind, marks, title, scale=kind, then=mark_axes)
-
-
-@dataclass(frozen=True, slots=True)
-class _MapAxis:
-    """Axis of a map.
-
-    ``kind``: label, unit and format of the values
-    ``levels``: values [SI] on the axis
-    ``declared``: entry of the study file for the varied path
-
-    Values of a list are drawn side by side, in cells of equal size.
-    """
-
-    kind: Kind
-    levels: Floats
-    declared: Mapping[str, Any]
-
-    @property
-    def is_listed(self) -> bool:
-        """True if the values are a list."""
-        return bool(self.declared["kind"] == "list")
-
-    @property
-    def shown_kind(self) -> Kind:
-        """Label, unit and format of the ticks; for a list, only the label."""
-        return Kind(self.kind.axis) if self.is_listed else self.kind
-
-    @property
-    def places(self) -> Floats:
-        """Positions of the cells along the axis."""
-        return np.arange(float(self.levels.size)) if self.is_listed else self.levels
-
-    def mark(self, axis: "Axis", set_scale: "Callable[[str], None]") -> None:
-        """Set ticks and scale of an axis of a figure."""
         from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-        if self.is_listed:
-            axis.set_ticks(self.places, [f"{value:g}" for value in self.kind.values(self.levels)])
-        elif self.declared.get("spacing") == "logarithmic":
-            set_scale("log")
-            # Plain numbers at 1, 2 and 5 of every decade.
-            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-            axis.set_minor_formatter(NullFormatter())
+        axes.grid(visible=False)
+        sides = ((axes.xaxis, axes.set_xscale, columns), (axes.yaxis, axes.set_yscale, rows))
+        for number, (axis, set_scale, levels) in enumerate(sides):
+            if are_listed[number]:
+                axis.set_ticks(places[number], [f"{value:g}" for value in kinds[number].values(levels)])
+            elif declared[grid[number]].get("spacing") == "logarithmic":
+                set_scale("log")
+                # Plain numbers at 1, 2 and 5 of every decade.
+                axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+                axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+                axis.set_minor_formatter(NullFormatter())
+
+    marks = (Mark("map", places[0], places[1], kind.values(mean)),)
+    across_kind, upward_kind = (
+        Kind(axis_kind.axis) if is_listed else axis_kind for axis_kind, is_listed in zip(kinds, are_listed, strict=True)
+    )
+    return Panel(across_kind, upward_kind, marks, name if is_compared else "", scale=kind, then=mark_axes)
 
 
 def _points(results: StudyResults, paths: Sequence[str], metric: str, name: str, is_compared: bool) -> Panel:

@@ -131,7 +131,9 @@ def draw_until(
     is_met = False
     for size in rule.sizes:
         done = looks[-1].draws if looks else 0
-        columns = statistic.columns(uncertainty, done, size - done, seed)
+        # Sobol replicates for a mean, else independent draws.
+        draw = uncertainty.replicated_columns if statistic.is_of_replicates else uncertainty.random_columns
+        columns = draw(done, size - done, seed)
         # Draws of the first look are kept: they are repeated with new noise to find its share of the variance.
         first_drawn = first_drawn or columns
         runs.run(columns)

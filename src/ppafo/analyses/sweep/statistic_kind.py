@@ -16,7 +16,7 @@ from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.report.kind import ConfidenceInterval
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import REPLICATES, Columns, Uncertainty
+from ppafo.studies.draws import REPLICATES
 from ppafo.studies.intervals import effective_sample_size, floored_interval, fraction_interval, quantile_interval
 from ppafo.studies.limits import level_of
 
@@ -46,11 +46,6 @@ class Statistic:
     estimate: Callable[[Floats, float], ConfidenceInterval] = field(compare=False)
     is_of_replicates: bool = False
     threshold: float | None = None
-
-    def columns(self, uncertainty: Uncertainty, first: int, count: int, seed: int) -> Columns:
-        """Return the draws from number ``first`` on: Sobol replicates for a mean, else independent draws."""
-        draw = uncertainty.replicated_columns if self.is_of_replicates else uncertainty.random_columns
-        return draw(first, count, seed)
 
     def unseen(self, values: Floats, confidence: float) -> float:
         """Return an upper bound of the change of a mean [SI] by values that were not drawn; 0 for other statistics.
@@ -83,11 +78,11 @@ def mean_of(unit: str) -> Statistic:
 
 def quantile_of(unit: str, fraction: float) -> Statistic:
     """Return the statistic for the quantile of a metric at a fraction of the runs."""
-
-    def interval(values: Floats, level: float) -> ConfidenceInterval:
-        return quantile_interval(values[np.isfinite(values)], fraction, level)
-
-    return Statistic(f"quantile {fraction:g}", unit, interval)
+    return Statistic(
+        f"quantile {fraction:g}",
+        unit,
+        lambda values, level: quantile_interval(values[np.isfinite(values)], fraction, level),
+    )
 
 
 def probability_of(threshold: float, is_above: bool, text: str) -> Statistic:

@@ -320,14 +320,33 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
             raise StudyError(f"'{repeated}' is searched twice; give it only one [[search]]")
         varies = ATMOSPHERE_PATH in (*paths, *drawn)
         atmosphere = atmosphere_of(scenario, (*drawn, *paths))
+        searched = tuple(_searched(gain, scenario, varies) for gain in parsed.search)
+        goals, limits = [], []
+        for goal in parsed.objective:
+            if goal.weight == 0.0:
+                raise StudyError(f"objective '{goal.metric}': weight = 0 has no effect; omit it")
+            scale, where = None, f"objective '{goal.metric}': scale = '{goal.scale}'"
+            if goal.scale is not None:
+                scale = difference_of(goal.scale, goal.metric, where)
+            if scale is not None and scale <= 0.0:
+                raise StudyError(f"{where} must be more than 0")
+            goals.append(ObjectiveTerm(goal.metric, goal.weight, scale))
+        for constraint in parsed.constraints:
+            bounds = [text for text in (constraint.at_most, constraint.at_least) if text is not None]
+            if len(bounds) != 1:
+                has = "both" if bounds else "none"
+                raise StudyError(f"constraint '{constraint.metric}': needs either at_most or at_least, it has {has}")
+            where = f"constraint '{constraint.metric}' = '{bounds[0]}'"
+            limit = level_of(bounds[0], constraint.metric, where, atmosphere)
+            limits.append(MetricLimit(constraint.metric, limit, constraint.at_most is not None, bounds[0]))
         return Problem(
             name=parsed.name,
             description=" ".join(parsed.description.split()),
             scenario=scenario,
             overrides=scenario.origin.overrides,
-            searched=tuple(_searched(gain, scenario, varies) for gain in parsed.search),
-            goals=tuple(_goal(goal) for goal in parsed.objective),
-            constraints=tuple(_constraint(constraint, atmosphere) for constraint in parsed.constraints),
+            searched=searched,
+            goals=tuple(goals),
+            constraints=tuple(limits),
             spread=spread,
             effort=parsed.effort,
         )
@@ -354,27 +373,6 @@ def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) ->
     # Where the atmosphere varies, gauge bounds count from each run's own; so does the value before.
     before -= varied.atmosphere if varied.is_gauge else 0.0
     return SearchedParameter(gain.path, minimum, maximum, is_logarithmic, before, varied)
-
-
-def _goal(goal: GoalSection) -> ObjectiveTerm:
-    if goal.weight == 0.0:
-        raise StudyError(f"objective '{goal.metric}': weight = 0 has no effect; omit it")
-    if goal.scale is None:
-        return ObjectiveTerm(goal.metric, goal.weight, None)
-    where = f"objective '{goal.metric}': scale = '{goal.scale}'"
-    scale = difference_of(goal.scale, goal.metric, where)
-    if scale <= 0.0:
-        raise StudyError(f"{where} must be more than 0")
-    return ObjectiveTerm(goal.metric, goal.weight, scale)
-
-
-def _constraint(constraint: Constraint, atmosphere: float | None) -> MetricLimit:
-    bounds = [text for text in (constraint.at_most, constraint.at_least) if text is not None]
-    if len(bounds) != 1:
-        has = "both" if bounds else "none"
-        raise StudyError(f"constraint '{constraint.metric}': needs either at_most or at_least, it has {has}")
-    limit = level_of(bounds[0], constraint.metric, f"constraint '{constraint.metric}' = '{bounds[0]}'", atmosphere)
-    return MetricLimit(constraint.metric, limit, constraint.at_most is not None, bounds[0])
 
 
 def _spread(parsed: TuningFile, folder: Path, searched: Sequence[str], scenario: Scenario) -> Spread | None:

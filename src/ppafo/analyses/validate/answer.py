@@ -1,7 +1,6 @@
 """Report of a validation: verdict, table of errors and panels for each recording, replayed recordings."""
 
 import re
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -90,7 +89,11 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement) ->
 @in_units(lambda validation: validation.device.shown)
 def finding_of(validation: Validation) -> Finding[Validation]:
     """Return a validation as a finding; passed if every error is within its limit."""
-    names = _file_stems([agreement.file for agreement in validation.recordings])
+    # Stems of the written files, numbered if recordings have one name.
+    stems = [_UNUSUAL.sub("-", Path(row.file).stem).strip("-.") or "recording" for row in validation.recordings]
+    names = [
+        f"{stem}-{1 + stems[:index].count(stem)}" if stems.count(stem) > 1 else stem for index, stem in enumerate(stems)
+    ]
     kinds = {agreement.measured.kind for agreement in validation.recordings}
     pairs = list(zip(names, validation.recordings, strict=True))
     sentences, unmeasured = [verdict(validation)], sorted(kinds - {"measured"})
@@ -102,6 +105,12 @@ def finding_of(validation: Validation) -> Finding[Validation]:
         )
     if validation.overrides:
         sentences.append(f"values changed: {', '.join(validation.overrides)}")
+    method = (
+        f"The model with the valve '{validation.device.valve_name}' was run with the inputs of each recording, from "
+        "the state of its first samples. A residual is measured - model. Percentages are of the full range: the "
+        "angle between the stops, the gauge pressure of the supply, and twice that for the pressure difference. One "
+        "common delay was removed before the errors were computed."
+    )
     hashes = [(recording.file, f"sha256 {recording.sha256}") for recording in validation.recordings if recording.sha256]
     return Finding(
         name="validate",
@@ -109,7 +118,7 @@ def finding_of(validation: Validation) -> Finding[Validation]:
         title=f"{validation.device.name} against {count_of(len(validation.recordings), 'recording')}",
         said=sentences,
         parts=(
-            Section(said=[_method(validation)], is_detail=True),
+            Section(said=[method], is_detail=True),
             *(_part(name, agreement) for name, agreement in pairs),
             Section("Files" if hashes else "", facts(hashes), is_detail=True),
         ),
@@ -120,25 +129,6 @@ def finding_of(validation: Validation) -> Finding[Validation]:
             f"{name}-replayed.csv": partial(marked_csv_bytes, agreement.model.resample(agreement.measured.time))
             for name, agreement in pairs
         },
-    )
-
-
-def _file_stems(files: Sequence[str]) -> list[str]:
-    """Return the stems of the written files of recordings, numbered if recordings have one name."""
-    stems: list[str] = []
-    names = [_UNUSUAL.sub("-", Path(file).stem).strip("-.") or "recording" for file in files]
-    for index, name in enumerate(names):
-        stems.append(f"{name}-{1 + names[:index].count(name)}" if names.count(name) > 1 else name)
-    return stems
-
-
-def _method(validation: Validation) -> str:
-    """Return a text on the computation of the errors."""
-    return (
-        f"The model with the valve '{validation.device.valve_name}' was run with the inputs of each recording, from "
-        "the state of its first samples. A residual is measured - model. Percentages are of the full range: the "
-        "angle between the stops, the gauge pressure of the supply, and twice that for the pressure difference. One "
-        "common delay was removed before the errors were computed."
     )
 
 

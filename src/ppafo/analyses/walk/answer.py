@@ -2,17 +2,16 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ppafo.analyses.walk.bottle import bottle_data, bottle_files, bottle_parts, bottle_remark
-from ppafo.analyses.walk.document import ShownNumber, csv_of, metrics_table, toes, walk_data
+from ppafo.analyses.walk.bottle import bottle_data, bottle_parts
+from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes, versions, walk_document
 from ppafo.analyses.walk.task_sequence import (
-    task_sequence_data,
-    task_sequence_files,
+    segments_csv,
     task_sequence_parts,
     task_sequence_pictures,
     trust_remark,
@@ -28,10 +27,12 @@ from ppafo.report.kind import Kind
 from ppafo.report.live_parts import live_part
 from ppafo.running import tried
 from ppafo.simulation.gains import gains_of
+from ppafo.simulation.scenario import UNITS
 from ppafo.simulation.tracking import Tracking
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
+from ppafo.walking.bottle.course import lasted, minutes_text
 from ppafo.walking.figures.animation import animation
 from ppafo.walking.figures.gait_strip import strip_figure
 from ppafo.walking.figures.legs import frames_figure
@@ -107,13 +108,30 @@ class _WalkPair:
 
     def json_document(self) -> dict[str, Any]:
         """Return the metrics (with the device, without it, healthy) and the events as plain data in SI units."""
-        worn, verdict = self.comparison.with_device, self.tracking
+        worn, bare, verdict = self.comparison.with_device, self.comparison.without_device, self.tracking
+        sequence, segments = walk_of(worn.scenario).task_sequence, {}
+        if sequence is not None:
+            segments = {
+                "task_sequence": sequence.name,
+                "segments": [asdict(segment) for segment in worn.segments],
+                "segments_off": [asdict(segment) for segment in bare.segments],
+            }
         return {
-            **walk_data(WALK_FORMAT, SCHEMA_VERSION, self.comparison),
+            "format": WALK_FORMAT,
+            "schema_version": SCHEMA_VERSION,
+            "units": UNITS,
+            "status": plain(worn.status),
+            "status_off": plain(bare.status),
+            "metrics": plain(dict(worn.metrics)),
+            "metrics_off": plain(dict(bare.metrics)),
+            "events": [event.to_dict() for event in worn.events],
+            "versions": versions(),
+            "configuration": walk_document(worn.scenario),
+            "shown": dict(worn.scenario.device.shown),
             "tracking": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
             "gains": plain(gains_of(worn.scenario, law_of(worn.scenario))),
             "minutes": float(worn.recording.time[-1]) / 60.0,
-            **task_sequence_data(self.comparison),
+            **segments,
             **bottle_data(worn),
             "metrics_vented": plain(dict(worn.vented_metrics)),
             "healthy": plain(dict(self.comparison.healthy)),
@@ -194,6 +212,12 @@ def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
         f"values changed for this walk: {', '.join(overrides)}" if overrides else "",
     )
     ended = f"{configuration.name}: {worn.status.kind}, {strides} of {motion.gait.name}{along}"
+    segments, supply = {}, worn.supply
+    if motion.task_sequence is not None:
+        segments = {
+            "segments.csv": partial(segments_csv, worn.segments),
+            "segments-off.csv": partial(segments_csv, bare.segments),
+        }
     return Finding(
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
@@ -220,8 +244,8 @@ def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
             "strides-off.csv": partial(strides_csv, bare),
             "mean-stride.csv": partial(mean_stride_csv, worn),
             "mean-stride-off.csv": partial(mean_stride_csv, bare),
-            **task_sequence_files(comparison),
-            **bottle_files(worn),
+            **segments,
+            **({} if supply is None else {"bottle.csv": lambda: marked_csv_bytes(supply.recording)}),
         },
         live=partial(live_part, [configuration]),
     )
@@ -230,8 +254,12 @@ def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
 def _remarks(comparison: WalkComparison) -> list[str]:
     """Return remarks on wearer, bottle, safety, the trusted range of speeds, and divergence."""
     worn, bare = comparison.with_device, comparison.without_device
-    bottle = "" if worn.supply is None else bottle_remark(worn)
-    if worn.supply is None and "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
+    bottle, supply = "", worn.supply
+    if supply is not None:
+        time = lasted(supply)
+        ended = "" if time is None else f"lasts {minutes_text(time)}: "
+        bottle = f"bottle {supply.supply.bottle.name}: {ended}{supply.ending.message}"
+    elif "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
         walk_on_it = f"walk on it, {argument_text('bottle', PAPER_BOTTLE)}"
         bottle = f"how long a bottle lasts: {walk_on_it}; here its supply pressure stays as it is set"
     remarks = (
@@ -253,21 +281,22 @@ def _pictures(comparison: WalkComparison) -> Sequence[Section]:
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is not None:
         return task_sequence_pictures(comparison)
-    figures: list[Section] = []
-
-    def add(heading: str, name: str, caption: str, draw: Callable[[], Any]) -> None:
-        figures.append(Section(heading, name=name, caption=caption, draw=draw, is_detail=True))
-
+    figures: list[tuple[str, str, str, Callable[[], Any]]] = []
     # A figure of an even walk over time shows nothing that the mean stride does not.
     if worn.events or failure_times(worn.scenario):
-        add("The walk over time", "over-time", _OVER_TIME, partial(whole_walk_figure, worn))
+        figures.append(("The walk over time", "over-time", _OVER_TIME, partial(whole_walk_figure, worn)))
     if worn.averages and bare.averages:
         walks = {"with the device": worn, "without": bare}
-        add("The leg", "legs", _LEGS, partial(frames_figure, comparison))
-        add("", "legs-moving", _MOVING, partial(animation, comparison))
-        add("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn))
-        add("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks))
-    return figures
+        figures += [
+            ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
+            ("", "legs-moving", _MOVING, partial(animation, comparison)),
+            ("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn)),
+            ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
+        ]
+    return [
+        Section(heading, name=name, caption=caption, draw=draw, is_detail=True)
+        for heading, name, caption, draw in figures
+    ]
 
 
 def comparison_table(comparison: WalkComparison) -> list[Column]:
@@ -290,7 +319,10 @@ def comparison_table(comparison: WalkComparison) -> list[Column]:
     # The positive work of a healthy ankle is what the device's is a share of.
     if "positive_push_off_work" in comparison.healthy:
         columns[-1][1]["push_off_share"] = 1.0
-    return metrics_table(_NUMBERS, columns)
+    # A number that no walk of the table has would be a row of dashes.
+    known = [number for number in _NUMBERS if any(values.get(number.name) is not None for _, values in columns)]
+    cells = (number_texts(number, (values.get(number.name) for _, values in columns)) for number in known)
+    return columns_of(["", *(head for head, _ in columns)], cells)
 
 
 def strides_csv(result: WalkResult) -> bytes:

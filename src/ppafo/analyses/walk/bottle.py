@@ -1,6 +1,5 @@
-"""Gas bottle in the report of a walk: facts, remark, data, time series and figure."""
+"""Gas bottle in the report of a walk: facts, data and figure."""
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -8,8 +7,7 @@ import numpy as np
 
 from ppafo.report.finding import Section, facts
 from ppafo.report.kind import Kind
-from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.walking.bottle.course import SupplyCourse, lasted, minutes_text, strides_text
+from ppafo.walking.bottle.course import SupplyCourse, strides_text
 from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
@@ -41,15 +39,6 @@ def bottle_parts(worn: WalkResult) -> tuple[Section, ...]:
         Section("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
         Section("How to read the bottle", said=_EXPLAINED, is_detail=True),
     )
-
-
-def bottle_remark(worn: WalkResult) -> str:
-    """Return the remark on the end of a walk on a bottle, with the time that the bottle lasted."""
-    supply = worn.supply
-    assert supply is not None, "said of a walk on a bottle"
-    time = lasted(supply)
-    ended = "" if time is None else f"lasts {minutes_text(time)}: "
-    return f"bottle {supply.supply.bottle.name}: {ended}{supply.ending.message}"
 
 
 def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
@@ -96,9 +85,3 @@ def bottle_data(worn: WalkResult) -> dict[str, Any]:
             "lowest": {name: float(np.min(values)) for name, values in supply.values.items()},
         }
     }
-
-
-def bottle_files(worn: WalkResult) -> dict[str, Callable[[], bytes]]:
-    """Return the CSV file of the supply over time, by file name; {} for a walk without a bottle."""
-    supply = worn.supply
-    return {} if supply is None else {"bottle.csv": lambda: marked_csv_bytes(supply.recording)}

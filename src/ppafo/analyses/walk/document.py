@@ -1,37 +1,17 @@
 """Walk as plain data and as table rows: content of ``walk.json`` and of the tables of all walks."""
 
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ppafo.documents.json_text import plain
 from ppafo.report.display_units import display_unit, display_value
-from ppafo.report.finding import Column, columns_of
-from ppafo.simulation.scenario import UNITS, Scenario
+from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import sensor_numbers
-from ppafo.walking.walk import WalkComparison
-
-
-def walk_data(name: str, version: int, comparison: WalkComparison) -> dict[str, Any]:
-    """Return the common data of a walk file; ``name`` and ``version`` identify the file format."""
-    worn, bare = comparison.with_device, comparison.without_device
-    return {
-        "format": name,
-        "schema_version": version,
-        "units": UNITS,
-        "status": plain(worn.status),
-        "status_off": plain(bare.status),
-        "metrics": plain(dict(worn.metrics)),
-        "metrics_off": plain(dict(bare.metrics)),
-        "events": [event.to_dict() for event in worn.events],
-        "versions": versions(),
-        "configuration": walk_document(worn.scenario),
-        "shown": dict(worn.scenario.device.shown),
-    }
 
 
 def versions() -> dict[str, str]:
@@ -100,16 +80,6 @@ def number_texts(shown: ShownNumber, values: Iterable[float | str | None]) -> tu
 def toes(height: float | None) -> float | str | None:
     """Return the toe clearance above the ground [m] or, if negative, the text that the toes would drag."""
     return WOULD_DRAG if height is not None and height < 0.0 else height
-
-
-def metrics_table(
-    numbers: Sequence[ShownNumber], columns: Sequence[tuple[str, Mapping[str, float | str | None]]]
-) -> list[Column]:
-    """Return the table of the numbers in at least one column; a column is its head and values [SI] by name."""
-    # A number that no walk of the table has would be a row of dashes.
-    known = [number for number in numbers if any(values.get(number.name) is not None for _, values in columns)]
-    cells = (number_texts(number, (values.get(number.name) for _, values in columns)) for number in known)
-    return columns_of(["", *(head for head, _ in columns)], cells)
 
 
 def csv_of(columns: Mapping[str, Iterable[Any]]) -> bytes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -66,9 +66,9 @@ def walk_with_and_without(
     warn_of_coarse_pairs([chosen])
     report = progress or report_nothing
     if wearers is not None:
-        advance = _reporter(report, "wearers", 0.0)
+        advance = partial(_report_walk, report, "wearers", 0.0)
         return wearers_finding(walk_population(chosen, minutes=minutes, wearers=wearers, seed=seed, progress=advance))
-    comparison = compare_walks(chosen, minutes=minutes, progress=_reporter(report, "min", _LONG_WALK))
+    comparison = compare_walks(chosen, minutes=minutes, progress=partial(_report_walk, report, "min", _LONG_WALK))
     finding = finding_of(comparison)
     return replace(finding, passed=finding.passed and finding.found.tracking is None) if check else finding
 
@@ -77,11 +77,7 @@ _LONG_WALK = 12.0
 """Duration [min] above which a walk reports its progress."""
 
 
-def _reporter(report: Report, noun: str, above: float) -> Callable[[float, float], None]:
-    """Return a progress callback that reports only if the total exceeds ``above``, counted in the unit ``noun``."""
-
-    def forward(done: float, total: float) -> None:
-        if total > above:
-            report(Progress("walking", round(done), round(total), noun=noun))
-
-    return forward
+def _report_walk(report: Report, noun: str, above: float, done: float, total: float) -> None:
+    """Report the progress of walks, counted in the unit ``noun``, if the total exceeds ``above``."""
+    if total > above:
+        report(Progress("walking", round(done), round(total), noun=noun))

@@ -1,9 +1,8 @@
-"""Task sequence in the report of a walk: table of the segments, remarks, data, files and figures."""
+"""Task sequence in the report of a walk: table of the segments, remarks, file of the segments and figures."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, fields
 from functools import partial
-from typing import Any
 
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes
 from ppafo.errors import DataError
@@ -14,9 +13,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.task_sequence import task_sequence_figure
 from ppafo.walking.motion import walk_of
-from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import SegmentResult
-from ppafo.walking.task_sequence import TaskSequence
 from ppafo.walking.walk import WalkComparison
 
 _NUMBERS = (
@@ -61,43 +58,40 @@ def task_sequence_parts(comparison: WalkComparison) -> tuple[Section, ...]:
         return ()
     bare_toes = {segment.start: segment.lowest_toes for segment in bare.segments}
     rows = [{**asdict(segment), "without": bare_toes.get(segment.start)} for segment in worn.segments]
-    rows.append(_whole(worn, bare))
+    # The whole task sequence, or as far as walked, under the names of a segment's numbers.
+    numbers = {name: metric.value for name, metric in worn.metrics.items()}
+    lowest_bare_toes = bare.metrics.get("task_sequence_lowest_toes")
+    is_whole = numbers["task_sequence_time"] >= numbers["task_sequence_planned_time"] - _SAME_TIME
+    rows.append(
+        {
+            "title": "whole task sequence" if is_whole else "as far as walked",
+            "start": 0.0,
+            "end": numbers["task_sequence_time"],
+            "strides": numbers["task_sequence_strides"],
+            "helped": sum(segment.helped for segment in worn.segments),
+            "gas": numbers["task_sequence_gas"],
+            "net_push_off_work": numbers["task_sequence_work"],
+            "lowest_toes": numbers.get("task_sequence_lowest_toes"),
+            "without": None if lowest_bare_toes is None else lowest_bare_toes.value,
+            "flat_push": numbers["task_sequence_flat_push"],
+            "safe_time": numbers.get("safe_state_time"),
+        }
+    )
     for row in rows:
         row.update({name: toes(row[name]) for name in ("lowest_toes", "without")})
     table = [Column("Segment", [row["title"] for row in rows])]
     for number in _NUMBERS:
         head, *cells = number_texts(number, (row[number.name] for row in rows))
         table.append(Column(str(head), cells))
-    steady, strides = worn.metrics["steady_strides"].value, worn.metrics["task_sequence_strides"].value
     means = (
-        f"The numbers below are means over the {steady:.0f} of {strides:.0f} strides that are at an even speed on "
-        "level ground."
+        f"The numbers below are means over the {numbers['steady_strides']:.0f} of "
+        f"{numbers['task_sequence_strides']:.0f} strides that are at an even speed on level ground."
     )
     return (
         Section(columns=table, marked=(len(rows) - 1,)),
         Section("How to read the task sequence", said=_EXPLAINED, is_detail=True),
         Section(said=(means,)),
     )
-
-
-def _whole(worn: WalkResult, bare: WalkResult) -> dict[str, Any]:
-    """Return the numbers of the task sequence, whole or as far as walked, under the names of a segment's numbers."""
-    numbers = {name: metric.value for name, metric in worn.metrics.items()}
-    bare_toes = bare.metrics.get("task_sequence_lowest_toes")
-    is_whole = numbers["task_sequence_time"] >= numbers["task_sequence_planned_time"] - _SAME_TIME
-    return {
-        "title": "whole task sequence" if is_whole else "as far as walked",
-        "start": 0.0,
-        "end": numbers["task_sequence_time"],
-        "strides": numbers["task_sequence_strides"],
-        "helped": sum(segment.helped for segment in worn.segments),
-        "gas": numbers["task_sequence_gas"],
-        "net_push_off_work": numbers["task_sequence_work"],
-        "lowest_toes": numbers.get("task_sequence_lowest_toes"),
-        "without": None if bare_toes is None else bare_toes.value,
-        "flat_push": numbers["task_sequence_flat_push"],
-        "safe_time": numbers.get("safe_state_time"),
-    }
 
 
 def task_sequence_pictures(comparison: WalkComparison) -> tuple[Section, ...]:
@@ -117,36 +111,12 @@ def task_sequence_pictures(comparison: WalkComparison) -> tuple[Section, ...]:
     return pictures if worn.averages and bare.averages else pictures[:1]
 
 
-def task_sequence_files(comparison: WalkComparison) -> dict[str, Callable[[], bytes]]:
-    """Return the files of the segments with and without the device, by name; {} without a task sequence."""
-    worn, bare = comparison.with_device, comparison.without_device
-    if walk_of(worn.scenario).task_sequence is None:
-        return {}
-    return {
-        "segments.csv": partial(segments_csv, worn.segments),
-        "segments-off.csv": partial(segments_csv, bare.segments),
-    }
-
-
 def segments_csv(segments: Sequence[SegmentResult]) -> bytes:
     """Return a CSV line for each segment, in SI units; a missing value is an empty cell."""
     units = {number.name: si_unit(number.quantity) or "-" for number in _NUMBERS}
     names = [field.name for field in fields(SegmentResult) if field.name != "title"]
     heads = {name: f"{name} [{units[name]}]" if name in units else name for name in names}
     return csv_of({head: [getattr(segment, name) for segment in segments] for name, head in heads.items()})
-
-
-def task_sequence_data(comparison: WalkComparison) -> dict[str, Any]:
-    """Return the segments as data in SI units; {} for a walk without a task sequence."""
-    worn, bare = comparison.with_device, comparison.without_device
-    sequence = walk_of(worn.scenario).task_sequence
-    if sequence is None:
-        return {}
-    return {
-        "task_sequence": sequence.name,
-        "segments": [asdict(segment) for segment in worn.segments],
-        "segments_off": [asdict(segment) for segment in bare.segments],
-    }
 
 
 def trust_remark(configuration: Scenario) -> str:
@@ -158,9 +128,12 @@ def trust_remark(configuration: Scenario) -> str:
         low, high = speed_range(gait)
     except DataError:
         return f"gait '{gait.name}' has no walking speed: how far its strides can be scaled is not known"
-    # A cadence counts both feet; the speed goes with its square, as the walk ratio is constant.
-    ratios = [0.5 * cadence * gait.stride_time for cadence in _given(sequence, "cadence")]
-    speeds = [*_given(sequence, "speed"), *((gait.walking_speed or 0.0) * ratio * ratio for ratio in ratios)]
+    speeds = [segment.values["speed"] for segment in sequence.segments if "speed" in segment.values]
+    for segment in sequence.segments:
+        if "cadence" in segment.values:
+            # A cadence counts both feet; the speed goes with its square, as the walk ratio is constant.
+            ratio = 0.5 * segment.values["cadence"] * gait.stride_time
+            speeds.append((gait.walking_speed or 0.0) * ratio * ratio)
     # A speed at the edge, written in another unit, is not beyond it.
     outside = [speed for speed in speeds if not low - _SAME_SPEED <= speed <= high + _SAME_SPEED]
     if not outside:
@@ -170,8 +143,3 @@ def trust_remark(configuration: Scenario) -> str:
         f"gait '{gait.name}' is scaled to {listed} m/s: beyond {low:.3g} to {high:.3g} m/s, where its angles "
         "and forces are assumed and not measured"
     )
-
-
-def _given(sequence: TaskSequence, name: str) -> list[float]:
-    """Return the values [SI] of a number from all segments that state it."""
-    return [segment.values[name] for segment in sequence.segments if name in segment.values]

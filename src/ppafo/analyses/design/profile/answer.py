@@ -241,12 +241,27 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
 @in_units(lambda sizing: sizing.problem.scenario.device.shown)
 def finding_of(sizing: Sizing) -> Finding[Sizing]:
     """Return a sizing study as a finding; not passed if there is no suggestion."""
-    problem, recording = sizing.problem, sizing.recording
+    problem, profile, recording = sizing.problem, sizing.problem.profile, sizing.recording
+    table_error = profile.table_error
+    knots = f", {profile.knot_times.size} knots, to {_TORQUE.text(table_error)}" if table_error else ""
+    requirements = (
+        f"profile of {TIME.text(profile.period, '.3g')} with up to {_TORQUE.text(profile.largest)} "
+        f"({_ORIGINS[profile.kind]}{knots}); {problem.repetitions:.0f} repetitions ({problem.hours:.2g} h), RMS error "
+        f"at most {_TORQUE.text(problem.largest_error)}, {100 * problem.reserve:.0f} % of the gas as reserve"
+    )
+    carried = f" with {', '.join(part.title for part in problem.carried)}" if problem.carried else ""
+    method = (
+        f"The mass counts valve and full bottle{carried}.",
+        f"{problem.simulated} repetitions of the profile were simulated from the initial state of the scenario; "
+        "error and gas cover all of them, including the first filling of the chambers. Friction, leak, dead volumes "
+        "and sensors are the scenario's; what the data sheet of a valve does not state is taken as ideal.",
+        f"Made with: ppafo design {problem.file}",
+    )
     return Finding(
         name="design",
         kicker="Sizing study",
         title=problem.name,
-        said=(*([problem.description] if problem.description else []), _requirements(sizing)),
+        said=(*([problem.description] if problem.description else []), requirements),
         parts=(
             *_tables(sizing),
             finding.Section(remarks=_remarks(sizing)),
@@ -268,24 +283,12 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 is_detail=True,
             ),
             *parts_to_check(sizing.doubtful),
-            finding.Section("How to read it", said=(*_READING, *_method(problem)), is_detail=True),
+            finding.Section("How to read it", said=(*_READING, *method), is_detail=True),
             part_titles([sized.valve for sized in sizing.valves]),
         ),
         found=sizing,
         passed=sizing.choice is not None,
         files={} if recording is None else {"suggested.csv": partial(marked_csv_bytes, recording)},
-    )
-
-
-def _requirements(sizing: Sizing) -> str:
-    """Return a sentence on the requirements: profile, repetitions, error limit and reserve."""
-    problem, profile = sizing.problem, sizing.problem.profile
-    table_error = profile.table_error
-    knots = f", {profile.knot_times.size} knots, to {_TORQUE.text(table_error)}" if table_error else ""
-    return (
-        f"profile of {TIME.text(profile.period, '.3g')} with up to {_TORQUE.text(profile.largest)} "
-        f"({_ORIGINS[profile.kind]}{knots}); {problem.repetitions:.0f} repetitions ({problem.hours:.2g} h), RMS error "
-        f"at most {_TORQUE.text(problem.largest_error)}, {100 * problem.reserve:.0f} % of the gas as reserve"
     )
 
 
@@ -302,18 +305,6 @@ def _remarks(sizing: Sizing) -> tuple[str, ...]:
         *(f"{sized.valve.name}: {sized.remark}" for sized in sizing.valves if sized.remark),
         *([noisy] if sizing.streams else []),
         f"{sizing.runs:,} runs in {sizing.seconds:.0f} s; {failures}",
-    )
-
-
-def _method(problem: SizingProblem) -> tuple[str, ...]:
-    """Return sentences on the method of the sizing study."""
-    carried = f" with {', '.join(part.title for part in problem.carried)}" if problem.carried else ""
-    return (
-        f"The mass counts valve and full bottle{carried}.",
-        f"{problem.simulated} repetitions of the profile were simulated from the initial state of the scenario; "
-        "error and gas cover all of them, including the first filling of the chambers. Friction, leak, dead volumes "
-        "and sensors are the scenario's; what the data sheet of a valve does not state is taken as ideal.",
-        f"Made with: ppafo design {problem.file}",
     )
 
 

@@ -296,7 +296,16 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
     # The settings that multiply a torque error.
     quantities = CONTROLLERS[scenario.controller.kind].quantities
     gains = tuple(f"controller.{quantity.name}" for quantity in quantities if "(N m" in quantity.unit)
-    lowest, highest = _pressures(document, scenario, file)
+    atmosphere, pressures = scenario.device.supply.atmospheric_pressure, []
+    for key, text in (("lowest", document.pressure.lowest), ("highest", document.pressure.highest)):
+        with refused_as(StudyError, f"{file}: pressure.{key} = '{text}'", UnitError):
+            pressures.append(parse_quantity(text, "Pa_a", atmosphere))
+    lowest, highest = pressures
+    if not atmosphere < lowest < highest:
+        raise StudyError(
+            f"{file}: pressure.lowest = '{document.pressure.lowest}' must be above the atmosphere and below "
+            f"pressure.highest = '{document.pressure.highest}'"
+        )
     use = document.use
     if (use.repetitions is None) == (use.hours is None):
         raise StudyError(f"{file}: use: give either repetitions or hours")
@@ -347,19 +356,3 @@ def _scenario(document: SizingFile, profile: RequiredTorque, folder: Path, file:
     count = math.ceil(Fraction(document.simulated * profile.period).limit_denominator(_LARGEST_DENOMINATOR) / grain)
     duration = f"run.duration={float(count * grain)!r} s"
     return reloaded(plain, (*profile.overrides(), duration))
-
-
-def _pressures(document: SizingFile, scenario: Scenario, file: str) -> tuple[float, float]:
-    atmosphere = scenario.device.supply.atmospheric_pressure
-    values = []
-    for key in ("lowest", "highest"):
-        text = getattr(document.pressure, key)
-        with refused_as(StudyError, f"{file}: pressure.{key} = '{text}'", UnitError):
-            values.append(parse_quantity(text, "Pa_a", atmosphere))
-    lowest, highest = values
-    if not atmosphere < lowest < highest:
-        raise StudyError(
-            f"{file}: pressure.lowest = '{document.pressure.lowest}' must be above the atmosphere and below "
-            f"pressure.highest = '{document.pressure.highest}'"
-        )
-    return lowest, highest

@@ -77,8 +77,17 @@ def alternatives_to(
         yield from itertools.islice(filter(None, stronger), 1)
     # A walk that ends early is no full answer: less torque for the whole time is offered beside it.
     if all(alternative.requirements.seconds < requirements.seconds for alternative in alternatives):
-        lasting = _lasting(requirements, weak, bottle, shelf)
-        yield from [] if lasting is None else [lasting]
+        # The one with the most torque that walks for all of the time.
+        largest_flow = _USABLE * bottle.values["content"] / requirements.seconds
+        for candidate in weak:
+            if candidate.pair.flow > largest_flow:
+                continue
+            alternative = _as_walked(candidate, bottle, shelf)
+            if alternative is not None and alternative.requirements.seconds == requirements.seconds:
+                yield alternative
+                break
+            lasted = 0.0 if alternative is None else alternative.requirements.seconds
+            largest_flow = lasting_flow(candidate.pair, lasted, requirements.seconds)
 
 
 def _at_less_pressure(
@@ -128,22 +137,6 @@ def _thriftiest(able: Sequence[_Candidate], bottle: Part, shelf: AvailableParts)
             return alternative
         fallback = alternative if fallback is None else fallback
     return fallback
-
-
-def _lasting(
-    requirements: DesignRequirements, weak: Sequence[_Candidate], bottle: Part, shelf: AvailableParts
-) -> Alternative | None:
-    """Return the alternative with the most torque that walks for all of the time on a bottle; None if none does."""
-    largest_flow = _USABLE * bottle.values["content"] / requirements.seconds
-    for candidate in weak:
-        if candidate.pair.flow > largest_flow:
-            continue
-        alternative = _as_walked(candidate, bottle, shelf)
-        if alternative is not None and alternative.requirements.seconds == requirements.seconds:
-            return alternative
-        lasted = 0.0 if alternative is None else alternative.requirements.seconds
-        largest_flow = lasting_flow(candidate.pair, lasted, requirements.seconds)
-    return None
 
 
 def _as_walked(candidate: _Candidate, bottle: Part, shelf: AvailableParts) -> Alternative | None:

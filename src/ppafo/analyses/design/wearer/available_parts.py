@@ -7,7 +7,6 @@ from pathlib import Path
 from ppafo.analyses.design.wearer.requirements import WALKS
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part, load_catalogue
-from ppafo.parameters.parts.catalogue import rated_pressure
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,18 +39,6 @@ class AvailableParts:
         if self.chosen_bottle:
             return self.chosen_bottle
         return f"{self.file}/{bottle.name}" if "bottles" in self.own_groups else bottle.name
-
-    def pairs(self, pressure: float) -> list[tuple[Part, Part]]:
-        """Return every pair of valve and actuator that is rated for a supply pressure [Pa absolute].
-
-        A part without a rated pressure in the catalogue is included.
-        """
-        return [
-            (valve, actuator)
-            for valve in self.groups["valves"].values()
-            for actuator in self.groups["actuators"].values()
-            if rated_pressure(valve, actuator) >= pressure
-        ]
 
 
 def shelf_of(catalogue: str | Path) -> AvailableParts:

@@ -26,7 +26,7 @@ from ppafo.analyses.design.wearer.strides import SHUT_OFF_PARTS, few_strides, of
 from ppafo.analyses.endurance.solve import endurance_of_walk
 from ppafo.parameters.bottles.bottle import bottle_part
 from ppafo.parameters.parts import Part
-from ppafo.parameters.parts.catalogue import DEFAULT
+from ppafo.parameters.parts.catalogue import DEFAULT, rated_pressure
 from ppafo.progress import Progress, Report
 from ppafo.walking.loading import load_walk
 from ppafo.walking.result import WalkResult
@@ -62,7 +62,13 @@ def size_for_wearer(
     healthy = healthy_metrics(walking)["lowest_toes"].value
     # What the healthy gait itself does not do is not asked of a device, unless somebody does.
     requirements = replace(requirements, usual_toes=shown_clearance(min(TOES, healthy)))
-    pairs = shelf.pairs(requirements.pressure)
+    # A part without a rated pressure in the catalogue is included.
+    pairs = [
+        (valve, actuator)
+        for valve in shelf.groups["valves"].values()
+        for actuator in shelf.groups["actuators"].values()
+        if rated_pressure(valve, actuator) >= requirements.pressure
+    ]
     tried: list[WalkedDevice] = []
     for number, (valve, actuator) in enumerate(pairs):
         report(Progress(f"walking with {valve.name}", number, len(pairs), noun="pairs"))

@@ -66,9 +66,14 @@ def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -
             peak = (f"controller.peak_torque={text}",)
             lifts = [(), (f"controller.swing_peak_torque={written_text(torque, 'N m')}", *_EARLY_LIFT)]
         for lift in lifts:
-            tried = _strides_of(valve, actuator, (*common, *peak, *limit, *lift))
-            if tried is None:
+            overrides = (*common, *peak, *limit, *lift)
+            result = walk(load_walk(WALKS[valve.kind], overrides), minutes=_MINUTES)
+            # Strides without help say nothing, nor do those of a torque loop that oscillates.
+            if not (result.status.is_completed and result.is_helped and result.averages) or result.tracking:
                 break
+            flow = result.metrics["gas"].value / walk_of(result.scenario).gait.stride_time
+            mean_peak, toes = float(result.averages["torque"].mean.max()), result.metrics["lowest_toes"].value
+            tried = WalkedDevice(valve, actuator, overrides, mean_peak, flow, toes)
             # A request that has all of the torque goes before one that all but reaches it.
             if tried.torque >= requirements.torque and tried.has(requirements):
                 return [tried]
@@ -96,13 +101,3 @@ def _common_overrides(requirements: DesignRequirements, valve: Part, actuator: P
         *(f"{path}={written_text(number, units[path.partition('.')[2]])}" for path, number in numbers.items()),
         f"shut_off.area={written_text(SHUT_OFF_PARTS['area'], 'm^2')}",
     )
-
-
-def _strides_of(valve: Part, actuator: Part, overrides: tuple[str, ...]) -> WalkedDevice | None:
-    """Return a few strides with given overrides; None if they provide no help or the torque loop oscillates."""
-    result = walk(load_walk(WALKS[valve.kind], overrides), minutes=_MINUTES)
-    if not result.status.is_completed or not result.is_helped or not result.averages or result.tracking:
-        return None
-    flow = result.metrics["gas"].value / walk_of(result.scenario).gait.stride_time
-    torque = float(result.averages["torque"].mean.max())
-    return WalkedDevice(valve, actuator, overrides, torque, flow, result.metrics["lowest_toes"].value)
