@@ -1,16 +1,21 @@
 """Controller gains in use in a run, and their origin."""
 
+import logging
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.ports import load_torque
 from ppafo.parameters.effects import effects_of
-from ppafo.parameters.graph import LinkFunction
+from ppafo.parameters.graph import LinkFunction, acting
+from ppafo.parameters.overrides import other_forms
 from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.default_gains import DEAD_TIME, GAIN_TERMS, RATE, loop_terms
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
+
+logger = logging.getLogger("ppafo")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,3 +86,30 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     of_joint = any(gain.computed for gain in gains) and not isinstance(scenario.motion, PrescribedMotion)
     loads = [effect.section for effect in effects_of(scenario.device) if load_torque in effect.laws]
     return Gains(gains, rate, late, CONTROLLED[controlled].plain_unit, tuple(loads) if of_joint else ())
+
+
+def remark_on_following_gains(scenario: Scenario, varied: Collection[str]) -> str:
+    """Return a remark on gains computed anew for each value of the varied paths; empty if no gain follows them."""
+    gains = None if scenario.law is None else gains_of(scenario, scenario.law)
+    if gains is None:
+        return ""
+    paths = {form for path in varied for form in (path, *other_forms(path))}
+    moved = acting(scenario.graph, paths)
+    following = [gain for gain in gains.gains if f"controller.{gain.name}" in moved]
+    if not following:
+        return ""
+    options = " ".join(
+        f"--set 'controller.{gain.name}={f'{gain.value:.6g} {gain.unit}'.removesuffix(' -').rstrip()}'"
+        for gain in following
+    )
+    names = ", ".join(gain.name for gain in following)
+    return (
+        f"{scenario.name}: {names} {'is' if len(following) == 1 else 'are'} computed anew from the varied values, as "
+        f"if the controller knew them in every run; for the gains of the nominal device: {options}"
+    )
+
+
+def warn_of_following_gains(scenario: Scenario, varied: Collection[str]) -> None:
+    """Log the remark on gains that follow varied values, if there is one."""
+    if remark := remark_on_following_gains(scenario, varied):
+        logger.warning("ppafo: %s", remark)

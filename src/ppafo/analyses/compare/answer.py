@@ -16,6 +16,7 @@ from ppafo.report.kind import ConfidenceInterval, Kind, of_metric
 from ppafo.report.live_parts import live_part
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, COLOURS, GREY, look_of_valve
+from ppafo.simulation.gains import remark_on_following_gains
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.tracking import Tracking
@@ -257,6 +258,9 @@ def remarks_of(comparison: ComparisonResult) -> list[str]:
             where = f"{case.configuration}, {task.task}"
             if coarse := coarse_pair(case.scenario):
                 remarks.append(coarse)
+            following = remark_on_following_gains(case.scenario, comparison.varied)
+            if following and following not in remarks:
+                remarks.append(following)
             if not case.status.is_completed:
                 failed.append(f"{where}: {case.status.message}")
             if case.tracking is not None and not case.follows:

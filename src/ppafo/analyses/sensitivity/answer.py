@@ -43,6 +43,8 @@ def finding_of(influences: Influences) -> Finding[Influences]:
         sentences.append(
             f"in {influences.not_following:,} runs the reference is not followed: the indices are of these too"
         )
+    if influences.gains:
+        sentences.append(influences.gains)
     figure = Section(
         "Indices and their convergence",
         panels=lambda: [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)],
@@ -76,7 +78,8 @@ def _part(influences: Influences, metric: MetricSensitivity) -> Section:
     ends = [None if math.isnan(change[row]) else f"± {kind.change_number(band[row], '.2g')}" for row in order]
     change_cells = [None if math.isnan(change[row]) else change[row] for row in order]
     columns += [Column("change, 5 to 95 %", change_cells, kind, is_change=True), Column("band", ends)]
-    heading = f"{metric.metric}: sd {kind.change(metric.standard_deviation)}"
+    mean = of_metric(metric.metric).number(metric.mean)
+    heading = f"{metric.metric}: mean {mean}, sd {kind.change(metric.standard_deviation)}"
     if metric.dropped_blocks:
         label = METHODS[influences.method].sizes_label
         heading += f"; {metric.dropped_blocks:,} of {influences.settings.samples:,} {label} left out"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ppafo.analyses.sensitivity.methods import EvaluatedBlocks, Indices, Method, changes
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
+from ppafo.simulation.gains import remark_on_following_gains
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import Uncertainty
@@ -97,6 +98,7 @@ class Influences:
     ``paths``: paths of the uncertain values
     ``runs``, ``failed``: number of runs, and of failed runs
     ``not_following``: number of completed runs that do not follow their reference
+    ``gains``: remark on controller gains that follow the uncertain values, empty if none does
     """
 
     study: str
@@ -108,6 +110,7 @@ class Influences:
     not_following: int
     policy: str
     metrics: list[MetricSensitivity]
+    gains: str = ""
 
 
 _POLICY = "above the maximum fraction refused; below, every block with a failed run is left out"
@@ -169,6 +172,7 @@ def analyse(
         not_following=int(off),
         policy=_POLICY,
         metrics=[_metric_sensitivity(name, rows[name], evaluated, method, settings) for name in requested],
+        gains="" if scenario is None else remark_on_following_gains(scenario, uncertainty.paths),
     )
 
 

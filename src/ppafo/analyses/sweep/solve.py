@@ -30,6 +30,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding
 from ppafo.signals.recording import CHANNELS
+from ppafo.simulation.gains import warn_of_following_gains
 from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 from ppafo.storage.files import temporary_folder
 from ppafo.storage.parquet import TableColumn, encode_texts, matrix_of, parquet_bytes, table_of
@@ -246,6 +247,11 @@ def sweep(
     kept = temporary_folder("ppafo-study") if out is None else None
     folder = study_folder(kept.name if kept is not None else str(out))
     warn_of_coarse_pairs(configuration.scenario for configuration in chosen.configurations)
+    for configuration in chosen.configurations:
+        varied = {*chosen.paths, *chosen.same}
+        warn_of_following_gains(
+            configuration.scenario, [path for path in varied if chosen.varies(path, configuration.name)]
+        )
     store = StudyStore.claim(chosen, folder, agreed, threads)
     _compute_missing_chunks(store, threads, progress)
     results = StudyResults(folder, read_manifest(folder), {}, kept)
