@@ -11,13 +11,14 @@ from importlib.resources import files
 from typing import Any
 
 from ppafo.errors import ScenarioError, UnitError
-from ppafo.page.motions import declared_content, page_look, relations_in_files, usual_changes, with_limits
+from ppafo.page.motions import declared_content, is_walk, relations_in_files, usual_changes, with_limits
 from ppafo.page.wasm import WasmModule
 from ppafo.page.wasm.description import display_of
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import over, read_overrides
 from ppafo.report.display_units import metric_quantity
 from ppafo.report.setting_names import label_of
+from ppafo.report.style import PAGE_LOOKS
 from ppafo.simulation.declaration import PRESSURE_WORDS
 from ppafo.simulation.overrides import apply_overrides, is_of_device
 from ppafo.simulation.scenario import Scenario
@@ -94,7 +95,8 @@ def program_content(simulated: PageSimulation, module: str, intervals: Mapping[s
         "name": described["name"],
         "kind": described["kind"],
         "label": simulated.label,
-        "look": page_look(scenario),
+        # Walks, with and without the device, have colours in order.
+        "look": 0 if is_walk(scenario) else PAGE_LOOKS.get(scenario.device.valve.kind, 0),
         "description": " ".join(described["title"].split()),
         "document": document,
         "usual": usual_changes(scenario),
