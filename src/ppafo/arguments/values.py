@@ -137,20 +137,13 @@ def shown(value: Any) -> str:
     return f"<{type(value).__name__}>"
 
 
-def _taken_path(value: Any) -> Path:
-    """Return a Path; a text is left to the converter of names, which precedes this one wherever both are accepted."""
-    path = Path(taken_text(os.fspath(value)))
-    if "\0" in str(path):
-        raise ValueError
-    return path
-
-
 _PLAIN: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
     str: ("a text", taken_text),
     bool: ("True or False", taken_flag),
     int: ("a whole number", taken_whole(-(2**63))),
     float: ("a finite number", taken_number()),
-    Path: ("a path", _taken_path),
+    # Where a name is accepted too, its converter comes first and takes texts.
+    Path: ("a path", lambda value: Path(taken_text(os.fspath(value)))),
 }
 """Description and converter of each type without a ``Word``."""
 
