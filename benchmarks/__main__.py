@@ -9,7 +9,6 @@ from benchmarks.command import run_command
 from ppafo.cli.output import (
     EXIT_CHECK_FAILED,
     EXIT_GOOD,
-    add_json_argument,
     check_output,
     print_result,
     tell,
@@ -26,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument("--quick", action="store_true", help="a small version, about a minute")
     parser.add_argument("--check", action="store_true", help="exit 1 where a target is not met")
-    add_json_argument(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
     parser.add_argument("--out", metavar="DIR", type=Path, help=f"also write {', '.join(FILES)} here")
     parser.set_defaults(command=COMMAND)
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from benchmarks.command import run_command
 from benchmarks.report import describe_machine
-from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, add_json_argument, print_result, tell
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, print_result, tell
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.run import batch_of
 from ppafo.errors import SimulationError
@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--runs", metavar="N", type=int, default=256, help="runs of a repetition (default: 256)")
     parser.add_argument("--repetitions", metavar="N", type=int, default=7, help="the best counts (default: 7)")
     parser.add_argument("--check", action="store_true", help=f"exit 1 where an effect costs more than {GATE:g} times")
-    add_json_argument(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -15,7 +15,7 @@ import gymnasium
 import ppafo.gym
 from benchmarks.command import run_command
 from benchmarks.report import describe_machine
-from ppafo.cli.output import EXIT_GOOD, add_json_argument, print_result
+from ppafo.cli.output import EXIT_GOOD, print_result
 from ppafo.errors import SimulationError
 
 COUNT = 4096
@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument("--count", metavar="N", type=int, default=COUNT, help=f"environments (default: {COUNT})")
     parser.add_argument("--repetitions", metavar="N", type=int, default=5, help="the best counts (default: 5)")
-    add_json_argument(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
 
 def main(words: Sequence[str] | None = None) -> int:

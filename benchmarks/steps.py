@@ -19,7 +19,7 @@ from typing import Any
 from benchmarks.command import run_command
 from benchmarks.timing import Outcome, run_python
 from ppafo.cli.main import OBJECTS_BETWEEN_COLLECTIONS
-from ppafo.cli.output import EXIT_GOOD, add_json_argument, print_result, tell
+from ppafo.cli.output import EXIT_GOOD, print_result, tell
 from ppafo.errors import SimulationError
 
 ENTRY = "import sys; from ppafo.cli.main import main; sys.exit(main())"
@@ -133,7 +133,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--steps-into", metavar="DIR", type=Path, help="do the steps once, in this process, and print them"
     )
-    add_json_argument(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
 
 def run(parsed: argparse.Namespace) -> int:

@@ -137,20 +137,13 @@ def shown(value: Any) -> str:
     return f"<{type(value).__name__}>"
 
 
-def _taken_path(value: Any) -> Path:
-    """Return a Path; a text is left to the converter of names, which precedes this one wherever both are accepted."""
-    path = Path(taken_text(os.fspath(value)))
-    if "\0" in str(path):
-        raise ValueError
-    return path
-
-
 _PLAIN: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
     str: ("a text", taken_text),
     bool: ("True or False", taken_flag),
     int: ("a whole number", taken_whole(-(2**63))),
     float: ("a finite number", taken_number()),
-    Path: ("a path", _taken_path),
+    # Where a name is accepted too, its converter comes first and takes texts.
+    Path: ("a path", lambda value: Path(taken_text(os.fspath(value)))),
 }
 """Description and converter of each type without a ``Word``."""
 
@@ -186,17 +179,17 @@ def _of_class(kind: type, inner: tuple[Any, ...]) -> AcceptedValues:
         return _several(accepted_values(inner[0]))
     if kind is typing.get_origin(Callable[..., Any]):
         return _single("a function", lambda value: _accepted(value, callable(value)))
-    return _single(f"a {kind.__name__}", lambda value: _accepted(value, _is_instance(kind, value)))
+    if issubclass(kind, _NotLoaded):
+        # An object of a class that is not imported here is recognised by its name.
+        return _single(
+            f"a {kind.__name__}",
+            lambda value: _accepted(value, kind.__name__ in [base.__name__ for base in type(value).__mro__]),
+        )
+    return _single(f"a {kind.__name__}", lambda value: _accepted(value, isinstance(value, kind)))
 
 
 def _is_iterable(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, Iterable) and not issubclass(kind, str | bytes)
-
-
-def _is_instance(kind: type, value: Any) -> bool:
-    """Return True if a value is an instance of a class, which may be a placeholder for one not imported."""
-    is_named = issubclass(kind, _NotLoaded) and any(base.__name__ == kind.__name__ for base in type(value).__mro__)
-    return is_named or isinstance(value, kind)
 
 
 def _accepted(value: Any, is_accepted: bool) -> Any:

@@ -160,7 +160,7 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
         _add_parameter(parser, parameter, reading, help_text, command.lists and is_alone, is_listing)
     if command.lists:
         parser.add_argument("--list", action="store_true", help="list what comes with the package")
-    output.add_json_argument(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
     parser.add_argument(
         "--plugin",
         metavar="MODULE",

@@ -56,6 +56,7 @@ def doctor(
     """
     from ppafo.engine.cache import tidying
     from ppafo.engine.cache.folder import cache_folder, refusal
+    from ppafo.engine.loading import compilers_to_try
 
     requests = {"--warm": warm, "--clear": clear, "--bits": bits, "--schema": schema, "--programs": programs}
     options = [option for option, value in requests.items() if value]
@@ -69,7 +70,15 @@ def doctor(
         document = importlib.import_module(FORMATS[schema]).json_schema()
         return CommandOutput(json_text(document), document, f"{schema}.schema")
     if bits:
-        return _bits()
+        from ppafo.golden_bits import found_bits
+
+        is_equal = dict(found_bits())
+        others = [name for name in is_equal if not is_equal[name]]
+        compiler = compilers_to_try()[0].name
+        lines = [f"bits: {len(is_equal) - len(others)} of {len(is_equal)} runs have the recorded bits ({compiler})"]
+        lines += [f"  {name}: other bits; give its scenario, this computer and compiler in a report" for name in others]
+        code = EXIT_CHECK_FAILED if others else EXIT_GOOD
+        return CommandOutput("\n".join(lines), {"compiler": compiler, "same_bits": is_equal}, "bits", code)
     folder = cache_folder()
     cleared = tidying.clear(folder) if clear and folder is not None else 0
     why_not = "" if clear else refusal(folder)
@@ -82,20 +91,6 @@ def doctor(
         compile_models(load_scenario(name) for name in list_scenarios())
     document = models_document(folder, why_not) | ({"freed": cleared} if clear else {})
     return CommandOutput(models_text(document, programs), document, "doctor")
-
-
-def _bits() -> CommandOutput:
-    """Compare every run with its recorded bits, and return the number that agrees and the names of the others."""
-    from ppafo.engine.loading import compilers_to_try
-    from ppafo.golden_bits import found_bits
-
-    is_equal = dict(found_bits())
-    others = [name for name in is_equal if not is_equal[name]]
-    compiler = compilers_to_try()[0].name
-    lines = [f"bits: {len(is_equal) - len(others)} of {len(is_equal)} runs have the recorded bits ({compiler})"]
-    lines += [f"  {name}: other bits; give its scenario, this computer and compiler in a report" for name in others]
-    code = EXIT_CHECK_FAILED if others else EXIT_GOOD
-    return CommandOutput("\n".join(lines), {"compiler": compiler, "same_bits": is_equal}, "bits", code)
 
 
 def models_document(folder: Path | None, why_not: str) -> dict[str, Any]:

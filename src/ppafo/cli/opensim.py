@@ -52,7 +52,10 @@ def export_opensim(
         if value is not None:
             other = "a walk, not a recording" if is_recording else "a recording; a walk knows its wearer"
             raise DataError(f"{option}: is for {other}")
-    from ppafo.exports.opensim import files_of_recording, files_of_walk
+    from ppafo.exports.opensim import files_of_walk
+    from ppafo.storage.opensim import opensim_bytes
+    from ppafo.storage.opensim_names import opensim_recording
+    from ppafo.storage.reading import read_recording
 
     # Known once the files are made, and said after that.
     missing: list[str] = []
@@ -60,9 +63,9 @@ def export_opensim(
     def make() -> dict[str, bytes]:
         if not is_recording:
             return files_of_walk(walk, tuple(overrides), gait, minutes, side, strikes)
-        files, found = files_of_recording(path, side, body_mass)
+        recording, found = opensim_recording(read_recording(path), side, body_mass)
         missing.extend(found)
-        return files
+        return {"recording.sto": opensim_bytes(recording)}
 
     def following(_: Sequence[str]) -> str:
         file = shlex.quote(str(out / ("recording.sto" if is_recording else "device_torque.sto")))

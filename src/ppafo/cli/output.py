@@ -1,6 +1,5 @@
 """Delivery of a result: printing as text or JSON, writing of a folder completely or not at all, and exit code."""
 
-import argparse
 import contextlib
 import logging
 import os
@@ -25,11 +24,6 @@ EXIT_GOOD = 0
 EXIT_CHECK_FAILED = 1
 # As a shell has it for what SIGINT, signal 2, ended: 128 + 2.
 EXIT_INTERRUPTED = 130
-
-
-def add_json_argument(parser: argparse.ArgumentParser) -> None:
-    """Add the option ``--json``, common to all commands."""
-    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
 
 def check_output(out: Path | None, command: str) -> None:

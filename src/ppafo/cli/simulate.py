@@ -50,11 +50,24 @@ def simulate(
     with shown_in(loaded.device.shown):
         warn_of_coarse_pairs([loaded])
         report = assessed(run_scenario(loaded), check)
+        tracking = report.tracking
+        # A reference that is not followed makes the result useless, and a check fails.
+        is_useless = tracking is not None and tracking.is_useless
+        passes = report.check is None or (report.check.is_determined and not is_useless)
         return CommandOutput(
             _text(report),
-            {**_document(report), "folder": str(folder)},
+            {
+                "scenario": loaded.name,
+                "status": plain(report.result.status),
+                "tracking": None if tracking is None else {**plain(tracking), "sentence": tracking.sentence},
+                "gains": plain(report.gains),
+                "metrics": {name: plain(metric) for name, metric in report.result.metrics.items()},
+                **({} if report.error is None else {"error": plain(report.error)}),
+                **({} if report.check is None else {"check": report.check.document()}),
+                "folder": str(folder),
+            },
             finish=partial(_write, report, folder),
-            exit_code=EXIT_GOOD if report.is_good else EXIT_CHECK_FAILED,
+            exit_code=EXIT_GOOD if report.result.status.is_completed and passes else EXIT_CHECK_FAILED,
             aside="" if report.result.status.is_completed else f"{loaded.name}: {report.result.status.message}",
         )
 
@@ -68,14 +81,6 @@ class _RunReport:
     error: "ErrorEstimate | None"
     tracking: "Tracking | None"
     gains: "Gains | None"
-
-    @property
-    def is_good(self) -> bool:
-        """True for a completed run whose check, if requested, finds it repeatable and of use."""
-        # A reference that is not followed makes the result useless, and a check fails.
-        is_useless = self.tracking is not None and self.tracking.is_useless
-        passes = self.check is None or (self.check.is_determined and not is_useless)
-        return self.result.status.is_completed and passes
 
     @property
     def verdict(self) -> list[str]:
@@ -114,20 +119,6 @@ def _text(report: _RunReport) -> str:
     # Gains that are in force are no news: they stand last.
     last = [*accuracy, *report.gain_text]
     return "\n".join([*head, *metrics_lines(report.result.metrics), *([""] if last else []), *last])
-
-
-def _document(report: _RunReport) -> dict[str, Any]:
-    """Return the run and its assessment as plain data in SI units."""
-    result, tracking = report.result, report.tracking
-    return {
-        "scenario": result.scenario.name,
-        "status": plain(result.status),
-        "tracking": None if tracking is None else {**plain(tracking), "sentence": tracking.sentence},
-        "gains": plain(report.gains),
-        "metrics": {name: plain(metric) for name, metric in result.metrics.items()},
-        **({} if report.error is None else {"error": plain(report.error)}),
-        **({} if report.check is None else {"check": report.check.document()}),
-    }
 
 
 @in_units(lambda report, _folder: report.result.scenario.device.shown)

@@ -16,7 +16,6 @@ from ppafo.gait.recorded.mapping import Side
 from ppafo.signals import Channel, Recording
 from ppafo.storage.opensim import opensim_bytes
 from ppafo.storage.opensim_names import opensim_recording
-from ppafo.storage.reading import read_recording
 from ppafo.walking.loading import check_duration_once, load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
@@ -55,12 +54,6 @@ def files_of_walk(
     few_strides = FEW_STRIDES if walk_of(chosen).task_sequence is None else None
     result = walk(chosen, minutes=few_strides if minutes is None else minutes)
     return opensim_files(result, side, strikes or ())
-
-
-def files_of_recording(path: Path, side: Side, body_mass: float | None) -> tuple[dict[str, bytes], list[str]]:
-    """Return the OpenSim file of a recording, and the channels omitted since they need a ``body_mass`` [kg]."""
-    recording, missing = opensim_recording(read_recording(path), side, body_mass)
-    return {"recording.sto": opensim_bytes(recording)}, list(missing)
 
 
 def device_torque(result: WalkResult, side: Side = "right", strikes: Sequence[float] = ()) -> Recording:

@@ -135,10 +135,8 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
-        self.single_observation_space, self.single_action_space = (
-            self.world.observation_space,
-            self.world.action_space,
-        )
+        self.single_observation_space = self.world.observation_space
+        self.single_action_space = self.world.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._lanes = self.world.lanes(num_envs)

@@ -146,18 +146,16 @@ class EnvironmentSettings:
     def __post_init__(self) -> None:
         # Before a scenario is loaded that names what is in them.
         name_plugins(self.plugins)
-        _check_word("actions", self.actions, (CONTINUOUS, ON_OFF))
-        _check_word("observations", self.observations, (PHYSICAL, SCALED))
+        allowed_words = {"actions": (CONTINUOUS, ON_OFF), "observations": (PHYSICAL, SCALED)}
+        for name, allowed in allowed_words.items():
+            word = getattr(self, name)
+            if word not in allowed:
+                hint = nearest_name(word, allowed)
+                raise ScenarioError(f"{name} = {word!r}: must be '{allowed[0]}' or '{allowed[1]}'{hint}")
         if self.vary and not self.randomise:
             raise ScenarioError("vary: with randomise = False nothing is drawn; omit one of them")
         if not (isinstance(self.frame_skip, int) and self.frame_skip >= 1):
             raise ScenarioError(f"frame_skip = {self.frame_skip!r}: must be a whole number of samples, at least 1")
-
-
-def _check_word(name: str, word: Any, allowed: tuple[str, str]) -> None:
-    if word not in allowed:
-        hint = nearest_name(word, allowed)
-        raise ScenarioError(f"{name} = {word!r}: must be '{allowed[0]}' or '{allowed[1]}'{hint}")
 
 
 def settings_of(arguments: Mapping[str, Any]) -> EnvironmentSettings:

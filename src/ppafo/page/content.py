@@ -12,7 +12,7 @@ from typing import Any
 
 from ppafo.errors import ScenarioError, UnitError
 from ppafo.model.controlled import CONTROLLED
-from ppafo.page.motions import declared_content, page_look, relations_in_files, usual_changes, with_limits
+from ppafo.page.motions import declared_content, is_walk, relations_in_files, usual_changes, with_limits
 from ppafo.page.wasm import WasmModule
 from ppafo.page.wasm.description import display_of
 from ppafo.parameters.graph import ATMOSPHERE_PATH
@@ -20,6 +20,7 @@ from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.parameters.overrides import over, read_overrides
 from ppafo.report.display_units import metric_quantity
 from ppafo.report.setting_names import REFERENCE_LEVELS, label_of
+from ppafo.report.style import PAGE_LOOKS
 from ppafo.simulation.declaration import PRESSURE_WORDS
 from ppafo.simulation.overrides import apply_overrides, is_of_device
 from ppafo.simulation.profiles import limits_of
@@ -95,7 +96,8 @@ def program_content(simulated: PageSimulation, module: str, intervals: Mapping[s
         "name": described["name"],
         "kind": described["kind"],
         "label": simulated.label,
-        "look": page_look(scenario),
+        # Walks, with and without the device, have colours in order.
+        "look": 0 if is_walk(scenario) else PAGE_LOOKS.get(scenario.device.valve.kind, 0),
         "description": " ".join(described["title"].split()),
         "document": document,
         "usual": usual_changes(scenario),

@@ -1,10 +1,9 @@
-"""Presentation of scenarios and walks on a page: tab, colour, and setting limits known only from files."""
+"""Presentation of scenarios and walks on a page: tab, and setting limits known only from files."""
 
 import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from ppafo.report.style import PAGE_LOOKS
 from ppafo.simulation.declaration import OF_A_VANE, DeclaredContent
 from ppafo.simulation.motion_kind import WALK
 from ppafo.simulation.scenario import Scenario, vane_motion
@@ -25,11 +24,6 @@ def declared_content(scenario: Scenario) -> DeclaredContent:
     from ppafo.walking.declaration import OF_A_WALK
 
     return OF_A_WALK
-
-
-def page_look(scenario: Scenario) -> int:
-    """Return the colour number of a scenario; walks, with and without the device, get 0: colours in order."""
-    return 0 if is_walk(scenario) else PAGE_LOOKS.get(scenario.device.valve.kind, 0)
 
 
 def tab_title(scenario: Scenario) -> str:

@@ -294,22 +294,17 @@ def page_files(finding: Finding[Any]) -> dict[str, bytes]:
         on_page[name] = formats.get("svg") or formats["gif"]
     if finding.page is not None:
         return files | {REPORT: finding.page(on_page)}
+    parts = []
+    for section in finding.parts:
+        heads = [column.head for column in section.columns] if section.has_head else []
+        # A unit in brackets stays on one line.
+        heads = [_UNIT_IN_BRACKETS.sub(lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), head) for head in heads]
+        parts.append((section, heads, inline_figure(on_page[section.name]) if section.name else ""))
     values = {
         "finding": finding,
-        "parts": [
-            (section, _head_of(section), inline_figure(on_page[section.name]) if section.name else "")
-            for section in finding.parts
-        ],
+        "parts": parts,
         "origin": _ORIGINS[finding.kind],
         "versions": f"ppafo {__version__}",
         "live": None if finding.live is None else finding.live(),
     }
     return files | {REPORT: render_page("finding.html.jinja", values).encode()}
-
-
-def _head_of(section: Section) -> list[str]:
-    """Return the titles of a table, with non-breaking spaces within a unit in brackets."""
-    if not section.has_head:
-        return []
-    heads = [column.head for column in section.columns]
-    return [_UNIT_IN_BRACKETS.sub(lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), head) for head in heads]

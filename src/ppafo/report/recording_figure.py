@@ -6,6 +6,8 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import DataError
 from ppafo.parameters.joint import ANKLE, JointNames
@@ -110,14 +112,12 @@ def recording_figure(
     active atmosphere (``units/shown.py``).
     """
     title = title or recording.label
-    held = _held_angle(recording)
-    if held is not None:
-        title = f"{title}, {joint.name} at {_ANGLE.text(held)}"
-    drawn = [
-        quantity
-        for quantity in _QUANTITIES
-        if not quantity.lines.keys().isdisjoint(recording.names) and (quantity.kind is not _ANGLE or held is None)
-    ]
+    drawn = [quantity for quantity in _QUANTITIES if not quantity.lines.keys().isdisjoint(recording.names)]
+    others = [quantity for quantity in drawn if quantity.kind is not _ANGLE]
+    may_be_locked = recording.kind == "simulated" and "angle" in recording and "reference_angle" not in recording
+    if others and may_be_locked and len(recording) > 1 and np.ptp(recording["angle"]) == 0.0:
+        drawn = others
+        title = f"{title}, {joint.name} at {_ANGLE.text(float(recording['angle'][0]))}"
     if not drawn:
         channels = ", ".join(channel for quantity in _QUANTITIES for channel in quantity.lines)
         raise DataError(f"{recording.label}: has nothing to draw; a figure shows {channels}")
@@ -143,16 +143,6 @@ def _panel(recording: Recording, quantity: _Quantity, valve: str, joint: JointNa
     vents = kind is _COMMAND and float(recording["command"].max()) > 1.0
     shown_kind = _COMMAND_THAT_VENTS if vents else kind
     return Panel(TIME, replace(shown_kind, words=joint.said(shown_kind.words)), marks, then=then, shares_x=True)
-
-
-def _held_angle(recording: Recording) -> float | None:
-    """Return the constant angle [rad] of a simulated locked ankle, or None if it moves or nothing else can be drawn."""
-    others = [name for quantity in _QUANTITIES for name in quantity.lines if name != "angle" and name in recording]
-    is_followed = "reference_angle" in recording
-    if recording.kind != "simulated" or "angle" not in recording or not others or is_followed:
-        return None
-    angle = recording["angle"]
-    return float(angle[0]) if angle.size > 1 and bool((angle == angle[0]).all()) else None
 
 
 def _set_limits(

@@ -53,13 +53,18 @@ def draw_stored_result(stored: StoredResult) -> "Figure":
     Raises DataError that names the invalid key of ``run.json``.
     """
     file, document = stored.folder / RUN_FILE, stored.document
-    name = _under(file, document, "scenario").get("name", "")
-    if not isinstance(name, str):
-        raise _other_form(file, "scenario.name", name, "a text")
+    title = _under(file, document, "scenario").get("name", "")
+    if not isinstance(title, str):
+        raise _other_form(file, "scenario.name", title, "a text")
     valve = str(_under(file, document, "scenario", "device", "valve").get("kind", ""))
-    joint = stated_joint(file, document, "scenario", "device")
+    words = _under(file, document, "scenario", "device", "joint")
+    joint = {name: words.get(name, getattr(ANKLE, name)) for name in ("name", "positive", "negative")}
+    for name, word in joint.items():
+        if not isinstance(word, str):
+            raise _other_form(file, f"scenario.device.joint.{name}", word, "a text")
+    names = JointNames(**{name: one_line(word)[:_LONGEST_SHOWN] for name, word in joint.items()})
     with shown_in(stated_units(file, document, device=("scenario", "device"))):
-        return shown(recording_figure(stored.recording, one_line(name), _ending(file, document), valve, joint))
+        return shown(recording_figure(stored.recording, one_line(title), _ending(file, document), valve, names))
 
 
 def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recording) -> "Figure":
@@ -99,19 +104,6 @@ def stated_units(
     if not is_number or not 0.0 < atmosphere < _LARGEST:
         raise _other_form(file, ".".join(path), atmosphere, "a pressure in Pa")
     return counted_from(stated, float(atmosphere))
-
-
-def stated_joint(file: Path, document: Mapping[str, Any], *device: str) -> JointNames:
-    """Return the names of the joint from the device at some keys of a document; the default is the ankle.
-
-    Raises DataError that names the invalid key.
-    """
-    words = _under(file, document, *device, "joint")
-    joint = {name: words.get(name, getattr(ANKLE, name)) for name in ("name", "positive", "negative")}
-    for name, word in joint.items():
-        if not isinstance(word, str):
-            raise _other_form(file, ".".join((*device, "joint", name)), word, "a text")
-    return JointNames(**{name: one_line(word)[:_LONGEST_SHOWN] for name, word in joint.items()})
 
 
 def _ending(file: Path, document: Mapping[str, Any]) -> str:

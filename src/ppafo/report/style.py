@@ -167,22 +167,14 @@ def figure_of_panels(
     heights: Sequence[float] | None = None,
 ) -> "tuple[Figure, list[list[Axes]]]":
     """Return a figure of this width and height [inches] and its panels by row, with a shared horizontal axis."""
-    figure, panel_width = _figure_with_margins(size, margins, rows, columns)
+    figure, panel_width = figure_with_margins(size, margins, rows, columns)
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False, height_ratios=heights).tolist()
     for axes in figure.axes:
         axes.yaxis.set_label_coords(-margins.label / panel_width, 0.5)
     return figure, grid
 
 
-def figure_of_free_panels(
-    size: tuple[float, float], margins: FigureMargins, rows: int, columns: int, widths: Sequence[float] | None = None
-) -> "tuple[Figure, list[list[Axes]]]":
-    """Return a figure of this width and height [inches] and its panels by row, each with separate axes."""
-    figure, _ = _figure_with_margins(size, margins, rows, columns)
-    return figure, figure.subplots(rows, columns, squeeze=False, width_ratios=widths).tolist()
-
-
-def _figure_with_margins(
+def figure_with_margins(
     size: tuple[float, float], margins: FigureMargins, rows: int, columns: int
 ) -> "tuple[Figure, float]":
     """Return an empty figure with margins, and the width of a panel [inches]."""

@@ -26,6 +26,8 @@ _TIME = re.compile(
 """Time of day: hours, minutes and seconds, or two of them; optional fraction, am or pm, and time zone."""
 _COMPACT = re.compile(r"(?P<date>\d{8})T(?P<hour>\d{2})(?P<minute>\d{2})(?P<second>\d{2})(?P<rest>.*)")
 """Date and time in digits alone, ``20260321T080010``."""
+_OFFSET = re.compile(r"([+-])(\d{1,2}):?(\d{2})?$")
+"""Offset from UTC at the end of a time zone."""
 _YEAR_FIRST = re.compile(r"(\d{4})[-/.]?(\d{2})[-/.]?(\d{2})|(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})")
 _DOTTED = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{2,4})")
 _SLASHED = re.compile(r"(\d{1,2})[/-](\d{1,2})[/-](\d{2,4})")
@@ -39,7 +41,10 @@ _LARGEST_STEP = 10.0
 
 
 class _Stamp(NamedTuple):
-    """Time of day [s], its time zone, and the text beside it, which may be a date; texts are empty if absent."""
+    """Time of day [s], its time zone, and the text beside it, which may be a date; texts are empty if absent.
+
+    The time is in UTC if the time zone states its offset.
+    """
 
     seconds: float
     zone: str
@@ -70,7 +75,7 @@ def clock_seconds(
     zones = dict.fromkeys(re.sub(r"[+-].*", "", stamp.zone) for stamp in stamps)
     if len(zones) > 1:
         raise DataError(f"the clock changes its time zone ({', '.join(zones)}): give times of one zone, or numbers")
-    seconds = np.array([stamp.seconds - _offset(stamp.zone) for stamp in stamps])
+    seconds = np.array([stamp.seconds for stamp in stamps])
     days_in_words = [stamp.date for stamp in stamps] if dates is None else [cell.strip() for cell in dates]
     if any(days_in_words):
         days = _days(days_in_words, rows, seconds, order)
@@ -109,15 +114,11 @@ def _stamp(cell: str, form: ClockForm | None, row: str) -> _Stamp:
         hour = hour % 12 + (12 if half_of_day == "p" else 0)
     fraction = float(f"0.{match['fraction']}") if match["fraction"] else 0.0
     beside = f"{text[: match.start()]} {text[match.end() :]}".strip(" T,;")
-    return _Stamp(3600.0 * hour + 60.0 * minute + whole_seconds + fraction, match["zone"] or "", beside)
-
-
-def _offset(zone: str) -> float:
-    """Return the offset of a time zone from UTC [s] if it is given in digits, else 0."""
-    match = re.search(r"([+-])(\d{1,2}):?(\d{2})?$", zone)
-    if match is None:
-        return 0.0
-    return (-1.0 if match[1] == "-" else 1.0) * (3600.0 * int(match[2]) + 60.0 * int(match[3] or 0))
+    seconds, zone = 3600.0 * hour + 60.0 * minute + whole_seconds + fraction, match["zone"] or ""
+    offset = _OFFSET.search(zone)
+    if offset is not None:
+        seconds -= (-1.0 if offset[1] == "-" else 1.0) * (3600.0 * int(offset[2]) + 60.0 * int(offset[3] or 0))
+    return _Stamp(seconds, zone, beside)
 
 
 def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: DateOrder | None) -> Floats:

@@ -18,13 +18,10 @@ from ppafo.storage.comma_separated import parse_header, recording_of_columns
 from ppafo.wording import one_line
 
 PANDAS_READERS = {
-    ".xlsx": "read_excel({path!r})",
-    ".xls": "read_excel({path!r})",
-    ".ods": "read_excel({path!r})",
+    **dict.fromkeys((".xlsx", ".xls", ".ods"), "read_excel({path!r})"),
     ".json": "read_json({path!r})",
     ".feather": "read_feather({path!r})",
-    ".h5": "read_hdf({path!r})",
-    ".hdf5": "read_hdf({path!r})",
+    **dict.fromkeys((".h5", ".hdf5"), "read_hdf({path!r})"),
     ".pkl": "read_pickle({path!r})",
 }
 """Call of pandas that reads a table, by file suffix."""

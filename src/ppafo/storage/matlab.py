@@ -49,7 +49,7 @@ _LABELS = ("colheaders", "labels", "names")
 
 
 @dataclass(slots=True, eq=False)
-class MatlabFile:
+class _MatlabFile:
     """Content of a MATLAB file.
 
     ``columns``: numeric vectors by name. ``texts``: text arrays by name. ``words``: all texts in the file. ``objects``:
@@ -83,7 +83,7 @@ _PLAIN = {
 """MATLAB code, by class of an object, that saves its numbers as plain arrays and its times in seconds."""
 
 
-def read_matlab(path: str | Path) -> MatlabFile:
+def read_matlab(path: str | Path) -> _MatlabFile:
     """Return the variables of a ``.mat`` file of any version. Raises DataError for an invalid file."""
     is_hdf5 = read_bytes(path)[_HDF5_AT : _HDF5_AT + len(_HDF5)] == _HDF5
     # A damaged file can end a library of C code; another process tries it first.
@@ -91,10 +91,10 @@ def read_matlab(path: str | Path) -> MatlabFile:
     return open_matlab(path)
 
 
-def open_matlab(path: str | Path) -> MatlabFile:
+def open_matlab(path: str | Path) -> _MatlabFile:
     """Return the variables of a ``.mat`` file without a trial in another process; a damaged file may crash this one."""
     content = read_bytes(path)
-    contents = MatlabFile()
+    contents = _MatlabFile()
     try:
         if content[_HDF5_AT : _HDF5_AT + len(_HDF5)] == _HDF5:
             import h5py
@@ -122,7 +122,7 @@ Tree = dict[str, Any] | list[Any] | NDArray[Any] | str | _Object
 """Variable as plain data: structure, cell array or array of structures, numbers, text, or object."""
 
 
-def _read_older(path: str | Path, contents: MatlabFile) -> None:
+def _read_older(path: str | Path, contents: _MatlabFile) -> None:
     """Add the variables of a file of version 4 to 7 to ``contents``."""
     import zlib
 
@@ -211,7 +211,7 @@ def _tree_of_hdf5(node: Any, file: Any, depth: int) -> Tree:
     return "".join(map(chr, array.ravel().tolist())).strip() if kind == "char" else array
 
 
-def _add(name: str, tree: Tree, depth: int, contents: MatlabFile) -> None:
+def _add(name: str, tree: Tree, depth: int, contents: _MatlabFile) -> None:
     """Add a variable and everything nested in it to ``contents``, with dotted names."""
     if depth > _DEEPEST:
         return
@@ -239,7 +239,7 @@ def _add(name: str, tree: Tree, depth: int, contents: MatlabFile) -> None:
         _add_numbers(name, tree, contents)
 
 
-def _add_numbers(name: str, array: NDArray[Any], contents: MatlabFile) -> None:
+def _add_numbers(name: str, array: NDArray[Any], contents: _MatlabFile) -> None:
     """Add a vector, or the columns and rows of a matrix unless there are too many, to ``contents``."""
     if array.dtype.kind not in "iufb" or array.size == 0:
         return
@@ -252,7 +252,7 @@ def _add_numbers(name: str, array: NDArray[Any], contents: MatlabFile) -> None:
                 contents.columns |= {f"{name}({index.format(k)})": line for k, line in enumerate(lines, start=1)}
 
 
-def read_mapped_matlab(file: MatlabFile, columns: ColumnMap, map_name: str) -> MappedTable:
+def read_mapped_matlab(file: _MatlabFile, columns: ColumnMap, map_name: str) -> MappedTable:
     """Return the columns of a MATLAB file that a map selects, in the units of the file.
 
     Raises DataError with the key of a channel whose variable is absent or unusable, and with the map if it has a name.
@@ -289,7 +289,7 @@ def read_mapped_matlab(file: MatlabFile, columns: ColumnMap, map_name: str) -> M
     )
 
 
-def _variable(key: str, column: int | str, file: MatlabFile) -> str:
+def _variable(key: str, column: int | str, file: _MatlabFile) -> str:
     """Return the variable that a map names at ``key``; a number selects a column of the file's only matrix."""
     if isinstance(column, int):
         matrices = sorted({name.partition("(")[0] for name in file.columns if "(:," in name and "." not in name})

@@ -8,7 +8,6 @@ import contextlib
 import io
 import math
 import zlib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +57,14 @@ def read_netcdf(path: str | Path) -> Recording:
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
             variables = _own_variables(file)
-            _check_memory(variables, len(content))
+            # Before memory is allocated: numbers must not need far more than the size of the file.
+            chunks = [math.prod(item.chunks) * item.dtype.itemsize for item in variables.values() if item.chunks]
+            required = sum(chunks) + sum(_BYTES_OF_A_FLOAT * item.size for item in variables.values())
+            if required > max(_ALWAYS_ALLOWED, _MAXIMUM_GROWTH * len(content)):
+                raise DataError(
+                    f"requires {required / 1e6:,.0f} MB of memory, the file has {len(content) / 1e6:.2g} MB; "
+                    f"a recording requires at most {_MAXIMUM_GROWTH} times its file"
+                )
             for name, variable in variables.items():
                 _check_is_whole(name, variable)
             time = _channel(TIME, variables.pop(TIME))
@@ -101,20 +107,6 @@ def _own_variables(file: Any) -> dict[str, Any]:
                 f"'{name}' is compressed in a way that is not supported; save it with gzip, or uncompressed"
             )
     return variables
-
-
-def _check_memory(variables: Mapping[str, Any], file_bytes: int) -> None:
-    """Raise DataError, before memory is allocated, for numbers that need far more memory than the size of the file."""
-    required = 0
-    for variable in variables.values():
-        required += variable.size * _BYTES_OF_A_FLOAT
-        if variable.chunks is not None:
-            required += math.prod(variable.chunks) * variable.dtype.itemsize
-    if required > max(_ALWAYS_ALLOWED, _MAXIMUM_GROWTH * file_bytes):
-        raise DataError(
-            f"requires {required / 1e6:,.0f} MB of memory, the file has {file_bytes / 1e6:.2g} MB; "
-            f"a recording requires at most {_MAXIMUM_GROWTH} times its file"
-        )
 
 
 def _check_is_whole(name: str, variable: Any) -> None:

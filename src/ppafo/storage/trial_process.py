@@ -25,7 +25,16 @@ def read_on_trial(reader: str, library: str, path: str) -> int:
     # What the libraries take themselves does not count.
     import_module(library)
     read = pkgutil.resolve_name(reader)
-    _limit_memory(Path(path).stat().st_size)
+    sizes = Path("/proc/self/statm")
+    # Only Linux tells the memory that is taken already, and limits what comes on top.
+    if sizes.exists():
+        import resource
+
+        taken = int(sizes.read_text().split()[0]) * resource.getpagesize()
+        limit = taken + max(_ALWAYS_ALLOWED, _MAXIMUM_GROWTH * Path(path).stat().st_size)
+        highest = resource.getrlimit(resource.RLIMIT_AS)[1]
+        limit = limit if highest == resource.RLIM_INFINITY else min(limit, highest)
+        resource.setrlimit(resource.RLIMIT_AS, (limit, highest))
     try:
         read(path)
     except DataError as error:
@@ -34,22 +43,6 @@ def read_on_trial(reader: str, library: str, path: str) -> int:
     except MemoryError:
         return OUT_OF_MEMORY
     return 0
-
-
-def _limit_memory(file_bytes: int) -> None:
-    """Limit the additional memory of this process to a multiple of the file size (only on Linux)."""
-    sizes = Path("/proc/self/statm")
-    if not sizes.exists():
-        return
-    import resource
-
-    pages_taken = int(sizes.read_text().split()[0])
-    taken = pages_taken * resource.getpagesize()
-    limit = taken + max(_ALWAYS_ALLOWED, _MAXIMUM_GROWTH * file_bytes)
-    highest = resource.getrlimit(resource.RLIMIT_AS)[1]
-    if highest != resource.RLIM_INFINITY:
-        limit = min(limit, highest)
-    resource.setrlimit(resource.RLIMIT_AS, (limit, highest))
 
 
 if __name__ == "__main__":

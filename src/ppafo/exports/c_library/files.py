@@ -10,7 +10,6 @@ from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.exports import filled, in_comment, in_markdown, template
 from ppafo.exports.c_library.conditions import conditions_of_program, limits_in_c, relations_of_library
 from ppafo.exports.c_library.library import Library
-from ppafo.model.declaration import Quantity
 from ppafo.signals import CHANNELS
 from ppafo.version import __version__
 
@@ -80,12 +79,18 @@ def _words(library: Library, name: str) -> dict[str, str]:
     in_parts = ", run->needs_parts" if program.program.chooses_parts else ""
     steps = {"name": name, "signal_rows": str(SIGNAL_ROWS), "in_parts": in_parts}
     relations = relations_of_library(library)
-    table = []
+    table, fields = [], []
     for setting in settings:
-        low, high = limits_in_c(setting.quantity)
-        flags = setting.quantity.minimum_allowed, setting.name in library.defaults
+        quantity = setting.quantity
+        low, high = limits_in_c(quantity)
+        flags = quantity.minimum_allowed, setting.name in library.defaults
         words = ", ".join("true" if flag else "false" for flag in flags)
         table.append(f'    {{"{setting.name}", {setting.value!r}, {low!r}, {high!r}, {words}}},')
+        limits = [f"{'from' if quantity.minimum_allowed else 'above'} {quantity.minimum:g}"]
+        limits = limits if quantity.minimum > -math.inf else []
+        limits += [f"up to {quantity.maximum:g}"] if quantity.maximum < math.inf else []
+        meaning = "; ".join(filter(None, (quantity.summary or quantity.name, " ".join(limits))))
+        fields.append((setting.name, quantity.unit, library.worded(meaning)))
     # Every scenario has a supply pressure, which is what a user would try first.
     (pressure,) = [setting for setting in settings if setting.name == "supply_pressure"]
     return {
@@ -96,9 +101,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "description": "\n * ".join(textwrap.wrap(in_comment(library.description), 110)),
         "about": in_markdown(library.description),
         "version": __version__,
-        "settings": _members(
-            (setting.name, setting.quantity.unit, library.worded(_meaning(setting.quantity))) for setting in settings
-        ),
+        "settings": _members(fields),
         "outputs": _members(
             (
                 ("time", "s", "since the start"),
@@ -147,13 +150,3 @@ def _members(items: Iterable[tuple[str, str, str]]) -> str:
         comment = in_comment(f"{UNITS.get(unit, unit) or '-'}: {meaning}")
         lines.append(f"    double {name}; /* {comment} */")
     return "\n".join(lines)
-
-
-def _meaning(quantity: Quantity) -> str:
-    """Meaning and range of a parameter as text."""
-    low, high = (limit if abs(limit) < math.inf else None for limit in (quantity.minimum, quantity.maximum))
-    beyond = "from" if quantity.minimum_allowed else "above"
-    above = "" if low is None else f"{beyond} {low:g}"
-    below = "" if high is None else f"up to {high:g}"
-    limits = " ".join(filter(None, (above, below)))
-    return "; ".join(filter(None, (quantity.summary or quantity.name, limits)))

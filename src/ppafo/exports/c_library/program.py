@@ -7,7 +7,7 @@ name becomes a field, every number is a scalar, and a function over runs is call
 import ast
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from types import FunctionType
@@ -18,7 +18,6 @@ from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, HANDED
 from ppafo.engine.linking import link_program
 from ppafo.engine.loop_text import LOOP_ARRAYS, LOOP_NUMBERS, lane_loop, run_loop
-from ppafo.engine.program import Program
 from ppafo.engine.source_text import Replacements, SourceCollector, composed_lines
 from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_of, struct_of_numbers
 from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, Further, places_of
@@ -202,7 +201,14 @@ def c_text(exported: ExportedProgram, composed: ComposedLibrary, title: str, set
     state = list(places_of(exported.program.state_rows()).values())
     parameter = list(places_of(exported.program.parameter_rows()).values())
     alone = [name.replace("AT_", "PARAMETER_", 1) for name in parameter]
-    steps = {name: _stepping(program, _STEPS[name]) for name, program in exported.loops.items()}
+    # Values passed from step to step, and, of a loop whose lanes wait for others, values saved meanwhile.
+    steps = {}
+    for loop, program in exported.loops.items():
+        passed = {path: name.removeprefix("AT_") for path, name in places_of(program.step_rows()).items()}
+        saved = [name.removeprefix("AT_") for name in places_of(program.state_rows()).values()]
+        saved += ["REMAINING", *(name for path, name in passed.items() if path.startswith(HANDED))]
+        aside = [f"ASIDE_{name}" for name in saved] if program.parts_are_rare else []
+        steps[loop] = [f"{_STEPS[loop]}_{name}" for name in (*passed.values(), *aside)]
     places = {
         **{
             f"{name}{ending}.x": [*state, *parameter, *stepping]
@@ -237,17 +243,6 @@ def outline_of(exported: ExportedProgram, composed: ComposedLibrary, settings: S
     return f"{names!r}\n{without_origins(composed.text)}"
 
 
-def _stepping(program: Program, prefix: str) -> list[str]:
-    """Names of the indices of values passed from step to step, and of values saved while lanes wait."""
-    handed = [name.removeprefix("AT_") for name in places_of(program.step_rows()).values()]
-    states = [name.removeprefix("AT_") for name in places_of(program.state_rows()).values()]
-    kept = [
-        name.removeprefix("AT_") for path, name in places_of(program.step_rows()).items() if path.startswith(HANDED)
-    ]
-    aside = [f"ASIDE_{name}" for name in (*states, "REMAINING", *kept)] if program.parts_are_rare else []
-    return [f"{prefix}_{name}" for name in (*handed, *aside)]
-
-
 def _steps_of(exported: ExportedProgram, collector: SourceCollector) -> dict[str, StepText]:
     """Return the steps of the lane loops by C name; functions common to both are written once."""
     return {name: StepText(program, collector, _ENDINGS[name]) for name, program in exported.loops.items()}
@@ -259,13 +254,6 @@ def _enumeration(said: str, names: Sequence[str], first: int = 0) -> str:
     return f"/* {said} */\nenum {{\n{lines}\n}};\n"
 
 
-def _read_expression(read: Callable[[Readings], Any], add: Callable[[Any], str]) -> str:
-    if not isinstance(read, ReadAt):
-        return f"{add(read)}(readings)"
-    numbers = ", ".join(f"readings.{path}" for path in read.places)
-    return numbers if read.function is None else f"{add(read.function)}({numbers})"
-
-
 def metrics_entry(exported: ExportedProgram, collector: SourceCollector, boundary: Boundary) -> str:
     """Return the source of the entry ``metrics``: metrics of a run from its final states."""
     program, groups, add = exported.program, exported.program.state_rows(), collector.add
@@ -275,13 +263,14 @@ def metrics_entry(exported: ExportedProgram, collector: SourceCollector, boundar
         for name, group in zip(names, program.meter_groups, strict=True)
     )
     course = boundary.taken("states", "course", groups, add)
-    lines = [
-        f"readings = Readings(meters=Meters({meters}), course={course}, samples=samples)",
-        *(
-            f"{boundary.cell('found', index, metric.name)} = {_read_expression(metric.read, add)}"
-            for index, metric in enumerate(exported.metrics)
-        ),
-    ]
+    lines = [f"readings = Readings(meters=Meters({meters}), course={course}, samples=samples)"]
+    for index, metric in enumerate(exported.metrics):
+        if isinstance(metric.read, ReadAt):
+            value = ", ".join(f"readings.{path}" for path in metric.read.places)
+            value = value if metric.read.function is None else f"{add(metric.read.function)}({value})"
+        else:
+            value = f"{add(metric.read)}(readings)"
+        lines.append(f"{boundary.cell('found', index, metric.name)} = {value}")
     numbers = "float64[::1]"
     parameters_of_metrics = {"states": numbers, "samples": "int64", "found": numbers}
     rows = [

@@ -161,7 +161,10 @@ class Bench:
                 self.answers.sent = sequence
                 self.port.send(wire.sample_bytes(self._sample))
             next_due = (sequence + 1) * self.period
-            if not self.answers.is_answered and (self.pace.is_real or not self._expects_no_answer):
+            # In lock step no answer is waited for that will not come, or each sample would take a second.
+            is_silent = self.answers.sent - self.answers.answered > 1
+            is_hopeless = self.port.failure or (self.answers.vent_reason and is_silent)
+            if not self.answers.is_answered and (self.pace.is_real or not is_hopeless):
                 self.pace.listen(next_due, self.port, self._take)
             response_time = self._answer_time - send_time if self.answers.is_answered else None
             if self.port.failure:
@@ -214,13 +217,6 @@ class Bench:
     def _continues(self) -> bool:
         """False at the end of the run, and after the plant has diverged."""
         return self.plant.sample < self.plant.samples and not self._has_diverged
-
-    @property
-    def _expects_no_answer(self) -> bool:
-        """True if the port broke, or the plant is vented and the last sample had no answer."""
-        # In lock step nothing is waited for then, or each sample would take a second.
-        is_silent = self.answers.sent - self.answers.answered > 1
-        return bool(self.port.failure or (self.answers.vent_reason and is_silent))
 
     def _take(self, data: bytes) -> bool:
         """Process received data; return True if the last sent sample has been answered."""

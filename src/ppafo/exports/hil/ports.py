@@ -7,7 +7,7 @@ import socket
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Protocol, final
+from typing import Any, final
 
 from ppafo.arguments.door import argument_text
 from ppafo.errors import ScenarioError
@@ -29,26 +29,6 @@ _STRANGERS_AT_ONCE = 64
 """Maximum number of packets from other senders processed in one call, so that a flood cannot block the plant."""
 _WRITE_TIMEOUT = 2.0e-4
 """Longest time [s] that a serial line may take to accept a packet; with 0, pyserial would try forever."""
-
-
-class Port(Protocol):
-    """Link for sending and receiving bytes; after a fault, stored in ``failure``, nothing is received."""
-
-    is_stream: bool
-    """True for a byte stream, False for separate datagrams."""
-    failure: str
-    """Fault during the run; empty without one."""
-    strangers: int
-    """Number of discarded packets from other senders."""
-
-    def send(self, data: bytes) -> None:
-        """Send a packet without blocking, or drop it."""
-
-    def receive(self, timeout: float) -> bytes:
-        """Return bytes received within a time [s]; empty on a timeout."""
-
-    def close(self) -> None:
-        """Release the port."""
 
 
 @final
@@ -143,6 +123,14 @@ class _SerialPort:
         """Close the device."""
         with contextlib.suppress(OSError):
             self._device.close()
+
+
+Port = _UdpPort | _SerialPort
+"""Link for sending and receiving bytes, as a stream (``is_stream``) or as separate datagrams.
+
+``failure`` is the fault during the run, empty without one; after a fault nothing is received. ``strangers`` is the
+number of discarded packets from other senders.
+"""
 
 
 def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Port:

@@ -14,7 +14,7 @@ from ppafo.exports.hil import wire
 from ppafo.exports.hil.loop import LinkTraffic, LogRow
 from ppafo.exports.hil.plant import CompiledPlant
 from ppafo.report.recording_figure import recording_figure
-from ppafo.report.style import ACTUAL, VERMILION, FigureMargins, figure_of_free_panels, house_style, render_figure
+from ppafo.report.style import ACTUAL, VERMILION, FigureMargins, figure_with_margins, house_style, render_figure
 from ppafo.simulation.simulate import Result
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units.shown import shown_in
@@ -110,18 +110,20 @@ class HardwareRun:
         )
         pauses = traffic.pauses
         pause_text = f"stood still {len(pauses)} times, {sum(pauses):.3g} s in all" if pauses else "never stood still"
+        times = []
+        for label, values in (("answers", after), ("sent late", late)):
+            numbers = spread(values)
+            described = "none"
+            if numbers is not None:
+                median, most, largest = (f"{value * _PER_THOUSAND:.3g} ms" for value in numbers.values())
+                described = f"median {median}, 99 % within {most}, at most {largest}"
+            times.append(f"{label:<10} {described}")
+        times.append(f"time       {pause_text}")
+        times = times if traffic.is_real_time else ["time       in lock step with the answers"]
         lines = [
             f"samples    {len(late)} sent, {len(after)} answered, {len(late) - len(after)} missed; "
             f"longest silence {silence * _PER_THOUSAND:.3g} ms",
-            *(
-                (
-                    f"answers    {described_spread(after)}",
-                    f"sent late  {described_spread(late)}",
-                    f"time       {pause_text}",
-                )
-                if traffic.is_real_time
-                else ("time       in lock step with the answers",)
-            ),
+            *times,
             f"dropped    {wire.described_refusals(traffic.refused, others)}",
             f"machine    {machine.cores} cores{loads}; {machine.system}, Python {machine.python}",
             f"plant      {self.plant.compiled_by}",
@@ -171,9 +173,8 @@ class HardwareRun:
         delays, response_times = self.delays, self.response_times
         beside = "" if load is None else f"; load {load:.2f} on {self.machine.cores} cores"
         with house_style():
-            figure, ((late, after),) = figure_of_free_panels(
-                (7.2, 3.3), FigureMargins(0.75, 0.2, 0.8, 0.85, 0.5, 0.7), 1, 2
-            )
+            figure, _ = figure_with_margins((7.2, 3.3), FigureMargins(0.75, 0.2, 0.8, 0.85, 0.5, 0.7), 1, 2)
+            late, after = figure.subplots(1, 2)
             figure.text(0.017, 0.97, f"{self.plant.scenario.name}: the link", va="top", fontsize=13, fontweight="bold")
             missed = f"{len(delays) - len(response_times)} of {len(delays)} samples missed"
             figure.text(0.017, 0.03, f"Dashed: one sample, {period:g} ms. {missed}{beside}", va="bottom", fontsize=9)
@@ -194,15 +195,6 @@ def spread(values: Sequence[float]) -> dict[str, float] | None:
         "percentile_99": float(np.percentile(values, 99.0)),
         "largest": max(values),
     }
-
-
-def described_spread(values: Sequence[float]) -> str:
-    """Return median, 99th percentile and maximum of times [s] as text."""
-    numbers = spread(values)
-    if numbers is None:
-        return "none"
-    median, most, largest = (f"{value * _PER_THOUSAND:.3g} ms" for value in numbers.values())
-    return f"median {median}, 99 % within {most}, at most {largest}"
 
 
 def longest_silence(rows: Sequence[LogRow]) -> int:

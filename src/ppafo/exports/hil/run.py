@@ -7,8 +7,7 @@ import gc
 import os
 import platform
 import random
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 from ppafo.engine.run import batch_of
 from ppafo.exports.hil.loop import Bench
@@ -43,8 +42,15 @@ def run_plant(
     load_before = _load_now()
     # Built before the clock starts: arrays and programs take milliseconds.
     sampled = SampledRun(batch_of(plant.run), plant.module)
-    with _without_collections():
+    collects_garbage = gc.isenabled()
+    # Garbage collection takes milliseconds: now, so that nothing is left to collect for long, and not during the run.
+    gc.collect()
+    gc.disable()
+    try:
         exchange = Bench(sampled, plant.period, port, pace(plant.period), number).run(patience, is_stopped)
+    finally:
+        if collects_garbage:
+            gc.enable()
     machine = HostComputer(
         system=f"{platform.system()} {platform.machine()}",
         cores=os.cpu_count() or 1,
@@ -62,17 +68,3 @@ def _load_now() -> float | None:
         return os.getloadavg()[0]
     except (AttributeError, OSError):
         return None
-
-
-@contextmanager
-def _without_collections() -> Iterator[None]:
-    """Disable Python's garbage collection, which takes milliseconds, within a ``with`` block."""
-    was_on = gc.isenabled()
-    # Now, so that nothing is left to collect for long.
-    gc.collect()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()

@@ -48,7 +48,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 from ppafo.engine.cache.texts import kept_bytes
-from ppafo.engine.package_key import COMPOSED, Key, package_key
+from ppafo.engine.package_key import COMPOSED, package_key
 from ppafo.errors import ProgramError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of
@@ -101,7 +101,11 @@ def program_of(library: Library, scenario: Scenario) -> bytes:
     C text and module are cached on disk.
     """
     key = package_key(scenario, WRITTEN_BY)
-    shipped = {} if key is None else _shipped_digests(key)
+    # Stored digests of C texts, by scenario description and by outline, which are void after any change of code.
+    keys, shipped = _shipped_keys(), dict[str, str]()
+    if key is not None and key.files == keys["files"]:
+        values = {module: value for module, value in key.values.items() if module != _OF_THE_COMPUTER}
+        shipped = keys["digests"] if all(keys["values"].get(module) == values[module] for module in values) else {}
     if key is None:
         digest = _known_digest(library, shipped)
     elif not (digest := shipped.get(short_digest(key.described), "")):
@@ -119,16 +123,6 @@ def _shipped_keys() -> dict[str, Any]:
     """Return the digests of bundled scenarios and walks, with the package files and values for which they are valid."""
     keys: dict[str, Any] = json.loads(files("ppafo.page.wasm").joinpath(SHIPPED_KEYS).read_text(encoding="utf-8"))
     return keys
-
-
-def _shipped_digests(key: Key) -> Mapping[str, str]:
-    """Return the stored digests of C texts by scenario description and by outline; empty after any change of code."""
-    shipped = _shipped_keys()
-    is_as_shipped = key.files == shipped["files"] and all(
-        shipped["values"].get(module) == value for module, value in key.values.items() if module != _OF_THE_COMPUTER
-    )
-    digests: Mapping[str, str] = shipped["digests"] if is_as_shipped else {}
-    return digests
 
 
 def short_digest(described: str) -> str:
