@@ -23,11 +23,6 @@ def interval_factor(confidence: float) -> float:
     return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
 
 
-def half_width_for(confidence: float, half_width: float, stated: float) -> float:
-    """Return the half-width of an interval at a confidence, given the half-width at the confidence ``stated``."""
-    return half_width * interval_factor(confidence) / interval_factor(stated)
-
-
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """Value in ``unit`` (SI text) with its confidence interval ``low`` to ``high`` at the stated ``confidence``.

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from ppafo.errors import ParameterError, UnitError
-from ppafo.identification.estimate import Estimate, half_width_for
+from ppafo.identification.estimate import Estimate, interval_factor
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import build_device
@@ -69,14 +69,15 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
     )
     previous = "no value" if before is None else f"{number_text(before)} ({before.origin}: {before.source})"
     interval = f"{100.0 * estimate.confidence:g}% interval {low:.6g} to {high:.6g} {unit}".rstrip()
-    half_width = half_width_for(CONFIDENCE, max(high - value, value - low), estimate.confidence)
+    # An interval that is cut at a bound is too narrow on that side.
+    wider = max(high - value, value - low)
+    half_width = wider * interval_factor(CONFIDENCE) / interval_factor(estimate.confidence)
     entry = Entry(
         value=_in_digits_of(value, half_width),
         unit=unit,
         origin="identified" if estimate.is_identified else "fitted",
         source="; ".join(estimate.recordings),
         note=f"{estimate.verdict}, {interval}; {estimate.explanation.rstrip('.')}. Before, the set had {previous}.",
-        # An interval that is cut at a bound is too narrow on that side.
         uncertainty=_in_digits_of(half_width, half_width),
     )
     # An orifice that is given as an area has no sonic conductance any more, and the other way round.

@@ -129,11 +129,6 @@ class Tolerances:
         usual = 0.0 if channel == "angle" else PRESSURE_ERRORS.gain
         return usual if self.gain is None else self.gain
 
-    @property
-    def law_of_gas(self) -> float:
-        """Limit of the departure from the ideal gas law [-]."""
-        return GAS_LAW if self.gas_law is None else self.gas_law
-
     def deviation_of(self, path: str, value: float, half_width: float) -> float:
         """Return the standard deviation of a fixed parameter, given its ``value`` [SI].
 

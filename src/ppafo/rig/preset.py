@@ -40,10 +40,6 @@ def _sensor(unit: str, name: str) -> tuple[Quantity, ...]:
     )
 
 
-def _bandwidth(name: str) -> Quantity:
-    return _from_zero("bandwidth", "Hz", f"first-order bandwidth of the {name}, 0 for none", 1e5)
-
-
 SECTIONS: dict[str, tuple[Quantity, ...]] = {
     "gas": (
         _from_zero("heat_transfer_coefficient", "W/(m^2 K)", "heat transfer between gas and wall", 1e9),
@@ -94,8 +90,14 @@ SECTIONS: dict[str, tuple[Quantity, ...]] = {
         _from_zero("laminar_conductance", "kg/(s Pa^2)", "further leak per difference of squared pressures", 1e-8),
     ),
     "sampling": (Quantity("rate", "Hz", "samples recorded per second", minimum=1.0, maximum=1e5),),
-    "angle_sensor": (_bandwidth("angle sensor"), *_sensor("rad", "angle sensor")),
-    "pressure_sensor": (_bandwidth("pressure sensors"), *_sensor("Pa_d", "pressure sensors")),
+    "angle_sensor": (
+        _from_zero("bandwidth", "Hz", "first-order bandwidth of the angle sensor, 0 for none", 1e5),
+        *_sensor("rad", "angle sensor"),
+    ),
+    "pressure_sensor": (
+        _from_zero("bandwidth", "Hz", "first-order bandwidth of the pressure sensors, 0 for none", 1e5),
+        *_sensor("Pa_d", "pressure sensors"),
+    ),
     "torque_sensor": _sensor("N m", "scale"),
     "flow_sensor": _sensor("kg/s", "flow meter"),
 }

@@ -30,51 +30,6 @@ from ppafo.rig.dynamics import Inputs, Observables, RigNumbers, RigPhysics, RigS
 from ppafo.rig.sensors import SimulatedSensor
 from ppafo.rig.stretches import Distances, Slopes, solve_stretch
 
-# The controller of a run on the rig: what it decides sample by sample, and its commands on the way to the valve.
-
-
-class _Commands:
-    """Commands of one run: ``decided`` [-] by the controller, and ``at_valve`` [-] after backlash and dead time.
-
-    ``period`` [s]: time between two controller decisions
-    ``delay`` [s]: dead time between controller and valve
-    ``hysteresis`` [-]: backlash of the valve's spool
-
-    Raises SimulationError for a controller written in Python, which the rig cannot run.
-    """
-
-    def __init__(self, run: Run, period: float, delay: float, hysteresis: float) -> None:
-        if run.program.controller is None:
-            raise SimulationError("the simulated test bench runs controllers of the catalogue only")
-        self._controller: ControllerKind = run.program.controller
-        self._run, self._period, self._delay, self._hysteresis = run, period, delay, hysteresis
-        self._controller_state = self._controller.initial
-        self._spool = 0.0
-        # Time [s] at which the valve gets a command [-].
-        self._under_way: list[tuple[float, float]] = []
-        self.decided = self.at_valve = 0.0
-
-    def decide(self, sample: int, time: float, measurement: Measurement) -> None:
-        """Update the controller with a measurement at a time [s], and queue its command for the valve."""
-        run = self._run
-        reference = run.program.reference.value(run.reference, sample * self._period)[0]
-        # A constant command is decided once for the whole run; the law still has the period of its file.
-        self.decided, self._controller_state = self._controller.update(
-            run.controller, self._controller_state, reference, measurement, run.period
-        )
-        self._spool = spool_position(self._spool, self.decided, self._hysteresis)
-        self._under_way.append((time + self._delay, self._spool))
-
-    def arrive(self, time: float) -> None:
-        """Pass the commands that have arrived by a time [s] to the valve."""
-        while self._under_way and self._under_way[0][0] <= time + SAME_TIME:
-            _, self.at_valve = self._under_way.pop(0)
-
-    def next_arrival(self, end: float) -> float:
-        """Return the arrival time [s] of the next command, or ``end`` [s] if no command arrives before."""
-        return min(end, self._under_way[0][0]) if self._under_way else end
-
-
 Floats = NDArray[np.float64]
 
 UNKNOWNS = len(RigState._fields)
@@ -137,59 +92,31 @@ def solve_rig(rig_run: RigRun) -> RigSolution:
     return _Solver(rig_run).solve()
 
 
-class _CompiledRig:
-    """Compiled equations with the parameters of one run. Calls are independent of each other.
-
-    Valve and prescribed vane angle are computed outside, in Python, and passed in as numbers. So one compiled program
-    serves all devices and experiments, and a new computer compiles only once.
-    """
-
-    def __init__(self, given: RigNumbers) -> None:
-        parameters = np.array(numbers(given))
-        self._state, self._rates = np.empty(len(RigState._fields)), np.empty(len(RigState._fields))
-        self._observed, self._inputs = np.empty(len(Observables._fields)), np.zeros(len(leaf_paths(Inputs, "inputs")))
-        slopes, observed = row_functions(rig_rates, observables)
-        self._fill = with_arrays(slopes, parameters, self._state, self._inputs, self._rates)
-        self._show = with_arrays(observed, parameters, self._state, self._inputs, self._observed)
-
-    def rates(self, state: Floats, openings: Openings, vane: VaneInputs, direction: float) -> Floats:
-        """Return the time derivatives of the unknowns of ``RigState`` (unknowns,) [SI]; each call overwrites the array.
-
-        ``openings`` are the valve openings [-]; ``direction`` is the sliding direction of the vane (1 or -1), 0 if the
-        vane is stuck or prescribed.
-        """
-        self._state[:] = state
-        self._inputs[:] = (*openings, *vane)
-        self._fill(direction)
-        return self._rates
-
-    def observe(self, state: Floats, vane: VaneInputs) -> Observables:
-        """Return the observable quantities of a bench for unknowns of ``RigState`` (unknowns,) [SI]."""
-        self._state[:] = state
-        self._inputs[len(Openings._fields) :] = vane
-        self._show()
-        return Observables._make(self._observed.tolist())
-
-
 class _Equations:
-    """Equations of one run: functions of time [s], unknowns (unknowns,) and mode, without internal state.
+    """Equations of one run: functions of time [s], unknowns (unknowns,) and mode. Calls are independent of each other.
 
     The mode is the sliding ``direction`` of the vane: 1, -1, or 0 if the vane is stuck or its angle is prescribed.
+    Valve and prescribed vane angle are computed in Python and passed to the compiled equations as numbers. So one
+    compiled program serves all devices and experiments, and a new computer compiles only once.
     """
 
     def __init__(self, rig_run: RigRun) -> None:
         self.rig_run, self.run = rig_run, rig_run.run
         self.plant: PlantParameters = rig_run.run.plant
         self.is_free = self.run.program.angle is None
-        self.compiled = _CompiledRig(
-            RigNumbers(
-                plant=self.plant,
-                rig=rig_run.physics,
-                valve_orifice=self.run.valve_orifice,
-                leak_orifice=self.run.leak_orifice,
-                line_orifice=rig_run.line_orifice,
-            )
+        given = RigNumbers(
+            plant=self.plant,
+            rig=rig_run.physics,
+            valve_orifice=self.run.valve_orifice,
+            leak_orifice=self.run.leak_orifice,
+            line_orifice=rig_run.line_orifice,
         )
+        parameters = np.array(numbers(given))
+        self._state, self._rates = np.empty(UNKNOWNS), np.empty(UNKNOWNS)
+        self._observed, self._inputs = np.empty(len(Observables._fields)), np.zeros(len(leaf_paths(Inputs, "inputs")))
+        slopes, observed = row_functions(rig_rates, observables)
+        self._fill = with_arrays(slopes, parameters, self._state, self._inputs, self._rates)
+        self._show = with_arrays(observed, parameters, self._state, self._inputs, self._observed)
         valve_state = self.run.program.valve.initial()
         # Each evaluation makes a state of numbers, for which a flat one needs no search for what it nests.
         self._has_flat_valve = not any(isinstance(value, tuple) for value in valve_state)
@@ -227,14 +154,20 @@ class _Equations:
             slopes = np.empty_like(unknowns)
             slopes[UNKNOWNS:] = self.valve_slopes(unknowns, command) if valve_moves else 0.0
             openings = self.openings(unknowns, command) if valve_moves else resting
-            slopes[:UNKNOWNS] = self.compiled.rates(unknowns[:UNKNOWNS], openings, self.vane(time, unknowns), direction)
+            self._state[:] = unknowns[:UNKNOWNS]
+            self._inputs[:] = (*openings, *self.vane(time, unknowns))
+            self._fill(direction)
+            slopes[:UNKNOWNS] = self._rates
             return slopes
 
         return slopes
 
     def observe(self, time: float, unknowns: Floats) -> Observables:
         """Pressures [Pa], driving torque [N m] and static friction limit [N m] at a time [s]."""
-        return self.compiled.observe(unknowns[:UNKNOWNS], self.vane(time, unknowns))
+        self._state[:] = unknowns[:UNKNOWNS]
+        self._inputs[len(Openings._fields) :] = self.vane(time, unknowns)
+        self._show()
+        return Observables._make(self._observed.tolist())
 
     def distances(self, direction: float) -> Distances:
         """Root functions of a mode: distance to breakaway at rest, or to standstill and to the stop ahead in motion."""
@@ -267,11 +200,20 @@ class _Equations:
 
 
 class _Solver:
-    """Solver of a run, with the present time [s], unknowns and mode, from event to event."""
+    """Solver of a run, with the present time [s], unknowns and mode, from event to event.
+
+    ``decided`` is the last command of the controller [-], ``at_valve`` the command after backlash and dead time [-].
+    Raises SimulationError for a controller written in Python, which the rig cannot run.
+    """
 
     def __init__(self, rig_run: RigRun) -> None:
+        if rig_run.run.program.controller is None:
+            raise SimulationError("the simulated test bench runs controllers of the catalogue only")
         self.rig_run, self.equations = rig_run, _Equations(rig_run)
-        self.commands = _Commands(rig_run.run, rig_run.control_period, rig_run.command_delay, rig_run.hysteresis)
+        self.controller: ControllerKind = rig_run.run.program.controller
+        self.decided = self.at_valve = 0.0
+        self.commands_under_way: list[tuple[float, float]] = []
+        """Arrival times [s] at the valve, with the commands [-]."""
         self.time, self.unknowns, self.direction = 0.0, self.equations.initial, 0.0
         samples = rig_run.sample_times.size
         self.solution = RigSolution(
@@ -288,11 +230,18 @@ class _Solver:
 
     def solve(self) -> RigSolution:
         """Integrate to the end of the run, one controller period after another."""
-        end, sample = float(self.rig_run.sample_times[-1]), 0
+        rig_run, run = self.rig_run, self.rig_run.run
+        end, sample = float(rig_run.sample_times[-1]), 0
+        spool, state = 0.0, self.controller.initial
         while self.time < end - SAME_TIME:
-            self.commands.decide(sample, self.time, self.measure())
+            measurement = self.measure()
+            reference = run.program.reference.value(run.reference, sample * rig_run.control_period)[0]
+            # A constant command is decided once for the whole run; the law still has the period of its file.
+            self.decided, state = self.controller.update(run.controller, state, reference, measurement, run.period)
+            spool = spool_position(spool, self.decided, rig_run.hysteresis)
+            self.commands_under_way.append((self.time + rig_run.command_delay, spool))
             sample += 1
-            self.advance_to(min(sample * self.rig_run.control_period, end))
+            self.advance_to(min(sample * rig_run.control_period, end))
         # The stretches leave out the sample at the very end, where the unknowns are.
         while self.recorded < self.rig_run.sample_times.size:
             self.record(self.unknowns)
@@ -318,13 +267,15 @@ class _Solver:
         """Advance to a time [s], stopping at each arrival of a command and each event of the valve."""
         run, valve = self.rig_run.run, self.rig_run.run.program.valve
         while self.time < end - SAME_TIME:
-            self.commands.arrive(self.time)
-            command = self.commands.at_valve
+            while self.commands_under_way and self.commands_under_way[0][0] <= self.time + SAME_TIME:
+                _, self.at_valve = self.commands_under_way.pop(0)
+            command = self.at_valve
             valve_state = valve.settle(run.valve, self.equations.valve_state(self.unknowns), command, self.time)
             self.unknowns[UNKNOWNS:] = numbers(valve_state)
             # An event that is now would not let time go on.
             switches = max(valve.next_event(run.valve, valve_state, command, self.time), self.time + 2 * SAME_TIME)
-            self.integrate(min(self.commands.next_arrival(end), switches))
+            arrivals = [arrival for arrival, _ in self.commands_under_way[:1]]
+            self.integrate(min(end, switches, *arrivals))
 
     def integrate(self, end: float) -> None:
         """Integrate to a time [s] or to the next event of the vane, and change the mode at the event."""
@@ -334,7 +285,7 @@ class _Solver:
                 self.solution.breakaways.append(self.time)
         samples = self.rig_run.sample_times
         times, unknowns = solve_stretch(
-            self.equations.slopes(self.direction, self.commands.at_valve, self.unknowns),
+            self.equations.slopes(self.direction, self.at_valve, self.unknowns),
             self.equations.distances(self.direction) if self.equations.is_free else None,
             self.unknowns,
             self.time,
@@ -357,7 +308,7 @@ class _Solver:
         observed = self.equations.observe(time, unknowns)
         self.solution.states[sample] = self.equations.with_prescribed_angle(time, unknowns)
         self.solution.pressures[sample] = observed.pressure_1, observed.pressure_2
-        self.solution.commands[sample] = self.commands.decided
+        self.solution.commands[sample] = self.decided
         self.recorded += 1
 
     def change_mode(self) -> None:

@@ -103,8 +103,7 @@ def _root(distances: Distances, number: int, interpolant: Callable[[float], Floa
     """
     from scipy.optimize import brentq
 
-    def distance(time: float) -> float:
-        return distances(time, interpolant(time))[number]
-
-    root: float = brentq(distance, start, end, xtol=1.0e-15, rtol=_ROOT_TOLERANCE)
-    return root
+    root = brentq(
+        lambda time: distances(time, interpolant(time))[number], start, end, xtol=1.0e-15, rtol=_ROOT_TOLERANCE
+    )
+    return float(root)

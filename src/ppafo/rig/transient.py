@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError
 from ppafo.model.controlled import TORQUE
 from ppafo.model.effects.second_virial import real_density
@@ -15,7 +14,7 @@ from ppafo.model.gas import gas_energy
 from ppafo.model.plant import chamber_volumes
 from ppafo.parameters import load_device
 from ppafo.parameters.declaration import SECTIONS
-from ppafo.rig.dynamics import RigPhysics, RigState
+from ppafo.rig.dynamics import RigState
 from ppafo.rig.sensors import sensor
 from ppafo.rig.setup import ExperimentRequest, ExperimentResult, real_device, rig_physics, with_line
 from ppafo.rig.solution import RigRun, sensor_signals, solve_rig
@@ -99,24 +98,7 @@ def rig_run(scenario: Scenario, request: ExperimentRequest, highest_rate: float 
         )
     physics, (plant, line) = rig_physics(device, preset), with_line(device, run.plant, preset)
     run = replace(run, plant=plant)
-    times = np.arange(int(scenario.run.duration * rate + _WHOLE) + 1, dtype=np.float64) / rate
-    return RigRun(
-        device=device,
-        run=run,
-        physics=physics,
-        line_orifice=line,
-        initial=_initial_state(scenario, run, physics),
-        sensors={name: sensor(preset, name, request.seed, times.size) for name in (*_SENSED, *_SUPPLIES)},
-        sample_times=times,
-        # A constant command is decided once.
-        control_period=2.0 * scenario.run.duration if scenario.controller.is_open_loop else run.period,
-        command_delay=run.command_delay + preset.values["line.delay"],
-        hysteresis=preset.values["valve.hysteresis"],
-    )
-
-
-def _initial_state(scenario: Scenario, run: Run, physics: RigPhysics) -> RigState:
-    """Return the initial state of vane and gas [SI], with all gas at wall temperature."""
+    # All gas is at wall temperature at the start.
     angle, warm = run.initial.angle, physics.wall_temperature
     start = dict.fromkeys(RigState._fields, 0.0)
     start |= {"angle": angle, "angular_velocity": run.initial.angular_velocity, "sensor_angle": angle}
@@ -127,7 +109,20 @@ def _initial_state(scenario: Scenario, run: Run, physics: RigPhysics) -> RigStat
         for prefix, filled in (("", volume), ("line_", physics.line_volume)):
             start[f"{prefix}mass_{number}"] = mass = density * filled
             start[f"{prefix}energy_{number}"] = gas_energy(mass, warm, physics.heat_capacity)
-    return RigState(**start)
+    times = np.arange(int(scenario.run.duration * rate + _WHOLE) + 1, dtype=np.float64) / rate
+    return RigRun(
+        device=device,
+        run=run,
+        physics=physics,
+        line_orifice=line,
+        initial=RigState(**start),
+        sensors={name: sensor(preset, name, request.seed, times.size) for name in (*_SENSED, *_SUPPLIES)},
+        sample_times=times,
+        # A constant command is decided once.
+        control_period=2.0 * scenario.run.duration if scenario.controller.is_open_loop else run.period,
+        command_delay=run.command_delay + preset.values["line.delay"],
+        hysteresis=preset.values["valve.hysteresis"],
+    )
 
 
 def _recorded(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str, ...]) -> ExperimentResult:

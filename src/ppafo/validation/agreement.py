@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.arguments.door import argument_text
-from ppafo.errors import DataError
+from ppafo.errors import DataError, PpafoError
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.faults import correlated_noise_of, noise_of, resolution_of
@@ -27,7 +27,7 @@ from ppafo.validation.compared import (
 )
 from ppafo.validation.delay import ComparedCurve, Delay, estimate_delay
 from ppafo.validation.measured import MeasuredRecording, supply_gauge
-from ppafo.validation.replay import Replay, Replayed, replay_recording
+from ppafo.validation.replay import Replay, Replayed, replay_together
 from ppafo.validation.settings import ReplaySettings, initial_remedies
 
 ENGINE_ERROR = 3.0e-5
@@ -162,7 +162,7 @@ def replay_of(measured: MeasuredRecording, device: Device, settings: ReplaySetti
     if settings.volume is not None:
         device, beside = with_fixed_volume(device, settings.volume)
         motion, initial = "locked", {**initial, **beside}
-    if motion == "measured" and not measured.has(ANGLE):
+    if motion == "measured" and ANGLE not in measured.recording:
         prescribed = argument_text("motion", "measured")
         raise DataError(f"{measured.file}: there is no channel '{ANGLE}' to prescribe ({prescribed})")
     start = start_of(measured.recording, device, initial, measured.file, initial_remedies())
@@ -172,7 +172,9 @@ def replay_of(measured: MeasuredRecording, device: Device, settings: ReplaySetti
 def compare_recording(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> RecordingAgreement:
     """Return the comparison of a recording with the model of a device, replayed on the recorded inputs."""
     request = replay_of(measured, device, settings)
-    replayed = replay_recording(request)
+    replayed = replay_together([request])[0]
+    if isinstance(replayed, PpafoError):
+        raise replayed
     curves = _curves(measured, replayed, request.device, settings)
     # Sums and multiples of two others do not count twice.
     sensed = [curve for curve in curves if curve.channel in (ANGLE, PRESSURE_1, PRESSURE_2)]
@@ -245,15 +247,16 @@ def _remarks(measured: MeasuredRecording, device: Device, settings: ReplaySettin
     remarks = []
     gauge_of_set = device.supply.pressure - device.supply.atmospheric_pressure
     recorded_gauge = supply_gauge(measured.recording, device)
-    if measured.has(SUPPLY) and abs(recorded_gauge - gauge_of_set) > _OTHER_SUPPLY * gauge_of_set:
+    if SUPPLY in measured.recording and abs(recorded_gauge - gauge_of_set) > _OTHER_SUPPLY * gauge_of_set:
         relation = "pressure, other than"
         if gauge_of_set > 0.0:
             relation = f"{recorded_gauge / gauge_of_set:.3g} times the gauge pressure of"
         remarks.append(f"the recorded supply has {relation} supply.pressure; the recorded supply was used")
-    if not measured.has(SUPPLY):
+    if SUPPLY not in measured.recording:
         # Shown as values, for they may be the set's or given in its place.
         used = {"supply.pressure": device.supply.pressure}
-        if settings.volume is None and not (measured.has(DORSIFLEXION_SUPPLY) or device.supply.has_one_pressure):
+        has_second = DORSIFLEXION_SUPPLY in measured.recording or device.supply.has_one_pressure
+        if settings.volume is None and not has_second:
             used["supply.dorsiflexion_pressure"] = device.supply.dorsiflexion_pressure
         atmosphere = device.supply.atmospheric_pressure
         shown = [f"{path} = {shown_text(value, 'Pa_a', '.4g', atmosphere)}" for path, value in used.items()]

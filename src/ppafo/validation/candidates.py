@@ -198,8 +198,8 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
     request = replay_of(measured, device, settings)
     scenario = replace(replayed_scenario(request), device=request.device)
     # Supply pressures that a replay follows in the recording, whatever the set has.
-    followed = {path for path, channel in _OF_SUPPLY.items() if measured.has(channel)}
-    if measured.has(SUPPLY) and request.device.supply.has_one_pressure:
+    followed = {path for path, channel in _OF_SUPPLY.items() if channel in measured.recording}
+    if SUPPLY in measured.recording and request.device.supply.has_one_pressure:
         followed = set(_OF_SUPPLY)
     declared = declared_numbers(scenario)
     other_forms = {f"{part}.{name}" for part in ("actuator.leak", "valve") for name in other_form(request.device, part)}
@@ -214,22 +214,19 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
             usual = math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0
             yield CandidateCause(path, words, change, factors, is_ratio=True, usual=usual, unit=quantity.unit or "-")
     pressures = {path: number_at(scenario, path) for path in _OF_SUPPLY if path not in followed}
-    yield _other_atmosphere(request.device, pressures)
+    atmosphere = request.device.supply.atmospheric_pressure
 
-
-def _other_atmosphere(device: Device, pressures: Mapping[str, float]) -> CandidateCause:
-    """Return a wrong atmospheric pressure as cause; it shifts gauge readings and supply ``pressures`` [Pa] by path."""
-    atmosphere = device.supply.atmospheric_pressure
-
-    def change(factor: float) -> ModelChange:
+    def under_atmosphere(factor: float) -> ModelChange:
         higher = (factor - 1.0) * atmosphere
         sensors = dict.fromkeys((PRESSURE_1, PRESSURE_2, *_OF_SUPPLY.values()), SensorModel(zero=-higher))
         moved = {path: pressure + higher for path, pressure in pressures.items()}
         return ModelChange(sensors, {ATMOSPHERE_PATH: atmosphere + higher, **moved})
 
-    unit, per_pascal = _unit_of_pressure(device)
+    unit, per_pascal = _unit_of_pressure(request.device)
     words = f"the atmosphere under gauge pressures seems to be {{:.4g}} {unit}"
-    return CandidateCause("atmosphere", words, change, _ATMOSPHERES, is_ratio=True, shown=per_pascal * atmosphere)
+    yield CandidateCause(
+        "atmosphere", words, under_atmosphere, _ATMOSPHERES, is_ratio=True, shown=per_pascal * atmosphere
+    )
 
 
 def _unit_of_pressure(device: Device) -> tuple[str, float]:

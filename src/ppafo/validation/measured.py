@@ -64,10 +64,6 @@ class MeasuredRecording:
     recording: Recording
     remarks: tuple[str, ...]
 
-    def has(self, name: str) -> bool:
-        """True if the recording has this channel."""
-        return name in self.recording
-
 
 def read_measured(
     source: "Recording | DataFrame | Dataset | str | Path",
@@ -128,9 +124,33 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     remarks = _check_names(recording, file)
     check_gaps(recording, file)
     check_command(recording, file)
-    _check_size(recording, device, file)
+    # Values out of reach of the device are a damaged line, or a unit wrong by powers of ten.
+    highest = max(device.supply.pressure, device.supply.dorsiflexion_pressure)
+    supplies = (SUPPLY, DORSIFLEXION_SUPPLY)
+    for name in (name for name in (*supplies, *COMPARED) if name in recording):
+        full_range = highest if name in supplies else COMPARED[name].full_range(device, highest)
+        worst = int(np.argmax(np.abs(recording[name])))
+        if abs(recording[name][worst]) > _MAXIMUM_RANGES * full_range:
+            where = f"{recording.time[worst]:.6g} s (sample {worst + 1})"
+            raise DataError(
+                f"{file}: '{name}' is {shown_text(recording[name][worst], recording.unit(name))} at {where}, more than "
+                f"{_MAXIMUM_RANGES:g} times what {device.name} can reach"
+            )
     _check_pressures(recording, device, file)
-    _check_change(recording, device, file)
+    gauge = supply_gauge(recording, device)
+    if gauge <= 0.0:
+        owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"
+        raise DataError(
+            f"{file}: {owner} is not above the atmosphere, so there is no full range to compare pressures with"
+        )
+    # Every model would agree with a recording in which no channel changes.
+    compared = [name for name in COMPARED if name in recording]
+    fractions = [lasting_change(recording[name]) / COMPARED[name].full_range(device, gauge) for name in compared]
+    if max(fractions) < _MINIMUM_CHANGE:
+        raise DataError(
+            f"{file}: nothing happens in it: {', '.join(compared)} change by less than {_MINIMUM_CHANGE:.0%} of full "
+            "range, so it cannot tell a good model from a bad one"
+        )
     intervals = np.diff(recording.time)
     wide = np.flatnonzero(intervals > _REMARKED_GAP * np.median(intervals))
     if wide.size:
@@ -157,21 +177,6 @@ def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
     if not any(name in recording for name in COMPARED):
         raise DataError(f"{file}: has none of the channels to compare: {', '.join(COMPARED)}")
     return tuple(f"channel '{name}' is not known and was ignored" for name in unknown)
-
-
-def _check_size(recording: Recording, device: Device, file: str) -> None:
-    """Raise DataError for values out of reach of the device: a damaged line, or a unit wrong by powers of ten."""
-    highest = max(device.supply.pressure, device.supply.dorsiflexion_pressure)
-    supplies = (SUPPLY, DORSIFLEXION_SUPPLY)
-    for name in (name for name in (*supplies, *COMPARED) if name in recording):
-        full_range = highest if name in supplies else COMPARED[name].full_range(device, highest)
-        worst = int(np.argmax(np.abs(recording[name])))
-        if abs(recording[name][worst]) > _MAXIMUM_RANGES * full_range:
-            where = f"{recording.time[worst]:.6g} s (sample {worst + 1})"
-            raise DataError(
-                f"{file}: '{name}' is {shown_text(recording[name][worst], recording.unit(name))} at {where}, more than "
-                f"{_MAXIMUM_RANGES:g} times what {device.name} can reach"
-            )
 
 
 def _check_pressures(recording: Recording, device: Device, file: str) -> None:
@@ -203,20 +208,3 @@ def supply_gauge(recording: Recording, device: Device) -> float:
     if SUPPLY in recording:
         return float(np.median(recording[SUPPLY])) - supply.atmospheric_pressure
     return max(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
-
-
-def _check_change(recording: Recording, device: Device, file: str) -> None:
-    """Raise DataError for a recording in which no channel changes, because every model would agree with it."""
-    gauge = supply_gauge(recording, device)
-    if gauge <= 0.0:
-        owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"
-        raise DataError(
-            f"{file}: {owner} is not above the atmosphere, so there is no full range to compare pressures with"
-        )
-    compared = [name for name in COMPARED if name in recording]
-    fractions = [lasting_change(recording[name]) / COMPARED[name].full_range(device, gauge) for name in compared]
-    if max(fractions) < _MINIMUM_CHANGE:
-        raise DataError(
-            f"{file}: nothing happens in it: {', '.join(compared)} change by less than {_MINIMUM_CHANGE:.0%} of full "
-            "range, so it cannot tell a good model from a bad one"
-        )

@@ -61,14 +61,6 @@ class Replay:
     leg: Leg | None = None
 
 
-def replay_recording(request: Replay) -> Replayed:
-    """Return the model replayed on a recording. Raises SimulationError if it diverges, DataError for invalid inputs."""
-    replayed = replay_together([request])[0]
-    if isinstance(replayed, PpafoError):
-        raise replayed
-    return replayed
-
-
 def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
     """Return the results of many replays in order; a replay that is invalid or diverges gives its error.
 
@@ -83,11 +75,14 @@ def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
             followed = followed_channels(request.measured, request.motion)
             run = _plan(request)
             inputs = step_inputs(RecordedInputs(recording, followed, float(recording.time[0])), request.device, run)
-            planned[number] = _Planned(request, run, inputs, batch_of(run))
+            batch = batch_of(run)
+            planned[number] = _Planned(request, run, inputs, batch)
         except PpafoError as error:
             ended[number] = error
             continue
-        alike.setdefault(planned[number].kind(), []).append(number)
+        command = None if inputs.command is None else inputs.command.tobytes()
+        parameters = tuple((path, series.tobytes()) for path, series in inputs.parameters.items())
+        alike.setdefault((batch.program, batch.clock, command, parameters), []).append(number)
     for together in alike.values():
         first = planned[together[0]]
         batch = replace(
@@ -110,12 +105,6 @@ class _Planned:
     inputs: StepInputs
     batch: Batch
 
-    def kind(self) -> Hashable:
-        """Return the key shared by replays that can run in one batch: program, clock and all inputs."""
-        command = None if self.inputs.command is None else self.inputs.command.tobytes()
-        parameters = tuple((path, series.tobytes()) for path, series in self.inputs.parameters.items())
-        return self.batch.program, self.batch.clock, command, parameters
-
 
 def _replayed(planned: _Planned, rows: Mapping[str, int], record: Floats, ends: Floats) -> Replayed | SimulationError:
     """Return one replay from its record (records, rows) and final state (rows,), or SimulationError if it diverged."""
@@ -129,14 +118,30 @@ def _replayed(planned: _Planned, rows: Mapping[str, int], record: Floats, ends: 
         return SimulationError(
             f"{request.measured.file}: the model diverged {until:.6g} s after the first sample; {remedy}"
         )
-    followed = followed_channels(request.measured, request.motion)
-    return Replayed(_recording(request.measured, run, rows, record), run.step, followed)
+    recorded = request.measured.recording
+    angle = record[:, rows["state.angle"]]
+    mass_1, mass_2 = record[:, rows["state.mass_1"]], record[:, rows["state.mass_2"]]
+    pressure_1, pressure_2 = pressures_of(run.program.actuator, run.plant, angle, mass_1, mass_2)
+    channels = {
+        "angle": (angle, "rad"),
+        "pressure_1": (pressure_1, "Pa"),
+        "pressure_2": (pressure_2, "Pa"),
+        "pressure_difference": (np.subtract(pressure_1, pressure_2), "Pa_d"),
+        "torque": (torque_of(run.program.actuator, run.plant, angle, pressure_1, pressure_2), "N m"),
+        "command": (record[:, rows["result.command"]], "-"),
+    }
+    # Times are on the clock of the recording.
+    interval = run.step * run.record_every
+    times = recorded.time[0] + interval * np.arange(record.shape[0], dtype=np.float64)
+    values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
+    model = Recording(f"{recorded.label}, replayed", times, values, kind="simulated")
+    return Replayed(model, run.step, followed_channels(request.measured, request.motion))
 
 
 def followed_channels(measured: MeasuredRecording, motion: Motion) -> tuple[str, ...]:
     """Return the channels used as inputs; external torque is an input only of a free vane."""
-    followed = [name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if measured.has(name)]
-    followed += [EXTERNAL_TORQUE] if measured.has(EXTERNAL_TORQUE) and motion == "free" else []
+    followed = [name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in measured.recording]
+    followed += [EXTERNAL_TORQUE] if EXTERNAL_TORQUE in measured.recording and motion == "free" else []
     return (COMMAND, *followed, *([ANGLE] if motion == "measured" else []))
 
 
@@ -176,22 +181,3 @@ def _plan(request: Replay) -> Run:
     every = max(count for count in range(1, most + 1) if run.steps_per_sample % count == 0)
     run = replace(run, plant=plant, record_every=every, step_count=samples * run.steps_per_sample)
     return with_prescribed_angle(run, request.start.angle) if request.motion == "measured" else run
-
-
-def _recording(measured: MeasuredRecording, run: Run, rows: Mapping[str, int], record: Floats) -> Recording:
-    """Return the recorded states as channels, with times on the clock of the replayed recording."""
-    angle = record[:, rows["state.angle"]]
-    mass_1, mass_2 = record[:, rows["state.mass_1"]], record[:, rows["state.mass_2"]]
-    pressure_1, pressure_2 = pressures_of(run.program.actuator, run.plant, angle, mass_1, mass_2)
-    channels = {
-        "angle": (angle, "rad"),
-        "pressure_1": (pressure_1, "Pa"),
-        "pressure_2": (pressure_2, "Pa"),
-        "pressure_difference": (np.subtract(pressure_1, pressure_2), "Pa_d"),
-        "torque": (torque_of(run.program.actuator, run.plant, angle, pressure_1, pressure_2), "N m"),
-        "command": (record[:, rows["result.command"]], "-"),
-    }
-    interval = run.step * run.record_every
-    times = measured.recording.time[0] + interval * np.arange(record.shape[0], dtype=np.float64)
-    values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
-    return Recording(f"{measured.recording.label}, replayed", times, values, kind="simulated")

@@ -86,19 +86,6 @@ class _Slope(NamedTuple):
     errors: Floats
 
 
-class _Sized(NamedTuple):
-    """Candidate cause at a magnitude, with the derivative of all errors (all samples,) by this magnitude."""
-
-    candidate: CandidateCause
-    size: float
-    slope: Floats
-
-    @property
-    def change(self) -> ModelChange:
-        """Change of the model at this magnitude."""
-        return self.candidate.at(self.size)
-
-
 @dataclass(frozen=True, slots=True)
 class CauseSearch:
     """Recordings of one device on which changes are tried; ``report`` receives the progress of long searches."""
@@ -234,15 +221,15 @@ class CauseSearch:
         slopes = self.slopes(ModelChange(), none, [candidate for candidate in usual if candidate.is_of_bench])
         if not slopes:
             return []
-        sized = _bounded(slopes, none.errors)
+        sizes = _bounded(slopes, none.errors)
         counts = [record.values.shape[1] for record in self.records for _ in record.channels]
-        sums = np.add.reduceat(np.stack([item.slope for item in sized], axis=1), np.cumsum([0, *counts[:-1]]))
-        deviations = [deviation_of_limit(item.candidate.usual) for item in sized]
-        explained = np.square(sums @ [item.size for item in sized])
+        sums = np.add.reduceat(np.stack([slope.errors for slope in slopes], axis=1), np.cumsum([0, *counts[:-1]]))
+        deviations = [deviation_of_limit(slope.candidate.usual) for slope in slopes]
+        explained = np.square(sums @ sizes)
         squares = explained / np.maximum(np.square(sums * deviations).sum(axis=1), _SMALLEST)
         if len(counts) * float(chi2.sf(squares.max(), 1)) < _UNUSUAL:
             return []
-        change = reduce(joined, [item.change for item in sized])
+        change = reduce(joined, [slope.candidate.at(size) for slope, size in zip(slopes, sizes, strict=True)])
         words = "zeros, gains and delays of several sensors seem to be off"
         return [CandidateCause("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
 
@@ -253,25 +240,25 @@ class CauseSearch:
         are left out.
         """
         usual = [slope for slope in slopes if slope.candidate.is_of_bench]
-        sized, changes = list[_Sized](), list[ModelChange]()
+        sized, changes = list[tuple[CandidateCause, float]](), list[ModelChange]()
         for slope in slopes:
             candidate = slope.candidate
             if candidate.name in known:
                 continue
             unbounded = slope._replace(candidate=replace(candidate, usual=math.inf))
             others = [other for other in usual if other is not slope]
-            fitted = _bounded([unbounded, *others], none.errors)
-            size = fitted[0].size
-            errors = none.errors + sum(item.size * item.slope for item in fitted)
+            sizes = _bounded([unbounded, *others], none.errors)
+            fitted, size = list(zip([slope, *others], sizes, strict=True)), sizes[0]
+            errors = none.errors + sum(part * item.errors for item, part in fitted)
             # A straight line leaves some more; what leaves far more is no small change, nor is what its grid does not
             # reach: of a logarithm such a size would be no number any more.
             is_inside = min(candidate.grid) < size < max(candidate.grid)
             if is_inside and float(errors @ errors) < 2.0 * ONLY_NOISE * len(errors) and abs(size) > candidate.usual:
-                sized.append(_Sized(candidate, size, slope.errors))
-                changes.append(reduce(joined, [item.change for item in fitted[1:]], candidate.at(size)))
+                sized.append((candidate, size))
+                changes.append(reduce(joined, [item.candidate.at(part) for item, part in fitted]))
         causes = [
             SizedCause(candidate, size, residuals, gain=self._gain(residuals, none) - self.penalty)
-            for (candidate, size, _), residuals in zip(sized, self.evaluated(changes), strict=True)
+            for (candidate, size), residuals in zip(sized, self.evaluated(changes), strict=True)
             if residuals is not None
         ]
         return [cause for cause in causes if cause.explains and cause.is_inside]
@@ -309,8 +296,8 @@ class CauseSearch:
         return False
 
 
-def _bounded(slopes: Sequence[_Slope], errors: Floats) -> list[_Sized]:
-    """Return each candidate with its most likely magnitude within its usual limit, from a linear fit of the errors.
+def _bounded(slopes: Sequence[_Slope], errors: Floats) -> list[float]:
+    """Return the most likely magnitude of each candidate within its usual limit, from a linear fit of the errors.
 
     Each usual limit acts as a prior, so that a magnitude on which the errors carry no information stays small. A
     candidate with an infinite usual magnitude is not bounded.
@@ -328,5 +315,5 @@ def _bounded(slopes: Sequence[_Slope], errors: Floats) -> list[_Sized]:
     columns = np.stack([slope.errors for slope in slopes], axis=1) * scales
     prior = np.diag(np.where(np.isfinite(limits), 1.0 / deviation_of_limit(1.0), 0.0))
     rows, right_side = np.concatenate([columns, prior]), np.concatenate([-errors, np.zeros(len(limits))])
-    sizes = lsq_linear(rows, right_side, (-limits, limits)).x * scales
-    return [_Sized(slope.candidate, float(size), slope.errors) for slope, size in zip(slopes, sizes, strict=True)]
+    sizes: list[float] = (lsq_linear(rows, right_side, (-limits, limits)).x * scales).tolist()
+    return sizes

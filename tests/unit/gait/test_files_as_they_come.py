@@ -135,9 +135,10 @@ def test_one_cycle_that_wraps_around_is_a_stride(tmp_path: Path) -> None:
 def test_a_cycle_whose_ends_are_not_the_same_motion_is_not_wrapped() -> None:
     time = np.arange(0.4, 0.4 + 1.2 * STRIDE, 0.01)
     walk = {name: Signal("file", time, curve(name, time)) for name in ("shank_angle", "ankle_angle")}
-    cycle = wrap_cycle(walk)
-    assert cycle is not None
-    assert cycle.period == pytest.approx(STRIDE, abs=0.006)
+    wrapped = wrap_cycle(walk)
+    assert wrapped is not None
+    _, period, _ = wrapped
+    assert period == pytest.approx(STRIDE, abs=0.006)
     drifting = {name: Signal("file", time, item.values + 0.4 * (time - 0.4)) for name, item in walk.items()}
     assert wrap_cycle(drifting) is None
     short = np.arange(0.4, 0.4 + 0.9 * STRIDE, 0.01)

@@ -8,9 +8,7 @@ from textwrap import shorten
 import numpy as np
 
 from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted
-from ppafo.gait.recorded.mapping import (
-    setting_text,
-)
+from ppafo.gait.recorded.mapping import setting_text
 from ppafo.gait.recorded.near_columns import nearest_column
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
@@ -98,38 +96,31 @@ def find_columns(
 
 
 def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTable]) -> str:
-    """Return a message on the missing columns of curves; ``names`` are the unsigned columns of each curve."""
-    reasons = "; ".join(_why_missing(curve, columns, tables) for curve, columns in names.items())
-    return f"{reasons} {_columns_text(tables)}"
+    """Return a message on the missing columns of curves; ``names`` are the unsigned columns of each curve.
 
-
-def _why_missing(curve: str, names: Sequence[str], tables: Sequence[MotionTable]) -> str:
-    """Return a text on the missing column of a curve, with the nearest name; raises DataError for duplicates."""
-    known = [name for table in tables for name in table.columns]
-    missing = next((name for name in names if name not in known), names[0])
-    twins = [name for name in known if re.fullmatch(re.escape(_marker(missing)) + r"#\d+(\.[xyz])?", name)]
-    if twins:
-        files = ", ".join(table.file for table in tables)
-        either = " or ".join(repr(_marker(name)) for name in twins if name[-2:] not in _COORDINATES[1:])
-        raise DataError(
-            f"{curve}: {files} has {_marker(missing)!r} more than once, and they differ: choose one, "
-            f"{either}, in a gait map ({setting_text('columns')})"
-        )
-    if missing in known:
-        return f"{curve}: no file has all of its columns"
-    return f"{curve}: there is no column {missing!r}{nearest_column(missing, known)}"
-
-
-def _columns_text(tables: Sequence[MotionTable]) -> str:
-    """Return the columns and remarks of files, shortened, and a hint to name columns in a gait map, as text."""
+    It has the nearest name of each, and the columns and remarks of the files, shortened. Raises DataError for columns
+    that a file has more than once.
+    """
+    known, reasons = [name for table in tables for name in table.columns], []
+    files = ", ".join(table.file for table in tables)
+    for curve, wanted in names.items():
+        missing = next((name for name in wanted if name not in known), wanted[0])
+        twins = [name for name in known if re.fullmatch(re.escape(_marker(missing)) + r"#\d+(\.[xyz])?", name)]
+        if twins:
+            either = " or ".join(repr(_marker(name)) for name in twins if name[-2:] not in _COORDINATES[1:])
+            raise DataError(
+                f"{curve}: {files} has {_marker(missing)!r} more than once, and they differ: choose one, "
+                f"{either}, in a gait map ({setting_text('columns')})"
+            )
+        reason = f"there is no column {missing!r}{nearest_column(missing, known)}"
+        reasons.append(f"{curve}: {'no file has all of its columns' if missing in known else reason}")
     # A marker counts once, not by its coordinates.
-    names = list(dict.fromkeys(one_line(_marker(name)) for table in tables for name in table.columns))
-    first_names = ", ".join(names[:_MOST_NAMES]) + (", ..." if len(names) > _MOST_NAMES else "")
+    markers = list(dict.fromkeys(one_line(_marker(name)) for name in known))
+    first_names = ", ".join(markers[:_MOST_NAMES]) + (", ..." if len(markers) > _MOST_NAMES else "")
     texts = [first_names, *(one_line(remark) for table in tables for remark in table.remarks)]
     listed = "; ".join(shorten(text, _LONGEST_TEXT, placeholder=" ...") for text in texts)
-    files = ", ".join(table.file for table in tables)
     schema = f"a gait map ({setting_text('columns')}), 'ppafo doctor --schema gait-map'"
-    return f"({files}: {listed}); name the columns in {schema}"
+    return f"{'; '.join(reasons)} ({files}: {listed}); name the columns in {schema}"
 
 
 def _marker(name: str) -> str:

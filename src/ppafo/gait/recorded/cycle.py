@@ -1,7 +1,7 @@
 """Cycle of a walk: a record slightly longer than a stride, whose end is the same motion as its start."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,17 +20,11 @@ _MISFIT = 0.06
 strides of one healthy walk differ by 0.03."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _WrappedCycle:
-    """Cycle repeated three times, its ``period`` [s], and the misfit of its ends relative to the ranges [-]."""
+def wrap_cycle(walk: Mapping[str, Signal]) -> tuple[dict[str, Signal], float, float] | None:
+    """Return one cycle repeated three times, its period [s], and the misfit of its ends relative to the ranges [-].
 
-    walk: Mapping[str, Signal]
-    period: float
-    misfit: float
-
-
-def wrap_cycle(walk: Mapping[str, Signal]) -> _WrappedCycle | None:
-    """Return the record of one cycle repeated three times, or None if its start and end are not the same motion."""
+    None is returned if start and end of the record are not the same motion.
+    """
     start = max(walk[name].time[0] for name in REQUIRED)
     end = min(walk[name].time[-1] for name in REQUIRED)
     # One even clock for both curves, whatever the rates of their files.
@@ -59,7 +53,7 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> _WrappedCycle | None:
         slack = 1.0 / signal.rate
         if signal.time[0] <= start + slack and signal.time[-1] >= start + period - slack:
             wrapped[name] = _repeat(signal, start, float(end), period, name in LOADS)
-    return _WrappedCycle(wrapped, period, float(misfits[best]))
+    return wrapped, period, float(misfits[best])
 
 
 def _repeat(signal: Signal, start: float, end: float, period: float, is_load: bool) -> Signal:

@@ -18,13 +18,6 @@ UNSEEN = ("", "nan", "-nan", "n/a", "na", "null")
 """Cells of a missing value, in lower case."""
 
 
-class Cells(NamedTuple):
-    """Columns of a table in their order: name ("" to skip the column) and unit ("" if the file does not state it)."""
-
-    names: Sequence[str]
-    units: Sequence[str]
-
-
 class NumberBlock(NamedTuple):
     """Rows of numbers in a text file.
 
@@ -54,15 +47,14 @@ def cells_of(line: str, delimiter: str) -> list[str]:
     return [cell.strip().strip('"').strip() for cell in line.split(delimiter)]
 
 
-def rows_of(block: NumberBlock, cells: Cells, clock: Sequence[int] = ()) -> tuple[Floats, list[int]]:
+def rows_of(block: NumberBlock, names: Sequence[str], clock: Sequence[int] = ()) -> tuple[Floats, list[int]]:
     """Return the numbers of a block, shape (rows, named columns), NaN for missing values, and line numbers from 1.
 
-    ``clock`` are the indices of the named columns that must be complete. Raises DataError, with line and column, for a
-    cell that is not a number.
+    ``names`` are the names of all columns in their order, "" for a column that is skipped; ``clock`` are the indices of
+    the named columns that must be complete. Raises DataError, with line and column, for a cell that is not a number.
     """
-    named = [column for column, name in enumerate(cells.names) if name]
-    labels = [cells.names[column] for column in named]
-    width = len(cells.names)
+    named = [column for column, name in enumerate(names) if name]
+    width = len(names)
     rows: list[list[float]] = []
     numbers: list[int] = []
     for number, line in enumerate(block.lines[block.first :], block.first + 1):
@@ -79,8 +71,8 @@ def rows_of(block: NumberBlock, cells: Cells, clock: Sequence[int] = ()) -> tupl
             row = [cell.replace(block.decimal, ".") for cell in row]
         rows.append(
             [
-                number_in(row[place], number, label, () if index in clock else UNSEEN)
-                for index, (place, label) in enumerate(zip(named, labels, strict=True))
+                number_in(row[column], number, names[column], () if index in clock else UNSEEN)
+                for index, column in enumerate(named)
             ]
         )
         numbers.append(number)
@@ -89,52 +81,45 @@ def rows_of(block: NumberBlock, cells: Cells, clock: Sequence[int] = ()) -> tupl
     return np.array(rows), numbers
 
 
-class PerFrame(NamedTuple):
-    """Clock of a table with one frame per row at a rate [Hz]; ``name`` is the frame column (from 1), or empty."""
-
-    name: str
-    rate: float
-
-
-Clock = str | PerFrame
-"""Clock of a table: name of the time column, or frames at a rate."""
-
-
 def table_of(
     path: str | Path,
     block: NumberBlock,
-    cells: Cells,
-    clock: Clock,
+    names: Sequence[str],
+    units: Sequence[str],
+    clock: str,
     *,
+    frame_rate: float | None = None,
     seconds: float = 1.0,
     noun: str = "columns",
     kind: str = "measured",
 ) -> MotionTable:
-    """Return the motion table of a block; ``seconds`` [s] is the unit of the time column.
+    """Return the motion table of a block.
 
+    ``names`` and ``units`` are of all columns in their order: the name is "" for a column that is skipped, the unit if
+    the file does not state it. ``clock`` is the name of the time column, whose unit is ``seconds`` [s], or with a
+    ``frame_rate`` [Hz] of the column of frames from 1, "" for one frame in each row.
     Duplicate column names are allowed. Raises DataError, with file, line and column, for values that cannot be read.
     """
-    written = [name for name in cells.names if name]
+    written = [name for name in names if name]
     distinct = told_apart(written)
     distinct_names = iter(distinct)
-    named = Cells([next(distinct_names) if name else "" for name in cells.names], cells.units)
-    time_name = clock.name if isinstance(clock, PerFrame) else clock
-    time_column = written.index(time_name) if time_name else None
+    named = [next(distinct_names) if name else "" for name in names]
+    time_column = written.index(clock) if clock else None
     try:
         values, numbers = rows_of(block, named, () if time_column is None else (time_column,))
         has_clock = time_column is not None
         time: Floats = values[:, time_column] if has_clock else np.arange(len(values), dtype=np.float64)
         first = 1.0 if has_clock else 0.0
-        time = time * seconds if isinstance(clock, str) else (time - first) / clock.rate
+        time = time * seconds if frame_rate is None else (time - first) / frame_rate
         check_clock(time, numbers, may_have_trials=False)
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
-    twins = {name: others for name, others in doubled(written, distinct).items() if name != time_name}
+    twins = {name: others for name, others in doubled(written, distinct).items() if name != clock}
     columns = without_copies(
         {name: values[:, column] for column, name in enumerate(distinct) if column != time_column},
         twins,
     )
-    units = [unit for name, unit in zip(cells.names, cells.units, strict=True) if name]
-    stated = dict(zip((*distinct, *written), (*units, *units), strict=True))
+    written_units = [unit for name, unit in zip(names, units, strict=True) if name]
+    stated = dict(zip((*distinct, *written), (*written_units, *written_units), strict=True))
     remarks = tuple(said_of_doubled(twins, columns, noun))
     return MotionTable(str(path), time, columns, {name: stated[name] for name in columns}, kind=kind, remarks=remarks)

@@ -16,9 +16,7 @@ from ppafo.gait.plausible_angles import SHANK_RANGE, check_angle_range
 from ppafo.gait.recorded.columns import LOADS
 from ppafo.gait.recorded.contacts import UNLOADED, Contact, contacts_of
 from ppafo.gait.recorded.cycle import wrap_cycle
-from ppafo.gait.recorded.mapping import (
-    Side,
-)
+from ppafo.gait.recorded.mapping import Side
 from ppafo.gait.recorded.signal import Signal, low_pass
 from ppafo.gait.recorded.table import OFF, STRIKE, MotionTable
 from ppafo.wording import count_of
@@ -93,26 +91,34 @@ def find_footfalls(
     if len(usable) >= (1 if footfalls.is_overground else least) or least > LEAST_STRIDES:
         return footfalls
     # A cycle must not wrap around what was bridged.
-    cycle = None if any(signal.lost is not None for signal in walk.values()) else wrap_cycle(walk)
-    if cycle is None:
+    wrapped = None if any(signal.lost is not None for signal in walk.values()) else wrap_cycle(walk)
+    if wrapped is None:
         return footfalls
+    cycle, period, misfit = wrapped
     # Three cycles in a row have one whole stride in the middle, wherever the record begins.
-    again = _of_walk(cycle.walk, (), side, 1)
-    whole = usable_strides(cycle.walk, again.strides)
+    again = _of_walk(cycle, (), side, 1)
+    whole = usable_strides(cycle, again.strides)
     # A record of two strides wraps around too, as one cycle that is twice as long.
-    if not whole or whole[0].time < _LEAST_OF_CYCLE * cycle.period:
+    if not whole or whole[0].time < _LEAST_OF_CYCLE * period:
         return footfalls
     span = walk[SHANK].time[-1] - walk[SHANK].time[0]
     remark = (
-        f"one cycle that wraps around: {span:.3g} s of data around a stride of {cycle.period:.4g} s, whose start and "
-        f"end differ by {100.0 * cycle.misfit:.1f} % of the ranges; how much strides differ is not known"
+        f"one cycle that wraps around: {span:.3g} s of data around a stride of {period:.4g} s, whose start and "
+        f"end differ by {100.0 * misfit:.1f} % of the ranges; how much strides differ is not known"
     )
-    return replace(again, walk=cycle.walk, strides=whole[:1], remarks=(*again.remarks, remark), is_one_cycle=True)
+    return replace(again, walk=cycle, strides=whole[:1], remarks=(*again.remarks, remark), is_one_cycle=True)
 
 
 def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, least: int) -> Footfalls:
     """Return the strides from the force, if it has the ``least`` number, or from the source with more strides."""
-    recorded = _strides_of_file(tables, side)
+    trials, recorded = [table.trial for table in tables if table.trial is not None], list[Stride]()
+    # Events of two trials have two clocks.
+    if len(trials) == 1:
+        strikes, offs = (trials[0].events.get((side, kind), []) for kind in (STRIKE, OFF))
+        for start, end in pairwise(strikes):
+            between = [time for time in offs if start < time < end]
+            # Two toe-offs between two strikes are a missed strike: such a stride is none.
+            recorded += [Stride(start, between[0], end)] if len(between) == 1 else []
     if FORCE not in walk:
         if recorded:
             return Footfalls(walk, recorded, FILE, is_overground=True)
@@ -131,18 +137,6 @@ def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Si
         return Footfalls(walk, forced, FORCE)
     corrected, remark = _by_contacts(leaning, contacts)
     return Footfalls(walk, corrected, SHANK, (remark,), is_overground=True)
-
-
-def _strides_of_file(tables: Sequence[MotionTable], side: Side) -> list[Stride]:
-    """Return the strides between the events of a foot in a C3D file; each stride needs exactly one toe-off."""
-    trials = [table.trial for table in tables if table.trial is not None]
-    # Events of two trials have two clocks.
-    if len(trials) != 1:
-        return []
-    strikes, offs = (trials[0].events.get((side, kind), []) for kind in (STRIKE, OFF))
-    between = {(start, end): [time for time in offs if start < time < end] for start, end in pairwise(strikes)}
-    # Two toe-offs between two strikes are a missed strike: such a stride is none.
-    return [Stride(start, times[0], end) for (start, end), times in between.items() if len(times) == 1]
 
 
 def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[list[Stride], str]:

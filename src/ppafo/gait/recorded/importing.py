@@ -87,7 +87,16 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     if footfalls is None:
         raise_noted(wrong)
     walk = dict(footfalls.walk)
-    strides = _steady_strides(footfalls, settings, wrong)
+    least = settings.least_strides or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
+    strides = of_usual_time(usable_strides(walk, footfalls.strides), least)
+    counts = [(stride, max(lost_in(walk[name], stride) for name in REQUIRED)) for stride in footfalls.strides]
+    lost = [(stride, f"{count_of(count, 'frame')} of its markers or angles lost") for stride, count in counts if count]
+    strides = replace(strides, left_out=(*strides.left_out, *lost))
+    sources = {name: walk[name] for name in (*REQUIRED, footfalls.events) if name in walk}
+    with noted_in(wrong):
+        _check_enough(strides, footfalls.strides, sources)
+    if not strides.taken:
+        raise_noted(wrong)
     covered = {name: strides_of_curve(footfalls, name, signal, strides.taken) for name, signal in walk.items()}
     # A load that no plate measured for a whole stance would otherwise look like one whose file is too short.
     unmeasured = [
@@ -95,7 +104,14 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     ]
     walk = {name: signal for name, signal in walk.items() if name not in unmeasured}
     strides = without_drop_outs(walk, source.tables, covered, strides, wrong)
-    curves = _curves(walk, covered, strides, settings.low_pass)
+    # Footfalls come from the unfiltered force, whose edges a low pass would move.
+    smooth = walk
+    if settings.low_pass is not None:
+        smooth = {name: low_pass(signal, settings.low_pass) for name, signal in walk.items()}
+    curves = {
+        name: statistics(name, signal, [stride for stride in covered[name] if stride in strides.taken])
+        for name, signal in smooth.items()
+    }
     strides = without_odd_shapes(curves, strides)
     curves = _over_taken_strides(curves, walk, strides, wrong)
     missing = [f"{name} is left out: in no whole stride was it measured throughout the stance" for name in unmeasured]
@@ -104,33 +120,6 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
         raise_noted(wrong)
     walk = {name: signal for name, signal in walk.items() if name in curves}
     return _finish(source, replace(footfalls, walk=walk), curves, strides, remarks, wrong)
-
-
-def _steady_strides(footfalls: Footfalls, settings: ImportSettings, wrong: list[PpafoError]) -> StrideSelection:
-    """Return the strides of usual duration that both angles cover; raises DataError if there is none."""
-    walk, events = footfalls.walk, footfalls.events
-    least = settings.least_strides or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
-    strides = of_usual_time(usable_strides(walk, footfalls.strides), least)
-    counts = [(stride, max(lost_in(walk[name], stride) for name in REQUIRED)) for stride in footfalls.strides]
-    lost = [(stride, f"{count_of(count, 'frame')} of its markers or angles lost") for stride, count in counts if count]
-    strides = replace(strides, left_out=(*strides.left_out, *lost))
-    with noted_in(wrong):
-        _check_enough(strides, footfalls.strides, {name: walk[name] for name in (*REQUIRED, events) if name in walk})
-    if not strides.taken:
-        raise_noted(wrong)
-    return strides
-
-
-def _curves(
-    walk: Mapping[str, Signal], covered: Mapping[str, Sequence[Stride]], strides: StrideSelection, cut_off: float | None
-) -> dict[str, CurveStatistics]:
-    """Return the curves of all signals over the selected strides that they cover, low-pass filtered if requested."""
-    # Footfalls come from the unfiltered force, whose edges a low pass would move.
-    smooth = walk if cut_off is None else {name: low_pass(signal, cut_off) for name, signal in walk.items()}
-    return {
-        name: statistics(name, signal, [stride for stride in covered[name] if stride in strides.taken])
-        for name, signal in smooth.items()
-    }
 
 
 def _over_taken_strides(

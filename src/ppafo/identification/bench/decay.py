@@ -7,7 +7,6 @@ import numpy as np
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.checks import check_moves, check_no_gap
 from ppafo.identification.source import RecordingSource, window
-from ppafo.signals import Recording
 from ppafo.signals.faults import is_at_limit, noise_of, plateaus
 from ppafo.signals.recording import Floats
 
@@ -58,9 +57,23 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
             f"{noise:.3g} rad; push the vane"
         )
     skipped = check_no_gap(source, PROCEDURE, part)
-    rows, sign = _falling_part(source, part, start is not None)
+    # A start that the user gave is after the push.
+    has_start = start is not None
+    speeds, _ = smoothed_rates(part.time, part[ANGLE])
+    fastest = 0 if has_start else int(np.argmax(np.abs(speeds)))
+    sign = 1.0 if speeds[fastest] > 0.0 else -1.0
+    # A push ends a little after the highest speed of the smoothed signal; that much is left out.
+    first = fastest if has_start else fastest + smoothing_width(part.time.size) // 2
+    back = np.flatnonzero(sign * speeds[first:] < -_REVERSAL * np.abs(speeds).max())
+    last = first + int(back[0]) if back.size else part.time.size
+    if last - first < MINIMUM_SAMPLES:
+        raise IdentificationError(
+            f"{source.name}: {PROCEDURE}: only {last - first} samples lie between the highest speed and the end or the "
+            f"first reversal, {MINIMUM_SAMPLES} are needed; record longer, or give start and end"
+        )
+    rows = slice(first, last)
     angle = part[ANGLE][rows]
-    before = skipped + rows.start
+    before = skipped + first
     for plateau in plateaus(angle):
         if is_at_limit(angle, plateau):
             raise IdentificationError(
@@ -81,26 +94,6 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
                 f"check unit and sign of both"
             )
     return FreeDecay(time=time - time[0], angle=angle, sign=sign, velocity=velocity)
-
-
-def _falling_part(source: RecordingSource, part: Recording, starts_here: bool) -> tuple[slice, float]:
-    """Return the samples from the end of the push to the first reversal, and the direction of the push, 1 or -1.
-
-    If the user gave the start (``starts_here``), the push has ended by then.
-    """
-    velocity, _ = smoothed_rates(part.time, part[ANGLE])
-    fastest = 0 if starts_here else int(np.argmax(np.abs(velocity)))
-    sign = 1.0 if velocity[fastest] > 0.0 else -1.0
-    # A push ends a little after the highest speed of the smoothed signal; that much is left out.
-    first = fastest if starts_here else fastest + smoothing_width(part.time.size) // 2
-    back = np.flatnonzero(sign * velocity[first:] < -_REVERSAL * np.abs(velocity).max())
-    last = first + int(back[0]) if back.size else part.time.size
-    if last - first < MINIMUM_SAMPLES:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: only {last - first} samples lie between the highest speed and the end or the "
-            f"first reversal, {MINIMUM_SAMPLES} are needed; record longer, or give start and end"
-        )
-    return slice(first, last), sign
 
 
 def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:

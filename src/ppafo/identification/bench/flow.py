@@ -20,6 +20,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
 from ppafo.identification.bench.law import PooledReadings, Values, solve, sought, tolerance, within
 from ppafo.identification.fit import Fit
 from ppafo.identification.residuals import FitVariable
+from ppafo.identification.tolerances import GAS_LAW as LIMIT_OF_GAS_LAW
 from ppafo.identification.tolerances import Tolerances
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import sonic_conductance_mass
@@ -75,7 +76,8 @@ class GasAt:
 
 def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[FitVariable, ...]:
     """Return the uncertain quantities of the gas: temperature [K] and relative departure from the ideal gas law [-]."""
-    return (*tolerance(TEMPERATURE, gas.temperature_deviation), *within(GAS_LAW, tolerances.law_of_gas))
+    departure = LIMIT_OF_GAS_LAW if tolerances.gas_law is None else tolerances.gas_law
+    return (*tolerance(TEMPERATURE, gas.temperature_deviation), *within(GAS_LAW, departure))
 
 
 def flow_tolerances(

@@ -63,7 +63,17 @@ def torque_readings(sources: tuple[RecordingSource, ...]) -> TorqueReadings:
     """Return the readings of all recordings. Raises IdentificationError if they cannot separate slope from friction."""
     is_force = bool(sources) and all(FORCE in item.recording and TORQUE not in item.recording for item in sources)
     channel = FORCE if is_force else TORQUE
-    _check_recordings(sources, channel)
+    check_sources(sources, PROCEDURE, (channel, "pressure_difference", "direction"), 1, moving=(channel,))
+    for source in sources:
+        check_not_alone(source, PROCEDURE, "pressure_difference")
+        check_not_clipped(source, PROCEDURE, channel, "pressure_difference", source.recording["pressure_difference"])
+        directions = source.recording["direction"]
+        wrong = np.flatnonzero(~np.isin(directions, (-1.0, 0.0, 1.0)))
+        if wrong.size:
+            raise IdentificationError(
+                f"{source.name}: {PROCEDURE}: channel 'direction' is {directions[wrong[0]]:g} at sample "
+                f"{wrong[0] + 1}; it is 1 while the pressure rises, -1 while it falls, 0 for neither"
+            )
     pressure, load, direction = (pool(sources, name) for name in ("pressure_difference", channel, "direction"))
     is_used = direction != 0.0
     check_no_wrong_reading(sources, PROCEDURE, channel, (pressure, direction), is_used)
@@ -106,21 +116,6 @@ def torque_readings(sources: tuple[RecordingSource, ...]) -> TorqueReadings:
         channel=channel,
         slides=_slides(sources),
     )
-
-
-def _check_recordings(sources: tuple[RecordingSource, ...], channel: str) -> None:
-    """Raise IdentificationError for a recording with a missing, stuck or saturated channel or an unknown direction."""
-    check_sources(sources, PROCEDURE, (channel, "pressure_difference", "direction"), 1, moving=(channel,))
-    for source in sources:
-        check_not_alone(source, PROCEDURE, "pressure_difference")
-        check_not_clipped(source, PROCEDURE, channel, "pressure_difference", source.recording["pressure_difference"])
-        direction = source.recording["direction"]
-        wrong = np.flatnonzero(~np.isin(direction, (-1.0, 0.0, 1.0)))
-        if wrong.size:
-            raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: channel 'direction' is {direction[wrong[0]]:g} at sample {wrong[0] + 1}; "
-                f"it is 1 while the pressure rises, -1 while it falls, 0 for neither"
-            )
 
 
 def _check_separable(sources: tuple[RecordingSource, ...], pressure: Floats, direction: Floats) -> None:

@@ -86,6 +86,7 @@ def valve_map(
     remedy, for recordings from which the map cannot be estimated.
     """
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("command", "mass_flow"), absolute=PRESSURES)
+    branches = []
     for source in sources:
         requested = source.recording["command"]
         wrong = np.flatnonzero(np.abs(requested) > 1.0 + 1e-9)
@@ -94,12 +95,15 @@ def valve_map(
                 f"{source.name}: {PROCEDURE}: channel 'command' is {requested[wrong[0]]:g} at sample {wrong[0] + 1}; "
                 f"it goes from -1 to 1: scale it in a column map"
             )
+        # The direction of the command, 0 before its first change, is that of the last change unless it was recorded.
+        signs = np.sign(np.diff(requested, prepend=requested[0]))
+        last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.size), 0))
+        branches.append(source.recording["direction"] if "direction" in source.recording else signs[last])
     command, upstream, downstream = (pool(sources, name) for name in CHANNELS if name != "mass_flow")
     direction = np.sign(command * (upstream - downstream))
     measured, is_possible, remarks = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow)
     commands = tuple(source.recording["command"] for source in sources)
-    branch = np.concatenate([_branch(source) for source in sources])
-    sweep = _Sweep(commands, command, measured, upstream, downstream, branch)
+    sweep = _Sweep(commands, command, measured, upstream, downstream, np.concatenate(branches))
     areas = _areas(sources, sweep, gas)
     band = f"{path}.dead_band"
     numbers = (
@@ -117,7 +121,13 @@ def valve_map(
         # A play needs every command, so that readings that cannot be drop out of the flow alone.
         return np.where(is_possible, flow, sweep.flow)
 
-    fitted, model = solve(law, _readings(sources, sweep), numbers, confidence)
+    groups = (
+        np.where(sweep.branch < 0.0, "falling commands", "rising commands").tolist(),
+        np.where(sweep.command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
+        np.where(np.abs(sweep.command) > 0.5 * sweep.highest_command, "large commands", "small commands").tolist(),
+    )
+    readings = PooledReadings(sweep.flow, ["mass_flow"] * sweep.flow.size, recordings_of(sources), groups)
+    fitted, model = solve(law, readings, numbers, confidence)
     values, residuals = fitted.by_name, sweep.flow - model
     scatter = np.std(residuals) / np.abs(sweep.flow).max()
     is_clear = bool((sweep.command > _CLEAR_COMMAND).any() and (sweep.command < -_CLEAR_COMMAND).any())
@@ -156,16 +166,6 @@ def _sought(sources: tuple[RecordingSource, ...], sweep: _Sweep, areas: Floats, 
         sought(_SATURATION, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
         *((sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if sweep.is_two_way else ()),
     )
-
-
-def _readings(sources: tuple[RecordingSource, ...], sweep: _Sweep) -> PooledReadings:
-    """Return the flow readings with labels for consistency tests: branch, direction and magnitude of the command."""
-    groups = (
-        np.where(sweep.branch < 0.0, "falling commands", "rising commands").tolist(),
-        np.where(sweep.command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
-        np.where(np.abs(sweep.command) > 0.5 * sweep.highest_command, "large commands", "small commands").tolist(),
-    )
-    return PooledReadings(sweep.flow, ["mass_flow"] * sweep.flow.size, recordings_of(sources), groups)
 
 
 def _reported(sweep: _Sweep, band: str, saturation: float) -> list[ReportedNumber]:
@@ -233,15 +233,3 @@ def _areas(sources: tuple[RecordingSource, ...], sweep: _Sweep, gas: GasAt) -> F
             f"reverse the sign of one of them"
         )
     return np.asarray(areas)
-
-
-def _branch(source: RecordingSource) -> Floats:
-    """Return the direction of the command (readings,): 1, -1, or 0 before the first change.
-
-    The direction is taken from the recorded channel, or else from the last change of the command.
-    """
-    if "direction" in source.recording:
-        return source.recording["direction"]
-    signs = np.sign(np.diff(source.recording["command"], prepend=source.recording["command"][0]))
-    last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.size), 0))
-    return signs[last]

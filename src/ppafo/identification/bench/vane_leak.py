@@ -58,6 +58,8 @@ STANDS_STILL = 0.02
 """Ratio of the pressure changes of both chambers [-] up to which the chamber with the smaller change is a room."""
 _NEARLY_EQUAL = 0.01
 _RATIO, _VOLUME, _RELAXATION = "ratio of the volumes", "volume", "time of the relaxation"
+_START, _RELAXED_BY = "start of {}, decay {}", "relaxation of {}, decay {}"
+"""Names of the initial pressure [Pa] and of the relative error just after filling [-], by channel and decay."""
 _RELAXED, _MOST_RELAXED = 5.0, 0.02
 """Usual ratio of recording length to relaxation time [-], and largest relative pressure error from relaxation [-]."""
 _REMEDY = "{}, or give start and end; gas may leak elsewhere, or relax with its walls"
@@ -183,24 +185,16 @@ class _ClosedChambers(NamedTuple):
         end = np.polyfit(self.time[-edge:] - self.time[-1], difference[-edge:], 1)[1]
         return float(start), float(end)
 
-    def start_of(self, sensor: str) -> str:
-        """Return the name of the initial pressure [Pa] of a chamber, given its channel."""
-        return f"start of {sensor}, decay {self.number}"
-
-    def relaxation_of(self, sensor: str) -> str:
-        """Return the name of the relative pressure error just after filling [-], given its channel."""
-        return f"relaxation of {sensor}, decay {self.number}"
-
     def numbers(self) -> Iterator[FitVariable]:
         """Yield the unknowns: initial pressures (in a room, with a prior of its noise) and relaxation after filling."""
         for side, (sensor, values) in enumerate(self.sensors):
             size = max(abs(self.changes[self.changing]), float(np.std(np.diff(values))), 1.0)
-            initial = sought(self.start_of(sensor), float(values[: self.edge].mean()), 1.0, scale=size)
+            initial = sought(_START.format(sensor, self.number), float(values[: self.edge].mean()), 1.0, scale=size)
             if side == self.room:
                 initial = replace(initial, start=float(values.mean()), deviation=max(float(values.std()), 1.0))
             yield initial
         for sensor, _ in self.fitted:
-            yield from within(self.relaxation_of(sensor), _MOST_RELAXED)
+            yield from within(_RELAXED_BY.format(sensor, self.number), _MOST_RELAXED)
 
     def halves(self) -> list[str]:
         """Return for each sample the label of the early or late half of the fall of the pressure difference."""
@@ -301,13 +295,13 @@ def _decaying_leak(
         rate = warm * (1.0 + at[GAS_LAW]) / (emptied * (1.0 + at[_VOLUME]))
         relaxed = longest / _RELAXED * math.exp(at[_RELAXATION])
         for decay in decays:
-            first, second = (at[decay.start_of(sensor)] for sensor, _ in decay.sensors)
+            first, second = (at[_START.format(sensor, decay.number)] for sensor, _ in decay.sensors)
             ratio = at[_RATIO] if decay.room is None else 0.0 if decay.room == 1 else math.inf
             falls = pressures_of_fall(opening, paths.sizes(at), first, second, ratio, rate, decay.time)
             faded = np.exp(-decay.time / relaxed)
             for side, ((sensor, _), pressure) in enumerate(zip(decay.sensors, falls, strict=True)):
                 if side != decay.room:
-                    offset = 1.0 + at[decay.relaxation_of(sensor)] * faded
+                    offset = 1.0 + at[_RELAXED_BY.format(sensor, decay.number)] * faded
                     pressures.append(pressure * offset + at[f"zero of {sensor}"])
         return np.concatenate(pressures)
 

@@ -188,7 +188,19 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
         is_state = path.partition(".")[0] in _STATE
         start = number_at(scenario_of(experiments[0]) if is_state else scenarios[0], path)
     low, high = _bounds(parameter, path, start, quantity)
-    _check_bounds(parameter, start, low, high, quantity)
+    bounds = f"{low:.6g} and {high:.6g}"
+    has_size = math.isfinite(high - low) or math.isfinite(parameter.deviation)
+    is_allowed = quantity.minimum <= low and high <= quantity.maximum
+    allowed = f"{quantity.minimum:.6g} to {quantity.maximum:.6g} {quantity.unit}".rstrip()
+    refuse_first(
+        parameter.name,
+        (not math.isfinite(start) or math.isnan(low) or math.isnan(high), "start and bounds must be finite numbers"),
+        (not low < high, f"low, {low:.6g}, must be below high, {high:.6g}"),
+        (not low <= start <= high, f"start {start:.6g} must lie between the bounds {bounds}"),
+        (start == 0.0 and not has_size, "a start at 0 needs bounds, because they define what a small step is"),
+        (not parameter.deviation > 0.0, "the standard deviation of a prior must be above 0"),
+        (not is_allowed, f"the bounds {bounds} exceed what is allowed, {allowed}"),
+    )
     if parameter.is_logarithm:
         start, low, high = math.log(start), math.log(low), math.log(high)
     # Differences are a thousandth of the scale at most, which for a prior is a tenth of its deviation.
@@ -209,23 +221,6 @@ def _bounds(parameter: FreeParameter, path: str, start: float, quantity: Quantit
         low = max(quantity.minimum, start / _FURTHEST) if start > 0.0 <= quantity.minimum else quantity.minimum
         high = min(quantity.maximum, start * _FURTHEST) if start > 0.0 else quantity.maximum
     return (low if parameter.low is None else parameter.low), (high if parameter.high is None else parameter.high)
-
-
-def _check_bounds(parameter: FreeParameter, start: float, low: float, high: float, quantity: Quantity) -> None:
-    """Raise IdentificationError if start, bounds and prior contradict each other or the declaration."""
-    bounds = f"{low:.6g} and {high:.6g}"
-    has_size = math.isfinite(high - low) or math.isfinite(parameter.deviation)
-    is_allowed = quantity.minimum <= low and high <= quantity.maximum
-    allowed = f"{quantity.minimum:.6g} to {quantity.maximum:.6g} {quantity.unit}".rstrip()
-    refuse_first(
-        parameter.name,
-        (not math.isfinite(start) or math.isnan(low) or math.isnan(high), "start and bounds must be finite numbers"),
-        (not low < high, f"low, {low:.6g}, must be below high, {high:.6g}"),
-        (not low <= start <= high, f"start {start:.6g} must lie between the bounds {bounds}"),
-        (start == 0.0 and not has_size, "a start at 0 needs bounds, because they define what a small step is"),
-        (not parameter.deviation > 0.0, "the standard deviation of a prior must be above 0"),
-        (not is_allowed, f"the bounds {bounds} exceed what is allowed, {allowed}"),
-    )
 
 
 def reach_of(chosen: Sequence[FitNumber]) -> float:

@@ -4,7 +4,7 @@ All input errors are reported before the search starts.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -104,18 +104,6 @@ def trajectory_problem(section: TrajectorySection, context: SectionContext) -> T
     stated = {} if context.parameter_set is None else stated_by(context.parameter_set, experiments[0].scenario)
     tolerances = tolerance_parameters(context.tolerances, experiments, parameters, stated)
     return TrajectoryProblem((*parameters, *tolerances), experiments, section.confidence)
-
-
-def candidates_of(section: TrajectorySection, context: SectionContext) -> tuple[CandidateExperiment, ...]:
-    """Return the candidate experiments of a section, with scenarios, noise and sample intervals [s]."""
-    candidates = []
-    for entry in section.candidates:
-        where = f"{context.file}: candidate '{entry.label}'"
-        scenario = _scenario(entry.scenario, entry.overrides, context)
-        interval = quantity_in(entry, "interval", "s", where, SHORTEST_STEP, scenario.run.duration)
-        assert interval is not None, "it has a default"
-        candidates.append(CandidateExperiment(entry.label, scenario, noise_of_channels(entry.noise, where), interval))
-    return tuple(candidates)
 
 
 def _experiment(entry: ExperimentSection, context: SectionContext) -> FittedExperiment:
@@ -247,7 +235,15 @@ def solve_section(section: TrajectorySection, context: SectionContext, report: R
     """Return the result of a section; all input errors are reported before the search starts."""
     try:
         problem = trajectory_problem(section, context)
-        candidates = candidates_of(section, context)
+        candidates = []
+        for entry in section.candidates:
+            where = f"{context.file}: candidate '{entry.label}'"
+            scenario = _scenario(entry.scenario, entry.overrides, context)
+            interval = quantity_in(entry, "interval", "s", where, SHORTEST_STEP, scenario.run.duration)
+            assert interval is not None, "it has a default"
+            candidates.append(
+                CandidateExperiment(entry.label, scenario, noise_of_channels(entry.noise, where), interval)
+            )
         fitted = fit(problem, report)
         expected = expected_information(fitted, candidates)
     except (IdentificationError, DataError) as error:
@@ -255,22 +251,17 @@ def solve_section(section: TrajectorySection, context: SectionContext, report: R
             raise
         raise type(error)(f"{context.file}: {error}") from error
     sources = tuple(RecordingSource(experiment.recording, experiment.source) for experiment in problem.experiments)
-    disagreeing = _against_bench(fitted.estimates, context.bench)
-    return TrajectoryOutcome(
-        fitted, expected, (*remarks_on_readings(sources), *fitted.outliers, *fitted.remarks, *disagreeing)
-    )
-
-
-def _against_bench(estimates: Iterable[Estimate], bench: Mapping[str, Estimate]) -> Iterator[str]:
-    """Yield a remark on each fitted value whose interval does not overlap the interval of a bench procedure."""
-    for fitted in estimates:
-        measured = bench.get(fitted.path)
-        if measured is None or not (measured.is_usable and fitted.is_usable):
+    remarks = [*remarks_on_readings(sources), *fitted.outliers, *fitted.remarks]
+    for estimate in fitted.estimates:
+        measured = context.bench.get(estimate.path)
+        if measured is None or not (measured.is_usable and estimate.is_usable):
             continue
-        if fitted.low > measured.high or fitted.high < measured.low:
-            ends = [in_shown_unit(end, fitted.unit) for end in (fitted.low, fitted.high, measured.low, measured.high)]
+        if estimate.low > measured.high or estimate.high < measured.low:
+            numbers = (estimate.low, estimate.high, measured.low, measured.high)
+            ends = [in_shown_unit(number, estimate.unit) for number in numbers]
             low, high, lowest, highest = (f"{end:.4g}" for end, _ in ends)
-            yield (
-                f"{fitted.path}: fitted {low} to {high} {ends[0][1]}, from the bench {lowest} to {highest}: one of the "
-                "two models is incomplete"
+            remarks.append(
+                f"{estimate.path}: fitted {low} to {high} {ends[0][1]}, from the bench {lowest} to {highest}: one of "
+                "the two models is incomplete"
             )
+    return TrajectoryOutcome(fitted, expected, tuple(remarks))

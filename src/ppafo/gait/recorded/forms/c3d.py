@@ -90,7 +90,16 @@ def read_c3d(path: str | Path) -> MotionTable:
         columns[name], units[name] = values, "N"
     # A trial that was cut keeps its clock: events count from the beginning of the capture.
     first = max(0, int(content["header"]["points"].get("first_frame", 0)))
-    trial = _trial(parameters)
+    subject = parameters.get("PROCESSING", {})
+    mass, height = _number(subject, _BODY), _number(subject, _HEIGHT)
+    # Plug-in Gait keeps the height in mm.
+    stature = None if height is None else height / 1000.0 if height > 100.0 else height
+    # An unknown spelling or an implausible value is treated as absent.
+    trial = TrialData(
+        mass if mass is not None and 1.0 <= mass <= 500.0 else None,
+        stature if stature is not None and 0.5 <= stature <= 2.5 else None,
+        *_events(parameters.get("EVENT", {})),
+    )
     time = (first + np.arange(frames)) / rate
     remarks = said_of_doubled(twins, dict.fromkeys(labels), "points")
     remarks += [f"points not read, for they have no label: {number - len(labels)}"] if len(labels) < number else []
@@ -147,19 +156,6 @@ def _texts(group: Any, key: str) -> list[str]:
             break
         keys.append(f"{key}{number}")
     return [str(text) for name in keys if name in group for text in group[name]["value"]]
-
-
-def _trial(parameters: Any) -> TrialData:
-    """Return subject and events; an unknown spelling or an implausible value is treated as absent."""
-    group = parameters.get("PROCESSING", {})
-    mass, height = _number(group, _BODY), _number(group, _HEIGHT)
-    # Plug-in Gait keeps the height in mm.
-    stature = None if height is None else height / 1000.0 if height > 100.0 else height
-    return TrialData(
-        mass if mass is not None and 1.0 <= mass <= 500.0 else None,
-        stature if stature is not None and 0.5 <= stature <= 2.5 else None,
-        *_events(parameters.get("EVENT", {})),
-    )
 
 
 def _number(group: Any, names: Iterable[str]) -> float | None:

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from ppafo.errors import DataError, UnitError, refused_as
-from ppafo.gait.recorded.delimited import Cells, NumberBlock, lines_of, table_of
+from ppafo.gait.recorded.delimited import NumberBlock, lines_of, table_of
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.mapping import Side, package_map, setting_text
 from ppafo.gait.recorded.table import MotionTable
@@ -40,15 +40,14 @@ def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Conventio
     return Convention(package_map())
 
 
-def is_plain(path: str | Path) -> bool:
-    """Return True for a CSV file with a foreign delimiter, or with a column without a unit in square brackets."""
-    header = _header(path)
-    return _delimiter(header) != "," or not all("[" in cell for cell in header.split(","))
-
-
 def plain_names(path: str | Path) -> list[str]:
-    """Return the names in the header of a plain CSV file."""
-    return [name for name, _ in _named_columns(_header(path))]
+    """Return the names in the header of a plain CSV file; an empty list for one of the package.
+
+    A plain file has a foreign delimiter, or a column without a unit in square brackets.
+    """
+    header = _header(path)
+    is_plain = _delimiter(header) != "," or not all("[" in cell for cell in header.split(","))
+    return [name for name, _ in _named_columns(header)] if is_plain else []
 
 
 def _named_columns(header: str) -> list[tuple[str, str]]:
@@ -91,8 +90,7 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     block = NumberBlock(
         lines=lines, first=first + 1, delimiter=delimiter, decimal="," if has_comma else ".", is_ragged=False
     )
-    cells = Cells([*[""] * at, *names[at:]], units)
-    return table_of(path, block, cells, names[at], seconds=seconds, kind=kind)
+    return table_of(path, block, [*[""] * at, *names[at:]], units, names[at], seconds=seconds, kind=kind)
 
 
 def _header(path: str | Path) -> str:

@@ -1,7 +1,6 @@
 """MATLAB files with curves over time, named by their variables or by labels stored beside a matrix."""
 
 import re
-from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -43,18 +42,14 @@ def _read(path: str | Path) -> MotionTable:
     # The unit of angles that the kept header of an OpenSim table states.
     stated = [match[1].lower() for word in file.words if (match := _DEGREES.search(word))]
     angle = {"yes": "deg", "no": "rad"}[stated[0]] if stated else ""
-    is_opensim = _has_opensim(columns)
+    is_opensim = any(map(_OPENSIM.fullmatch, columns))
     units = {other: unit_of_label(other, other, angle) if is_opensim else "" for other in columns}
     return MotionTable(str(path), time, columns, units)
 
 
-def _has_opensim(names: Iterable[str]) -> bool:
-    return any(map(_OPENSIM.fullmatch, names))
-
-
 def _convention(table: MotionTable, side: Side, body_mass: float) -> Convention:
     """Return the map of OpenSim's labels if the table has them, otherwise of the names of the package."""
-    if _has_opensim(table.columns):
+    if any(map(_OPENSIM.fullmatch, table.columns)):
         return opensim_convention(table, side, body_mass)
     return Convention(package_map())
 

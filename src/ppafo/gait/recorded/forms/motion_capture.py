@@ -14,10 +14,7 @@ import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.gait.recorded.delimited import (
-    Cells,
-    Clock,
     NumberBlock,
-    PerFrame,
     cells_of,
     lines_of,
     rows_of,
@@ -86,8 +83,8 @@ def _read_nexus(path: str | Path) -> MotionTable:
             f"{bare_label(label)}.{axis.lower()}" if label and axis.lower() in AXES else ""
             for label, axis in zip(block.labels, block.axes, strict=True)
         ]
-        cells = Cells(["Frame", *names[1:]], block.units)
-        motions.append(table_of(path, block.rows, cells, PerFrame("Frame", block.rate), noun="markers"))
+        names[0] = "Frame"
+        motions.append(table_of(path, block.rows, names, block.units, "Frame", frame_rate=block.rate, noun="markers"))
     if not motions:
         raise DataError(f"{path}: has no block 'Trajectories' or 'Model Outputs'; export the trajectories from Nexus")
     whole = motions[0]
@@ -137,7 +134,7 @@ def _nexus_forces(path: str | Path, block: _NexusBlock, time: Floats) -> dict[st
     if not any(names):
         return {}
     try:
-        values, _ = rows_of(block.rows, Cells(names, block.units))
+        values, _ = rows_of(block.rows, names)
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
     # Devices are sampled faster than markers, from the same first frame.
@@ -167,11 +164,12 @@ def _read_qualisys(path: str | Path) -> MotionTable:
     is_counted = cells_of(lines[first - 1], "\t")[:2] == ["Frame", "Time"]
     before = ["", "time"] if is_counted else []
     block = NumberBlock(lines, first, "\t", decimal="," if "," in lines[min(first, len(lines) - 1)] else ".")
-    cells = Cells([*before, *names], [*["", "s"][: len(before)], *["mm"] * len(names)])
+    units = [*["", "s"][: len(before)], *["mm"] * len(names)]
     if width < len(before) + len(names) - 2:
         raise DataError(f"{path}: line {first + 1} has {width} values for {len(labels)} markers")
-    clock: Clock = "time" if is_counted else PerFrame("", _rate_in(path, rate, line + 1))
-    return table_of(path, block, cells, clock, noun="markers")
+    frame_rate = None if is_counted else _rate_in(path, rate, line + 1)
+    clock = "time" if is_counted else ""
+    return table_of(path, block, [*before, *names], units, clock, frame_rate=frame_rate, noun="markers")
 
 
 def _read_motive(path: str | Path) -> MotionTable:
@@ -198,13 +196,8 @@ def _read_motive(path: str | Path) -> MotionTable:
     if not any(names):
         raise DataError(f"{path}: has no columns of markers; export the take with Markers, and their Position")
     names[1] = "time"
-    return table_of(
-        path,
-        NumberBlock(lines, at + 1, ","),
-        Cells(names, ["", "s", *[unit] * (len(names) - 2)]),
-        "time",
-        noun="markers",
-    )
+    units = ["", "s", *[unit] * (len(names) - 2)]
+    return table_of(path, NumberBlock(lines, at + 1, ","), names, units, "time", noun="markers")
 
 
 def _read_dflow(path: str | Path) -> MotionTable:
@@ -217,7 +210,7 @@ def _read_dflow(path: str | Path) -> MotionTable:
         names.append(f"{bare_label(column[1])}.{column[3].lower()}" if column is not None and is_marker else cell)
         units.append(_DFLOW[column[2]] if column is not None else "")
     names = ["" if name == "FrameNumber" else name for name in names]
-    return table_of(path, NumberBlock(lines, 1, "\t"), Cells(names, units), "TimeStamp", noun="markers")
+    return table_of(path, NumberBlock(lines, 1, "\t"), names, units, "TimeStamp", noun="markers")
 
 
 def _read_bts(path: str | Path) -> MotionTable:
@@ -240,8 +233,8 @@ def _read_bts(path: str | Path) -> MotionTable:
         names.pop()
     is_decimal_comma = "," in lines[min(at + 1, len(lines) - 1)]
     block = NumberBlock(lines, at + 1, "\t", decimal="," if is_decimal_comma else ".")
-    cells = Cells(names, ["", "s", *[unit if unit in _LENGTHS.values() else ""] * (len(names) - 2)])
-    return table_of(path, block, cells, "time", noun="markers")
+    units = ["", "s", *[unit if unit in _LENGTHS.values() else ""] * (len(names) - 2)]
+    return table_of(path, block, names, units, "time", noun="markers")
 
 
 def _form(name: str, summary: str, first: Sequence[str], read: Callable[[str | Path], MotionTable]) -> GaitForm:

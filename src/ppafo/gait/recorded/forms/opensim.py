@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.gait.recorded.form import Convention, GaitForm
-from ppafo.gait.recorded.forms.comma_separated import is_plain, plain_names, read_plain_csv
+from ppafo.gait.recorded.forms.comma_separated import plain_names, read_plain_csv
 from ppafo.gait.recorded.mapping import ForceMap, KneeMap, PressureMap, ShankMap, Side, opensim_map, setting_text
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.storage.files import read_bytes
@@ -30,7 +30,7 @@ def _recognises(path: str | Path) -> bool:
     """Return True for OpenSim's own files, and for a plain CSV file with OpenSim's name of an ankle coordinate."""
     if not _is_table(path):
         return True
-    return is_plain(path) and any(name.startswith("ankle_angle_") for name in plain_names(path))
+    return any(name.startswith("ankle_angle_") for name in plain_names(path))
 
 
 def _read(path: str | Path) -> MotionTable:
