@@ -303,7 +303,7 @@ def _settle(runs: FitRuns, point: Floats, outliers: Indices) -> _SearchEnd:
             left_out = np.union1d(outliers, highest[leverage[highest] > _LEVERAGE])
         if gain > 0.0:
             point, residuals = trial, trial_residuals
-    return _SearchEnd(point, residuals, linear, step, gain)
+    return _SearchEnd(point=point, residuals=residuals, linear=linear, step=step, gain=gain)
 
 
 def _edge(runs: FitRuns, point: Floats, step: Floats) -> dict[str, int]:

@@ -16,7 +16,9 @@ from ppafo.units import without_exponent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+    from matplotlib.ticker import Formatter
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +42,8 @@ class Panel:
     """Panel of a figure.
 
     Panels in the same column with ``shares_x`` share the horizontal axis and show the label of the vertical axis as
-    title. A panel without marks stays empty.
+    title. A panel without marks stays empty; one with ``shares_x`` beside nothing but empty panels is widened to the
+    whole row.
 
     - ``x``, ``y``: kinds of the numbers on the axes
     - ``marks``: graphical elements
@@ -83,6 +86,8 @@ _TITLE_SIZE, _SMALLEST_TITLE = 11.0, 0.72
 """Font size of a title [points], and smallest relative size of a shortened title."""
 _MARKUP = re.compile(r"\\[a-z]+|[${}_^]")
 """Pattern of the markup in a title, which takes no space on the page."""
+_SMALLEST_PLAIN, _LARGEST_PLAIN = 1.0e-4, 1.0e7
+"""Limits of a logarithmic axis whose numbers are written without an exponent."""
 _TITLE_LINE = 0.2
 """Line height of the title [inches]."""
 _OF_LEGEND: Mapping[str, Any] = {
@@ -170,11 +175,22 @@ def draw_panels(
         rect = (0.0, below / height, 1.0, 1.0 - (above + below) / height)
         figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, rect=rect))
         grid = list(figure.subplots(rows, across, squeeze=False, height_ratios=heights).flat)
-        drawn = [_DrawnPanel(axes, panel, _draw(axes, panel, size)) for axes, panel in zip(grid, panels, strict=False)]
+        widened = _widened(panels, across)
+        for number in widened:
+            grid[number].set_subplotspec(grid[number].get_subplotspec().get_gridspec()[number // across, :])
+        panel_sizes = [(size[0] * across if number in widened else size[0], size[1]) for number in range(len(panels))]
+        title_size = _TITLE_SIZE * min(map(_title_fit, panels, panel_sizes), default=1.0)
+        drawn = [
+            _DrawnPanel(axes, panel, _draw(axes, panel, panel_size, title_size))
+            for axes, panel, panel_size in zip(grid, panels, panel_sizes, strict=False)
+        ]
         for axes in grid[len(panels) :]:
             axes.set_axis_off()
-        for upper, lower, panel, other in zip(grid, grid[across:], panels, panels[across:], strict=False):
-            if panel.shares_x and other.shares_x and other.marks:
+        for number, (upper, lower, panel, other) in enumerate(
+            zip(grid, grid[across:], panels, panels[across:], strict=False)
+        ):
+            has_same_width = (number in widened) == (number + across in widened)
+            if panel.shares_x and other.shares_x and other.marks and has_same_width:
                 upper.sharex(lower)
                 upper.tick_params(labelbottom=False)
                 upper.set_xlabel("")
@@ -194,6 +210,29 @@ def draw_panels(
         return figure
 
 
+def _widened(panels: Sequence[Panel], across: int) -> set[int]:
+    """Return the indices of panels over a shared axis that are alone in their row and take its whole width."""
+    starts = range(0, len(panels), across)
+    return {
+        start
+        for start in starts
+        if panels[start].shares_x
+        and across > 1
+        and not any(panel.marks for panel in panels[start + 1 : start + across])
+    }
+
+
+def _title(panel: Panel) -> str:
+    """Return the title of a panel: its own, or the label of the vertical axis."""
+    return panel.title or (panel.y.axis if panel.shares_x else "")
+
+
+def _title_fit(panel: Panel, size: tuple[float, float]) -> float:
+    """Return the relative font size at which the title fits a panel of a size [inches], at most 1."""
+    letters = max(1, len(_MARKUP.sub("", _title(panel)))) if panel.marks else 1
+    return min(1.0, max(_SMALLEST_TITLE, _LETTERS * (size[0] - _AXIS_ROOM) / letters))
+
+
 def _legend_rows(panel: Panel, title: str, width: float) -> tuple[int, int]:
     """Return the legend entries per row for a width [inches], and the number of legend rows above the title."""
     names = [mark.label for mark in panel.marks if mark.label and mark.shape != "text"]
@@ -208,9 +247,12 @@ def _legend_rows(panel: Panel, title: str, width: float) -> tuple[int, int]:
     return 1, len(widths)
 
 
-def _draw(axes: "Axes", panel: Panel, size: tuple[float, float]) -> Any:
-    """Draw a panel of a size [inches], and return the Matplotlib object with a colour scale, if any."""
-    from matplotlib.ticker import FuncFormatter, NullFormatter
+def _draw(axes: "Axes", panel: Panel, size: tuple[float, float], title_size: float) -> Any:
+    """Draw a panel of a size [inches], and return the Matplotlib object with a colour scale, if any.
+
+    ``title_size`` is the font size of the title [points].
+    """
+    from matplotlib.ticker import NullFormatter
 
     if not panel.marks:
         axes.set_axis_off()
@@ -223,8 +265,7 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float]) -> Any:
         style = {"linestyle": DASHES.get(mark.colour, "-"), **mark.style} if is_dashed else mark.style
         artist = SHAPES[mark.shape](axes, replace(mark, style=style), panel.x.values(mark.x), panel.y.values(mark.y))
         mapped = artist if mark.shape in ("map", "points") else mapped
-    title = panel.title or (panel.y.axis if panel.shares_x else "")
-    pad = _ABOVE
+    title, pad = _title(panel), _ABOVE
     axes.set_xlabel(_wrapped(panel.x.axis, size[0]))
     axes.set_ylabel(_wrapped(panel.y.axis, size[1] * panel.tall) if panel.title or not panel.shares_x else "")
     # A text carries its words itself.
@@ -241,18 +282,30 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float]) -> Any:
             )
         elif panel.legend == "inside":
             axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", handlelength=2.2)
-    # A long title is smaller before it is cut off at the next panel.
-    fitting, letters = _LETTERS * (size[0] - _AXIS_ROOM), len(_MARKUP.sub("", title))
-    axes.set_title(title, pad=pad, fontsize=_TITLE_SIZE * min(1.0, max(_SMALLEST_TITLE, fitting / max(1, letters))))
+    axes.set_title(title, pad=pad, fontsize=title_size)
     # Last, so that it can undo what Matplotlib chose.
     if panel.then is not None:
         panel.then(axes)
     for axis in (axes.xaxis, axes.yaxis):
         if axis.get_scale() == "log":
-            # Plain numbers, not powers.
-            axis.set_major_formatter(FuncFormatter(lambda value, _: without_exponent(value, ".6g")))
+            axis.set_major_formatter(_logarithmic_ticks(axis))
             axis.set_minor_formatter(NullFormatter())
     return mapped
+
+
+def _logarithmic_ticks(axis: "Axis") -> "Formatter":
+    """Return the labels of a logarithmic axis: plain numbers, or all powers of ten where one would need an exponent."""
+    from matplotlib.ticker import FuncFormatter, LogFormatterMathtext
+
+    powers = LogFormatterMathtext()
+    powers.set_axis(axis)
+
+    def tick_label(value: float, _position: int | None) -> str:
+        low, high = axis.get_view_interval()
+        is_plain = low >= _SMALLEST_PLAIN and high < _LARGEST_PLAIN
+        return without_exponent(value, ".6g") if is_plain else powers(value)
+
+    return FuncFormatter(tick_label)
 
 
 def _wrapped(label: str, length: float) -> str:

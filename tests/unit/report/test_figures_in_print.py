@@ -99,3 +99,25 @@ def test_the_text_of_a_figure_can_be_read_at_the_width_of_a_column() -> None:
     smallest = min(float(label.get_fontsize()) for axes in figure.axes for label in axes.get_xticklabels())
     assert smallest * COLUMN / figure.get_figwidth() > 5.5
     assert overlaps(figure) == []
+
+
+def test_a_logarithmic_axis_has_plain_numbers_or_powers_and_never_both() -> None:
+    small = Mark("line", TIMES, 10.0 ** (-7.0 + 5.0 * TIMES))
+    figure = draw_panels([Panel(Kind(), Kind(), [small], then=lambda axes: axes.set_yscale("log"))])
+    figure.canvas.draw()
+    texts = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert texts
+    assert all("10^{" in text for text in texts)
+
+
+def test_a_panel_alone_in_its_row_takes_the_whole_row_and_all_titles_have_one_size() -> None:
+    line = Mark("line", TIMES, TIMES)
+    long, short, empty = Kind("A level with a title that is a long one"), Kind("Level"), ()
+    panels = [Panel(Kind("Time"), long, [line], shares_x=True) for _ in range(2)]
+    panels += [Panel(Kind("Time"), short, [line], shares_x=True), Panel(Kind(), Kind(), empty)]
+    figure = draw_panels(panels, across=2, size=(3.0, 2.0))
+    figure.canvas.draw()
+    left, right, below, _ = figure.axes
+    assert below.get_position().width > 1.9 * left.get_position().width
+    assert left.get_xlabel() == right.get_xlabel() == below.get_xlabel() == "Time"
+    assert len({axes._left_title.get_fontsize() for axes in (left, right, below)}) == 1  # type: ignore[attr-defined]

@@ -287,6 +287,8 @@ def front_of(cases: Sequence[ConfigurationResult]) -> list[str]:
 _MARKS = "osD^vP"
 _MAXIMUM_DOTS = 1500
 _BINS = 40
+_TICKS_OF_CHANGE = 4
+"""Largest number of intervals between ticks: labels such as -98.85 do not touch."""
 _SHOWN_PERCENTILES = (0.5, 99.5)
 """Percentiles between which changes are plotted; a few distant ones would squeeze all others into one bar."""
 
@@ -339,6 +341,8 @@ def _change(comparison: ComparisonResult, task: TaskComparison, metric: str) -> 
     title = f"Task: {task.task}" if len(comparison.tasks) > 1 and is_first else ""
 
     def limit_changes(axes: "Axes") -> None:
+        from matplotlib.ticker import MaxNLocator
+
         # Zero is shown where it is near: far from all changes it would squeeze them into a few pixels.
         low, high = min(ends, default=0.0), max(ends, default=0.0)
         span = high - low or 1.0
@@ -346,6 +350,8 @@ def _change(comparison: ComparisonResult, task: TaskComparison, metric: str) -> 
             axes.axvline(0.0, color=BLACK, linewidth=0.8)
             low, high = min(low, 0.0), max(high, 0.0)
         axes.set_xlim(low - 0.08 * span, high + 0.08 * span)
+        axes.xaxis.set_major_locator(MaxNLocator(_TICKS_OF_CHANGE))
+        axes.locator_params(axis="y", integer=True)
 
     axis, draws = Kind(words, "%"), Kind("Draws" if is_first else "")
     return Panel(axis, draws, marks, title, legend="" if is_first else "above", then=limit_changes if ends else None)

@@ -294,7 +294,7 @@ def steps_panels(model: LinearModel) -> list[Panel]:
             replace(TIME, words="Time after the step"),
             Kind("Change of torque per command", "N m"),
             [*over_time, linear],
-            legend="inside",
+            legend="above",
         ),
         Panel(
             Kind("Largest change of torque in a step", "N m"),

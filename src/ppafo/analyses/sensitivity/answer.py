@@ -146,8 +146,10 @@ def _bars(influences: Influences, metric: MetricSensitivity) -> Panel:
         for rank, row in enumerate(order):
             colour = _colour_of(rank)
             height, style = places[rank] + shift, {**base_style, "fmt": MARKERS.get(colour, "o")}
+            # One entry of the legend for each index: the markers of the first row.
+            label = _TITLES[name] if rank == 0 and len(shown) > 1 else ""
             marks.append(
-                Mark("reach", [indices.values[name][row]], [height], [indices.bands[name][row]], "", colour, style)
+                Mark("reach", [indices.values[name][row]], [height], [indices.bands[name][row]], label, colour, style)
             )
 
     def name_values(axes: "Axes") -> None:
@@ -155,7 +157,7 @@ def _bars(influences: Influences, metric: MetricSensitivity) -> Panel:
         axes.axvline(0.0, color="#9a9a9a", linewidth=0.8)
 
     fraction = Kind("Fraction of the variance")
-    return Panel(fraction, Kind(), marks, of_metric(metric.metric).words, legend="", then=name_values)
+    return Panel(fraction, Kind(), marks, of_metric(metric.metric).words, legend="figure", then=name_values)
 
 
 def _course(influences: Influences, metric: MetricSensitivity) -> Panel:

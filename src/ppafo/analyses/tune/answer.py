@@ -19,7 +19,7 @@ from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import TIME, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
-from ppafo.report.style import BLACK, BLUE, COLOURS, GREY, VERMILION
+from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILION
 from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.studies.intervals import fraction_text
 from ppafo.units import percentage, without_exponent
@@ -33,6 +33,13 @@ if TYPE_CHECKING:
 
 _COMMAND, _GAS = Kind("Valve command"), Kind("Gas supplied", "kg", "gas mass")
 _DECADE = 10.0
+_START_LINES: tuple[tuple[str, Any], ...] = (
+    (GREEN, "--"),
+    (PURPLE, ":"),
+    (ORANGE, "-."),
+    (GREY, (0, (6, 1, 1, 1, 1, 1))),
+)
+"""Colours and dashes of the starts of a search; the gains before and after have other colours."""
 _BEYOND = 0.05
 """Fraction of the range by which previous gains outside the bounds are plotted beyond the bounds, at most."""
 
@@ -73,10 +80,12 @@ def search_panels(
     for number, start in enumerate(starts):
         costs = np.array(start.generations)
         costs[costs >= INFEASIBLE] = np.nan  # no candidate keeps the constraints yet
-        colour = COLOURS[number % len(COLOURS)]
-        costs_of_starts.append(Mark("line", np.arange(costs.size), costs, colour=colour, style={"linewidth": 1.3}))
-    dashed = {"linestyle": "--", "linewidth": 1.0}
-    costs_of_starts.append(Mark("level", y=before.objective, label="before", colour=BLACK, style=dashed))
+        colour, dashes = _START_LINES[number % len(_START_LINES)]
+        label = f"start {number + 1}" if len(starts) <= len(_START_LINES) else ""
+        style = {"linewidth": 1.3, "linestyle": dashes}
+        costs_of_starts.append(Mark("line", np.arange(costs.size), costs, label=label, colour=colour, style=style))
+    thin = {"linewidth": 0.8}
+    costs_of_starts.append(Mark("level", y=before.objective, label="before", colour=BLACK, style=thin))
 
     def scale(axes: "Axes") -> None:
         # Below a decade a logarithmic axis has no tick that reads as a number.
@@ -96,7 +105,7 @@ def search_panels(
     ticks: dict[str, Any] = {"linestyle": "", "marker": "|", "markersize": 11}
     marks = (
         *(Mark("line", [0.0, 1.0], [row, row], colour=GREY, style={"linewidth": 1.0}) for row in rows),
-        Mark("line", ends, np.tile(rows, len(starts)), colour=GREY, style=ticks),
+        Mark("line", ends, np.tile(rows, len(starts)), label="end of a start", colour=BLACK, style=ticks),
         Mark("line", previous, rows, label="before", colour=VERMILION, style={**dots, "marker": "s"}),
         Mark("line", tuned, rows, label="after", colour=BLUE, style=dots),
     )
@@ -108,7 +117,7 @@ def search_panels(
 
     return [
         Panel(Kind("Generation"), Kind(), costs_of_starts, "Objective, best so far", then=scale),
-        Panel(Kind(), Kind(), marks, "Between bounds", then=name_gains),
+        Panel(Kind("Between bounds"), Kind(), marks, then=name_gains),
     ]
 
 

@@ -123,22 +123,28 @@ class _WalkPair:
 SCHEMA_VERSION = 1
 REVERSALS_PER_STRIDE, LARGEST_TORQUE = "reversals_per_stride", "largest_torque"
 _NUMBERS = (
-    ShownNumber("body_mass", "Body mass of the wearer", "mass", 1),
-    ShownNumber("gas", "Gas per stride", "gas mass", 3),
-    ShownNumber("total_gas", "Gas of the whole walk", "gas mass", 2),
-    ShownNumber("positive_push_off_work", "Positive work on the wearer in push-off", "energy", 2),
-    ShownNumber("push_off_share", "... of the healthy ankle's positive work", "fraction", 1),
-    ShownNumber("net_push_off_work", "Net work on the wearer in push-off", "energy", 2),
-    ShownNumber("torque_error", "Torque error where one is requested, RMS", "torque", 2),
-    ShownNumber("requested_torque", "... requested torque, RMS", "torque", 2),
-    ShownNumber("peak_torque", "Peak torque", "torque", 1),
-    ShownNumber(LARGEST_TORQUE, "... limit of the controller", "torque", 1),
-    ShownNumber(REVERSALS_PER_STRIDE, "Command reversals per stride", "", 1),
-    ShownNumber("lowest_toes", "Lowest toes over the ground in mid-swing", "body length", 1),
-    ShownNumber("toe_landing", "Strides that begin on the toes", "fraction", 0),
-    ShownNumber("dorsiflexor_moment", "Moment of the wearer's dorsiflexors, mean", "torque", 2),
-    ShownNumber("angle_difference", "Ankle against healthy, RMS over the stride", "angle", 1),
-    ShownNumber("counted_strides", "Strides with these means", "", 0),
+    ShownNumber(name="body_mass", title="Body mass of the wearer", quantity="mass", digits=1),
+    ShownNumber(name="gas", title="Gas per stride", quantity="gas mass", digits=3),
+    ShownNumber(name="total_gas", title="Gas of the whole walk", quantity="gas mass", digits=2),
+    ShownNumber(
+        name="positive_push_off_work", title="Positive work on the wearer in push-off", quantity="energy", digits=2
+    ),
+    ShownNumber(name="push_off_share", title="... of the healthy ankle's positive work", quantity="fraction", digits=1),
+    ShownNumber(name="net_push_off_work", title="Net work on the wearer in push-off", quantity="energy", digits=2),
+    ShownNumber(name="torque_error", title="Torque error where one is requested, RMS", quantity="torque", digits=2),
+    ShownNumber(name="requested_torque", title="... requested torque, RMS", quantity="torque", digits=2),
+    ShownNumber(name="peak_torque", title="Peak torque", quantity="torque", digits=1),
+    ShownNumber(name=LARGEST_TORQUE, title="... limit of the controller", quantity="torque", digits=1),
+    ShownNumber(name=REVERSALS_PER_STRIDE, title="Command reversals per stride", quantity="", digits=1),
+    ShownNumber(name="lowest_toes", title="Lowest toes over the ground in mid-swing", quantity="body length", digits=1),
+    ShownNumber(name="toe_landing", title="Strides that begin on the toes", quantity="fraction", digits=0),
+    ShownNumber(
+        name="dorsiflexor_moment", title="Moment of the wearer's dorsiflexors, mean", quantity="torque", digits=2
+    ),
+    ShownNumber(
+        name="angle_difference", title="Ankle against healthy, RMS over the stride", quantity="angle", digits=1
+    ),
+    ShownNumber(name="counted_strides", title="Strides with these means", quantity="", digits=0),
 )
 """Metrics in the table of a walk."""
 _EXPLAINED = (

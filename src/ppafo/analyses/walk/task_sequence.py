@@ -20,16 +20,16 @@ from ppafo.walking.task_sequence import TaskSequence
 from ppafo.walking.walk import WalkComparison
 
 _NUMBERS = (
-    ShownNumber("start", "from", "time", 1),
-    ShownNumber("end", "to", "time", 1),
-    ShownNumber("strides", "strides", "", 0),
-    ShownNumber("helped", "helped", "", 0),
-    ShownNumber("gas", "gas", "gas mass", 2),
-    ShownNumber("net_push_off_work", "work", "energy", 1),
-    ShownNumber("lowest_toes", "lowest toes", "body length", 1),
-    ShownNumber("without", "... without", "body length", 1),
-    ShownNumber("flat_push", "push, heel loaded", "torque", 1),
-    ShownNumber("safe_time", "less help at", "time", 2),
+    ShownNumber(name="start", title="from", quantity="time", digits=1),
+    ShownNumber(name="end", title="to", quantity="time", digits=1),
+    ShownNumber(name="strides", title="strides", quantity="", digits=0),
+    ShownNumber(name="helped", title="helped", quantity="", digits=0),
+    ShownNumber(name="gas", title="gas", quantity="gas mass", digits=2),
+    ShownNumber(name="net_push_off_work", title="work", quantity="energy", digits=1),
+    ShownNumber(name="lowest_toes", title="lowest toes", quantity="body length", digits=1),
+    ShownNumber(name="without", title="... without", quantity="body length", digits=1),
+    ShownNumber(name="flat_push", title="push, heel loaded", quantity="torque", digits=1),
+    ShownNumber(name="safe_time", title="less help at", quantity="time", digits=2),
 )
 """Numbers of a segment in the table, and lowest toes without the device."""
 _CAPTION = (

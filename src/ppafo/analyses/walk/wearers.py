@@ -41,7 +41,7 @@ def wearers_finding(population: Population) -> Finding[dict[str, Any]]:
     rows = []
     for name, (title, quantity, digits) in SHOWN.items():
         values = np.quantile(tables[name], QUANTILES).tolist() if tables[name].size else [None] * len(QUANTILES)
-        rows.append(number_texts(ShownNumber(name, title, quantity, digits), values))
+        rows.append(number_texts(ShownNumber(name=name, title=title, quantity=quantity, digits=digits), values))
     remarks = [*person_remarks(configuration)]
     if population.vented:
         remarks.append(f"safe state: the controllers of {population.vented} wearers vented both chambers permanently")

@@ -318,8 +318,12 @@ def next_observer(
     joined = nominal.nominal_joining_time if coil_1.position > 0.5 else max(state.joined - period, 0.0)
     # While the chambers are joined, gas passes that no nominal flow describes.
     is_blind = is_start | ((joined > 0.0) & (coil_1.position < 0.5))
-    reading_1 = ChamberReading(last_1, pressure_1, last_volume_1, volume_1, mean_1)
-    reading_2 = ChamberReading(last_2, pressure_2, last_volume_2, volume_2, mean_2)
+    reading_1 = ChamberReading(
+        last_pressure=last_1, pressure=pressure_1, last_volume=last_volume_1, volume=volume_1, mean_volume=mean_1
+    )
+    reading_2 = ChamberReading(
+        last_pressure=last_2, pressure=pressure_2, last_volume=last_volume_2, volume=volume_2, mean_volume=mean_2
+    )
     chamber_1, taken_1 = next_chamber(nominal, state.chamber_1, supplying_1, reading_1, is_blind, period)
     chamber_2, taken_2 = next_chamber(nominal, state.chamber_2, supplying_2, reading_2, is_blind, period)
     return Observer(

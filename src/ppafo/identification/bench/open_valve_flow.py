@@ -162,7 +162,13 @@ def _open_readings(sources: tuple[RecordingSource, ...], gas: GasAt, tolerances:
     zero = tolerances.zero_of_flow
     _, used, meter_remarks = meter_readings(sources, PROCEDURE, upstream - downstream, zero, is_open)
     labels = np.array(recordings_of(sources))[used].tolist()
-    return _OpenReadings(upstream[used], downstream[used], np.abs(flow[used]), labels, (*remarks, *meter_remarks))
+    return _OpenReadings(
+        upstream=upstream[used],
+        downstream=downstream[used],
+        flow=np.abs(flow[used]),
+        labels=labels,
+        remarks=(*remarks, *meter_remarks),
+    )
 
 
 def _reported(
