@@ -16,6 +16,12 @@ LABEL = r"^[^\x00-\x20\x7f-\xa0](?:[^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\xa0])?
 """Pattern of a display name: a line of text without leading or trailing space."""
 QUANTITY = r"^\s*[+-]?(\d|\.\d)"
 """Pattern of the start of a number with its unit."""
+_TEXT_RULES = {
+    NAME: "must consist of lower-case letters, digits, '-' and '_'",
+    LABEL: "must be a line of text without spaces around it",
+    QUANTITY: "does not start with a number; write for example '1.3 m/s'",
+}
+"""Ends of the messages on a text without a pattern, by pattern."""
 _LONGEST_VALUE = 60
 _MAXIMUM_PROBLEMS = 5
 _MAXIMUM_TABLES = 3
@@ -137,12 +143,7 @@ def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
             table = one_line(".".join(map(str, detail["loc"][:-2])))
             return f"{table}: the name {quote(detail['input'])} must consist of letters, digits, '-' and '_'"
         case "string_pattern_mismatch":
-            pattern = detail["ctx"]["pattern"]
-            if pattern == QUANTITY:
-                return f"{assignment} does not start with a number; write for example '1.3 m/s'"
-            if pattern == LABEL:
-                return f"{assignment} must be a line of text without spaces around it"
-            return f"{assignment} must consist of lower-case letters, digits, '-' and '_'"
+            return f"{assignment} {_TEXT_RULES.get(detail['ctx']['pattern'], _TEXT_RULES[NAME])}"
         case "string_type":
             return f"{assignment} must be a text in quotation marks"
         case "model_type" | "model_attributes_type" | "dict_type":
