@@ -11,7 +11,7 @@ _FORMATS = ("png", "svg")
 def export_figure(folder: Folder, *, out: File | None = None) -> CommandOutput:
     """Redraw the figures of a result folder.
 
-    Where the folder has its figures already, it is said which.
+    Figures of runs, walks, studies and rig recordings are drawn again; of other results it is said which there are.
 
     folder: a result folder written by ppafo
     out: a .png, .svg or .pdf file; default figure.png and figure.svg in DIR
@@ -41,7 +41,12 @@ def export_figure(folder: Folder, *, out: File | None = None) -> CommandOutput:
     if not drawn:
         message, document = what_is_there(folder, names)
         if out is not None:
-            raise DataError(f"--out {out}: there is no figure to draw: {message}")
+            vectors = [str(folder / name) for name in names if name.endswith(".svg")]
+            raise DataError(
+                f"--out {out}: only figures of runs, walks, studies and rig recordings can be drawn again, not those "
+                f"of 'ppafo {document['command']}'"
+                + (f"; convert a vector figure to PDF with other software: {', '.join(vectors)}" if vectors else "")
+            )
         return CommandOutput(message, document)
     if out is not None:
         if len(drawn) > 1:

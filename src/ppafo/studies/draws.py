@@ -10,7 +10,7 @@ import numpy as np
 from ppafo.errors import StudyError
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
-from ppafo.studies.loading import load_study
+from ppafo.studies.loading import load_configuration, load_study
 from ppafo.studies.sampling import NOISE, correlate, uniform_numbers, with_noise
 from ppafo.studies.study import Configuration, RandomValue, SamplingPlan, Study, with_followers
 from ppafo.wording import nearest_name
@@ -158,10 +158,14 @@ def drawn_in(
 ) -> tuple[Study, Configuration, Uncertainty]:
     """Return a study, one of its configurations, and the distributions in this configuration, with sensor noise.
 
-    ``independent`` omits the correlations.
+    ``independent`` omits the correlations. Overrides change the chosen configuration only.
     """
-    chosen = study_of(study, overrides)
+    changes = tuple(overrides)
+    chosen = study_of(study, changes if isinstance(study, Study) else ())
     base = choose_configuration(chosen, name)
+    if changes and not isinstance(study, Study):
+        chosen = load_configuration(study, base, changes)
+        base = chosen.configurations[0]
     known = uncertainty_in(chosen, base)
     used = replace(known, scores=None) if independent else known
     return chosen, base, used.with_noise_of([base.scenario])

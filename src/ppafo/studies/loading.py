@@ -14,9 +14,11 @@ from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, ParameterError, ScenarioError, StudyError, UnitError, refused_as
 from ppafo.loading import load_scenario, placed, reloaded
+from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
 from ppafo.plugins import Plugins, name_plugins
+from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import chosen_path
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import ShiftedDistribution
@@ -77,7 +79,42 @@ def load_study(
     ['proportional', 'solenoid']
     """
     name_plugins(plugins)
+    return _load(*read_source(STUDY_FILES, study), tuple(overrides), draws, seed)
+
+
+def load_configuration(
+    study: str | Path | Mapping[str, Any], configuration: Configuration, changes: Overrides
+) -> Study:
+    """Return a study with a single configuration, which alone has to accept the changes.
+
+    Paths, correlations and metrics that the configuration does not have are left out. Raises StudyError for changes
+    that the configuration refuses.
+    """
     document, source = read_source(STUDY_FILES, study)
+    name, scenario = configuration.name, configuration.scenario
+    document["configurations"] = [table for table in document["configurations"] if table["name"] == name]
+    varied = [table for table in document.get("vary", ()) if name in table.pop("only", [name])]
+    paths = {table["path"] for table in varied}
+    document["vary"] = [table for table in varied if table.get("same_as", table["path"]) in paths]
+    document["correlations"] = [
+        table for table in document.get("correlations", ()) if paths.issuperset(table["between"])
+    ]
+    # Traces are of no use where one configuration is drawn from.
+    metrics = document.get("outputs", {}).get("metrics", [])
+    if metrics != "all":
+        metrics = [metric for metric in metrics if not lacking(scenario, METRICS[metric])]
+    document["outputs"] = {"metrics": metrics}
+    return _load(document, source, tuple(changes))
+
+
+def _load(
+    document: dict[str, Any],
+    source: "StudySource",
+    changes: tuple[str, ...],
+    draws: int | None = None,
+    seed: int | None = None,
+) -> Study:
+    """Return the study of a document, with changes, draws and seed from the command line written into the document."""
     tables = document.get("vary")
     for table in tables if isinstance(tables, list | tuple) else ():
         if isinstance(table, dict) and "same_as" in table:
@@ -85,8 +122,6 @@ def load_study(
     parsed = validate(declared.StudyFile, document, source.file, StudyError)
     given = {key: value for key, value in (("runs", draws), ("seed", seed)) if value is not None}
     with refused_as(StudyError, source.file, StudyError):
-        # What the command line changes is written into the document, as if it stood in the file.
-        changes = tuple(overrides)
         if changes:
             for table, configuration in zip(document["configurations"], parsed.configurations, strict=True):
                 changed = _configuration(configuration, source.folder, changes).scenario

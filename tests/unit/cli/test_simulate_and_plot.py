@@ -215,7 +215,9 @@ def test_overrides_reach_the_saved_device_and_a_pressure_is_shown_above_its_atmo
 def test_a_folder_that_has_its_figures_or_none_says_so_and_what_to_open(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write_marked_folder(tmp_path / "a", {"change.png": b"", "report.html": b"", "compare.txt": b""}, "compare")
+    write_marked_folder(
+        tmp_path / "a", {"change.png": b"", "change.svg": b"", "report.html": b"", "compare.txt": b""}, "compare"
+    )
     write_marked_folder(tmp_path / "b", {"sets.txt": b"", "sets.json": b"{}"}, "sets")
     before = names(tmp_path / "a")
     assert main(["export", "figure", str(tmp_path / "a")]) == 0
@@ -225,8 +227,10 @@ def test_a_folder_that_has_its_figures_or_none_says_so_and_what_to_open(
         f"result of 'ppafo compare' has its figures (change.png); open {tmp_path / 'a' / 'report.html'}"
     )
     assert json.loads(second)["open"] == str(tmp_path / "b" / "sets.txt")
-    assert main(["export", "figure", str(tmp_path / "a"), "--out", str(tmp_path / "new.png")]) == 2
-    assert "there is no figure to draw" in capsys.readouterr().err
+    assert main(["export", "figure", str(tmp_path / "a"), "--out", str(tmp_path / "new.pdf")]) == 2
+    message = capsys.readouterr().err
+    assert "only figures of runs, walks, studies and rig recordings can be drawn again, not those of" in message
+    assert message.strip().endswith(f"vector figure to PDF with other software: {tmp_path / 'a' / 'change.svg'}")
     assert names(tmp_path / "a") == before
     assert names(tmp_path) == ["a", "b"]
 

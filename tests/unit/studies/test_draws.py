@@ -76,6 +76,18 @@ def test_a_choice_of_configurations_is_not_made_in_silence() -> None:
         choose_configuration(whole, "solenoids")
 
 
+def test_a_change_of_the_chosen_configuration_is_not_asked_of_the_others() -> None:
+    document = study()
+    document["vary"][0]["only"] = ["solenoid"]
+    changes = ["controller.anti_windup=3 1/s"]
+    _, base, uncertainty = drawn_in(document, changes, "proportional")
+    assert base.scenario.controller.settings["anti_windup"] == 3.0
+    assert uncertainty.paths == ("valve.area", "actuator.leak.area")
+    assert uncertainty.scores is not None
+    with pytest.raises(StudyError, match=r"'solenoid'.*anti_windup"):
+        drawn_in(document, changes, "solenoid")
+
+
 def test_a_grid_has_no_probability() -> None:
     document = study(correlations=[], sample=None)
     document["vary"] = [{"path": "valve.area", "kind": "list", "values": ["10 mm^2", "11 mm^2"]}]
