@@ -43,8 +43,8 @@ def export_figure(folder: Folder, *, out: File | None = None) -> CommandOutput:
         if out is not None:
             vectors = [str(folder / name) for name in names if name.endswith(".svg")]
             raise DataError(
-                f"--out {out}: only figures of runs, walks, studies and rig recordings can be drawn again, not those "
-                f"of 'ppafo {document['command']}'"
+                f"--out {out}: only figures of runs, walks, studies and rig recordings can be drawn again, but no "
+                f"figure of 'ppafo {document['command']}'"
                 + (f"; convert a vector figure to PDF with other software: {', '.join(vectors)}" if vectors else "")
             )
         return CommandOutput(message, document)

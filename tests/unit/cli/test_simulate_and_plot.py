@@ -229,7 +229,7 @@ def test_a_folder_that_has_its_figures_or_none_says_so_and_what_to_open(
     assert json.loads(second)["open"] == str(tmp_path / "b" / "sets.txt")
     assert main(["export", "figure", str(tmp_path / "a"), "--out", str(tmp_path / "new.pdf")]) == 2
     message = capsys.readouterr().err
-    assert "only figures of runs, walks, studies and rig recordings can be drawn again, not those of" in message
+    assert "only figures of runs, walks, studies and rig recordings can be drawn again, but no figure of" in message
     assert message.strip().endswith(f"vector figure to PDF with other software: {tmp_path / 'a' / 'change.svg'}")
     assert names(tmp_path / "a") == before
     assert names(tmp_path) == ["a", "b"]
