@@ -91,6 +91,7 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
     if not causes:
         return verdict
     from ppafo.simulation.tracking.remedies import change_text
+    from ppafo.simulation.tracking.verdict import time_text
 
     # What was changed in Python would be lost with overrides.
     is_of_file = replace(reloaded(scenario, ()), run=scenario.run) == scenario
@@ -115,7 +116,7 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
     if best is not None:
         with shown_in(verdict.units):
             error = change_text(verdict.controlled, best[1])
-        left_text = f"an RMS error of {error} is left{verdict.time_text}"
+        left_text = f"an RMS error of {error} is left{time_text(verdict.since)}"
         return replace(verdict, tried=f"with {best[0].text} {left_text}, as a further run shows")
     names = ", ".join(dict.fromkeys(path for remedy in verdict.remedies for path in remedy.numbers))
     if not names:

@@ -167,12 +167,6 @@ def table_value(profile: TabulatedProfile, time: float) -> tuple[float, float, f
     return profile.level + segment.first + rate * (place - segment.start), rate, 0.0
 
 
-def used_knots(profile: TabulatedProfile) -> list[tuple[float, float]]:
-    """Times [s] and values, without the offset ``level``, of the used knots."""
-    knots = [(0.0, profile.value_01), *((knot.time, knot.value) for knot in profile.knots)]
-    return [knot for knot in knots if knot[0] < profile.period]
-
-
 def table_bounds(profile: TabulatedProfile) -> tuple[float, float]:
     """Lowest and highest value [N m or rad] of the used knots, with the offset ``level``."""
     lowest, highest = profile.value_01, profile.value_01
@@ -273,28 +267,26 @@ def until_knot(profile: TabulatedProfile, time: float) -> float:
 def smooth_bounds(profile: TabulatedProfile) -> tuple[float, float]:
     """Lowest and highest value [N m or rad] of the cubic spline, which may overshoot its knots."""
     lowest, highest = table_bounds(profile)
-    knots = used_knots(profile)
+    knots = [(0.0, profile.value_01), *((knot.time, knot.value) for knot in profile.knots)]
+    knots = [knot for knot in knots if knot[0] < profile.period]
     for (start, _), (end, last) in zip(knots, [*knots[1:], (profile.period, profile.value_01)], strict=True):
         length = end - start
         value, rate, bend = smooth_value(profile, start)
         # The cubic is fixed by its start, with rate and bend, and by its end.
         twist = (profile.level + last - value - length * (rate + 0.5 * length * bend)) / length**3
-        # Extremes lie at knots or where the rate of a cubic is 0.
-        for place in turning_places(rate, bend, 3.0 * twist):
+        # Extremes lie at knots or where the rate of a cubic is 0: the real roots of rate + bend x + 3 twist x^2.
+        square = 3.0 * twist
+        inside = bend * bend - 4.0 * square * rate
+        if inside < 0.0:
+            continue
+        # Without the difference of two numbers that may be nearly equal.
+        half = -0.5 * (bend + math.copysign(math.sqrt(inside), bend))
+        for numerator, denominator in ((half, square), (rate, half)):
+            place = numerator / denominator if denominator != 0.0 else 0.0
             if 0.0 < place < length:
                 turned = value + place * (rate + place * (0.5 * bend + place * twist))
                 lowest, highest = min(lowest, turned), max(highest, turned)
     return lowest, highest
-
-
-def turning_places(rate: float, bend: float, square: float) -> list[float]:
-    """Real roots x of ``rate + bend x + square x^2``."""
-    inside = bend * bend - 4.0 * square * rate
-    if inside < 0.0 or (bend == 0.0 and square == 0.0):
-        return []
-    # Without the difference of two numbers that may be nearly equal.
-    half = -0.5 * (bend + math.copysign(math.sqrt(inside), bend))
-    return [part / whole for part, whole in ((half, square), (rate, half)) if whole != 0.0]
 
 
 def _quantity(name: str) -> Quantity:

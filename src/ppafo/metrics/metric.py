@@ -158,7 +158,7 @@ def for_each_reference(kinds: tuple[MetricKind, ...], rename: Callable[[str, str
             name=rename(kind.name, name),
             unit=controlled.difference if kind.unit == "N m" else kind.unit,
             summary=kind.summary.replace("torque", controlled.words).replace("the largest reference", _WAY),
-            channels=(controlled.channel, controlled.reference),
+            channels=(controlled.name, controlled.reference),
             of_reference=name,
         )
         for name, controlled in CONTROLLED.items()
@@ -180,7 +180,7 @@ def reference_of(recording: Recording) -> Floats:
 
 def followed(recording: Recording) -> tuple[Floats, Floats]:
     """Return the reference in a recording, which must have one, and the controlled quantity."""
-    channel = next(kind.channel for kind in CONTROLLED.values() if kind.reference in recording)
+    channel = next(kind.name for kind in CONTROLLED.values() if kind.reference in recording)
     return reference_of(recording), recording[channel]
 
 

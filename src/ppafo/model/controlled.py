@@ -116,7 +116,8 @@ def _in_order(one: Any, other: Any) -> tuple[Any, Any]:
 class ControlledQuantity:
     """Quantity that a reference can prescribe.
 
-    ``words`` name the quantity in a sentence, ``level`` declares a value, ``difference`` is the unit of a difference of
+    ``name`` is also its channel in a recording, which has a pressure difference only if that is controlled. ``words``
+    name the quantity in a sentence, ``level`` declares a value, ``difference`` is the unit of a difference of
     two values. ``value(angle, pressure_1, pressure_2, torque)`` computes the quantity from sensor readings. ``size`` is
     the value that corresponds to a torque of 1 N m: it scales the ranges of gains. A positive command raises the
     quantity, or lowers it if ``sign`` is -1; the reverse if the supplies are below the atmosphere. ``reach`` returns
@@ -133,11 +134,6 @@ class ControlledQuantity:
     sign: float = 1.0
     reach: Callable[[Ends], tuple[Any, Any]] | None = None
     limits: str = "the range between atmosphere and supply"
-
-    @property
-    def channel(self) -> str:
-        """Channel of the quantity in a recording; a pressure difference is recorded only if it is controlled."""
-        return self.name
 
     @property
     def reference(self) -> str:

@@ -457,15 +457,6 @@ def tilt_of_shank(timing: GaitTiming, phase: float, pace: PhaseMotion) -> Kinema
     )
 
 
-def marks_at(timing: GaitTiming, leg: LegParameters, phase: float, pace: PhaseMotion) -> Marks:
-    """Special features of the stride at a phase; none in a part without scuff and tilt."""
-    since = phase - timing.toe_off - SCUFF_AT * (1.0 - timing.toe_off)
-    # The scuff lasts for a time, while the phase counts turns: the cadence is between them.
-    weight = SCUFF_FORCE * leg.body_mass * leg.gravity
-    scuffs = since >= 0.0 and since < pace.scuff * pace.frequency
-    return Marks(scuff_force=weight if scuffs else 0.0, forefoot=1.0 if pace.tilt > 0.0 else 0.0)
-
-
 def gait_in_task_sequence(
     gait: GaitSeries, sequence: TimedSequence, timing: GaitTiming, leg: LegParameters, time: float
 ) -> tuple[GaitNow, Marks]:
@@ -522,4 +513,8 @@ def gait_in_task_sequence(
         sine_healthy_foot=sine_foot,
         healthy_torque=torque + load.inertia * ankle_acceleration + leg.ankle_damping * ankle_rate,
     )
-    return now, marks_at(timing, leg, phase, pace)
+    since = phase - timing.toe_off - SCUFF_AT * (1.0 - timing.toe_off)
+    # The scuff lasts for a time, while the phase counts turns: the cadence is between them.
+    weight = SCUFF_FORCE * leg.body_mass * leg.gravity
+    scuffs = since >= 0.0 and since < pace.scuff * pace.frequency
+    return now, Marks(scuff_force=weight if scuffs else 0.0, forefoot=1.0 if pace.tilt > 0.0 else 0.0)

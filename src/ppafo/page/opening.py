@@ -84,7 +84,7 @@ def computed_opening(
     channels = [channel["name"] for channel in module.description["channels"]]
     # The first panel shows what is controlled, else the motion of the vane.
     followed = next((kind for kind in CONTROLLED.values() if kind.reference in channels), None)
-    lead = "angle" if followed is None else followed.channel if followed.channel in TRACED else "pressure_1"
+    lead = "angle" if followed is None else followed.name if followed.name in TRACED else "pressure_1"
 
     def runs(columns: Mapping[str, Floats], bands: Sequence[str]) -> Any:
         count = max((len(column) for column in columns.values()), default=1)
@@ -93,7 +93,7 @@ def computed_opening(
         return run_ensemble(scenario, varied_columns, claims, bands)
 
     # A difference of pressures is no channel: its reference would be no level beside the one that is shown.
-    references = () if followed is None or lead != followed.channel else (followed.reference,)
+    references = () if followed is None or lead != followed.name else (followed.reference,)
     channels_of_panel = [lead, *references]
     base = runs({}, channels_of_panel)
     usual = [float(base.metrics[name][0]) for name in claims]

@@ -42,7 +42,7 @@ from ppafo.simulation.document import (
     kind_at,
     value_at,
 )
-from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
+from ppafo.simulation.following import numbers_of_lines, read_followers
 from ppafo.simulation.hardware import device_error, read_device, read_hardware
 from ppafo.simulation.law_signals import LEG_PATHS, MOVED, PERIOD_PATH, seen_in_scenario
 from ppafo.simulation.motion_kind import MOTIONS, RunTimes
@@ -119,24 +119,19 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         problem = reference_problem(scenario)
         if problem:
             raise ScenarioError(f"{request.file}: {problem}")
+        law = CONTROLLERS[control.kind]
         try:
-            _check_device(scenario)
+            if supply_line is not None:
+                device.check_pressurised(f"a [{SUPPLY_LINE}] with its regulators")
+            if law.needs_reference and law.controls == (TORQUE,):
+                # These open the valve by their own idea of the device, where a command above 0 raises the torque.
+                able = ", ".join(name for name, other in CONTROLLERS.items() if len(other.controls) > 1)
+                device.check_pressurised(f"the controller '{control.kind}'", f"; take one of {able}")
+            if law.plan is not None:
+                device.check_torque_constant("a fixed-point controller")
         except ParameterError as error:
             raise device_error(reading, error) from error
         return scenario
-
-
-def _check_device(scenario: Scenario) -> None:
-    """Raise ParameterError for an actuator that the supply lines or the controller of a scenario cannot work with."""
-    device, law = scenario.device, CONTROLLERS[scenario.controller.kind]
-    if scenario.supply_line is not None:
-        device.check_pressurised(f"a [{SUPPLY_LINE}] with its regulators")
-    if law.needs_reference and law.controls == (TORQUE,):
-        # These open the valve by their own idea of the device, where a command above 0 raises the torque.
-        able = ", ".join(name for name, other in CONTROLLERS.items() if len(other.controls) > 1)
-        device.check_pressurised(f"the controller '{scenario.controller.kind}'", f"; take one of {able}")
-    if law.plan is not None:
-        device.check_torque_constant("a fixed-point controller")
 
 
 def origin_of(request: ScenarioRequest, document: Mapping[str, Any], valve: str, named: Iterable[str] = ()) -> Origin:
@@ -197,8 +192,8 @@ def _control(
     )
     lines = None if supply_line is None else supply_line.row(device.supply)
     terms = nominal_terms(device, lines) | loop_terms(device, CONTROLLERS[kind], signals, controlled)
-    sensor_numbers = {quantity.name: getattr(sensors, quantity.name) for quantity in SENSORS}
-    sources = numbers_of_sensors(sensor_numbers) | numbers_of_lines(lines) | {PERIOD_PATH: period}
+    sources = {f"sensors.{quantity.name}": getattr(sensors, quantity.name) for quantity in SENSORS}
+    sources |= numbers_of_lines(lines) | {PERIOD_PATH: period}
     sources |= {f"reference.{name}": number for name, number in reference.settings.items()}
     if is_locked:
         sources[LOCKED_ANGLE] = motion.locked_angle

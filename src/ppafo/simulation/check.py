@@ -242,7 +242,13 @@ def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstima
             errors[signal.unit] = MARGIN * float(np.max(differences))
         for name in result.metrics:
             metric_errors[name] = MARGIN * abs(_difference(_value(fine, name), _value(result, name)))
-    shares = _relative_errors(result, metric_errors)
+    # Relative to the metric's value or, if larger, to the range of its quantity.
+    scales = {
+        name: max(abs(metric.value), _metric_range(result, name, metric.unit))
+        for name, metric in result.metrics.items()
+        if math.isfinite(metric.value)
+    }
+    shares = {name: metric_errors[name] / scale for name, scale in scales.items() if 0.0 < scale < math.inf}
     worst = max(shares, key=lambda name: shares[name], default="")
     over_promise = max(
         errors[signal.unit] / (signal.promised_error * _signal_range(result, signal.unit)) for signal in signals
@@ -272,29 +278,17 @@ def _recorded_signals(result: RecordedResult) -> dict[str, _ComparedSignal]:
 
 
 def _signal_range(result: RecordedResult, unit: str) -> float:
-    """Range of the angle [rad] or of the pressures [Pa], or the gas temperature [K]."""
+    """Range of the angle [rad] or of the pressures [Pa], or the gas temperature [K].
+
+    Pressures are those of chambers, supplies and atmosphere; the atmospheric pressure if their range is 0.
+    """
     actuator = result.scenario.device.actuator
-    if unit == "Pa":
-        return _pressure_range(result)
-    return actuator.angle_max - actuator.angle_min if unit == "rad" else result.scenario.device.gas.temperature
-
-
-def _pressure_range(result: RecordedResult) -> float:
-    """Range of the chamber, supply and atmospheric pressures [Pa]; the atmospheric pressure if the range is 0."""
+    if unit != "Pa":
+        return actuator.angle_max - actuator.angle_min if unit == "rad" else result.scenario.device.gas.temperature
     supply = result.scenario.device.supply
     constant = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
     chambers = [result.recording[name] for name in ("pressure_1", "pressure_2") if name in result.recording]
     return float(np.ptp(np.concatenate([*chambers, constant]))) or supply.atmospheric_pressure
-
-
-def _relative_errors(result: RecordedResult, errors: Mapping[str, float]) -> dict[str, float]:
-    """Relative errors of metrics [-]: divided by the metric's value or, if larger, the range of its quantity."""
-    scales = {
-        name: max(abs(metric.value), _metric_range(result, name, metric.unit))
-        for name, metric in result.metrics.items()
-        if math.isfinite(metric.value)
-    }
-    return {name: errors[name] / scale for name, scale in scales.items() if 0.0 < scale < math.inf}
 
 
 def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
@@ -314,11 +308,19 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
     starts = [start_moved(run, move, opposite) for opposite in (1.0, -1.0) for move in (MOVE, -MOVE)]
     runs = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]
     if not run.program.ideal_sensors:
-        runs += [(MOVED_MEASUREMENT, noisy) for noisy in _measurement_moved(run, _pressure_range(result))]
+        runs += [(MOVED_MEASUREMENT, noisy) for noisy in _measurement_moved(run, _signal_range(result, "Pa"))]
     results = rerun([planned for _, planned in runs])
     repeats = [(kind, repeat) for (kind, _), repeat in zip(runs, results, strict=True)]
     signals = _recorded_signals(result)
-    courses = tuple(_signal_check(name, signal, repeats, result) for name, signal in signals.items())
+    courses = []
+    for name, signal in signals.items():
+        extent = _signal_range(result, signal.unit)
+        changes = _largest_changes(
+            (kind, float(np.max(_largest_differences(repeat.recording, recording, signal.channels))))
+            for kind, repeat in repeats
+        )
+        promised = signal.promised_error * extent / MARGIN
+        courses.append(NumberCheck(name, signal.unit, extent, ALLOWED_PARTING * extent, changes, promised))
     separations = [repeat.status.time for repeat in results if repeat.status.time is not None]
     for course in courses:
         for repeat in results:
@@ -328,7 +330,7 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
     return Check(
         scenario=scenario.name,
         metrics=_metric_checks(result, repeats),
-        courses=courses,
+        courses=tuple(courses),
         error=estimated_error(result, results[0]),
         parts_at=min(separations, default=None),
         failed=tuple(dict.fromkeys(kind for kind, repeat in repeats if not repeat.status.is_completed)),
@@ -441,16 +443,3 @@ def _largest_differences(recording: Recording, other: Recording, channels: Itera
     # A repeat that diverged is shorter.
     count = min(len(recording), len(other))
     return np.asarray(np.max([np.abs(recording[name][:count] - other[name][:count]) for name in channels], axis=0))
-
-
-def _signal_check(
-    name: str, signal: _ComparedSignal, repeats: list[tuple[str, RecordedResult]], result: RecordedResult
-) -> NumberCheck:
-    """Largest changes of a signal over time."""
-    extent = _signal_range(result, signal.unit)
-    changes = _largest_changes(
-        (kind, float(np.max(_largest_differences(repeat.recording, result.recording, signal.channels))))
-        for kind, repeat in repeats
-    )
-    promised = signal.promised_error * extent / MARGIN
-    return NumberCheck(name, signal.unit, extent, ALLOWED_PARTING * extent, changes, promised)

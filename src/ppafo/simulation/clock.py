@@ -121,15 +121,11 @@ def dividing_step(period: Numeric, step: Numeric) -> Numeric:
 
 def output_unless_given(duration: Numeric, period: Numeric, step: Numeric) -> Numeric:
     """Default output interval [s]: every step, or nearly every step."""
-    found: Numeric = duration / larger(1.0, nearest_whole(duration / dividing_step(period, step)))
-    return found
-
-
-def nearest_whole(number: Numeric) -> Numeric:
-    """Nearest integer; ties go to the even one."""
-    up = truncated(number + 0.5)
-    is_odd_tie = (up - number == 0.5) & (0.5 * up != truncated(0.5 * up))
-    found: Numeric = choose(is_odd_tie, up - 1.0, up)
+    steps = duration / dividing_step(period, step)
+    # The nearest integer; ties go to the even one.
+    up = truncated(steps + 0.5)
+    is_odd_tie = (up - steps == 0.5) & (0.5 * up != truncated(0.5 * up))
+    found: Numeric = duration / larger(1.0, choose(is_odd_tie, up - 1.0, up))
     return found
 
 

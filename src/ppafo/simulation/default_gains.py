@@ -17,7 +17,7 @@ from ppafo.parameters.graph import LinkFunction
 from ppafo.simulation.mean_chambers import Surroundings
 from ppafo.simulation.motion_kind import LawSignals
 from ppafo.simulation.nominal import VALVE, in_its_form
-from ppafo.simulation.torque_loop import FlowNumbers, JointGainParts, LoopFunctions, loop_functions
+from ppafo.simulation.torque_loop import FlowNumbers, JointGainParts, loop_functions
 
 RATE, DEAD_TIME = "torque rate at full opening", "dead time of the torque loop"
 """Names of the loop parameters from which gains are computed."""
@@ -53,6 +53,10 @@ _OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
     angle_loop.REST_DISTANCE: angle_loop.rest_distance,
 }
 """Rule for each number that depends on torque loop and joint."""
+GAIN_TERMS = frozenset(
+    (*_OF_LOOP, *_OF_REACH, *_OF_JOINT, torque_loop.OPENING, torque_loop.INTEGRAL_GAIN, torque_loop.LEARNING_GAIN)
+) - {torque_loop.REACH, RATE, DEAD_TIME}
+"""Names of the numbers that are gains of a controller, and not numbers of the device."""
 
 
 class _GainParts(NamedTuple):
@@ -131,45 +135,36 @@ def loop_terms(
     ``controlled`` is the controlled quantity, ``seen`` the signals of the controller.
     """
     controls_torque = TORQUE in law.controls
-
-    def of_loop(loops: LoopFunctions, rule: PlainFunction) -> _GainParts:
-        # A law of the angle alone has the torque loop inside it.
-        return _GainParts(loops.loop if controls_torque else loops.torque_loop, rule)
-
-    def of_reach(loops: LoopFunctions, rule: PlainFunction) -> _GainParts:
-        return _GainParts(loops.reach, rule)
-
-    def of_joint(loops: LoopFunctions, rule: PlainFunction) -> JointGainParts:
-        assert loops.joint is not None, "a law of the angle knows its joint"
-        return JointGainParts(loops.torque_loop, loops.joint, rule)
-
     loops_in_forms = [loop_functions(device, seen, controlled, sonic) for sonic in (False, True)]
 
-    def term(gain: PlainFunction, parts_of: Callable[..., Any], rule: PlainFunction, *settings: str) -> LinkFunction:
-        of_area, of_sonic = (
-            LinkFunction(
-                (*loops.sources, *settings),
-                made_of(gain, f"{rule.__name__}_of_device", parts_of(loops, rule)),
-                loops.rows,
-            )
-            for loops in loops_in_forms
-        )
-        return in_its_form(device, VALVE, of_area, of_sonic)
+    def term(gain: PlainFunction, rule: PlainFunction, *settings: str) -> LinkFunction:
+        links = []
+        for loops in loops_in_forms:
+            parts: _GainParts | JointGainParts
+            if gain is gain_of_joint:
+                assert loops.joint is not None, "a law of the angle knows its joint"
+                parts = JointGainParts(loops.torque_loop, loops.joint, rule)
+            elif rule in _OF_REACH.values():
+                parts = _GainParts(loops.reach, rule)
+            else:
+                # A law of the angle alone has the torque loop inside it.
+                parts = _GainParts(loops.loop if controls_torque else loops.torque_loop, rule)
+            function = made_of(gain, f"{rule.__name__}_of_device", parts)
+            links.append(LinkFunction((*loops.sources, *settings), function, loops.rows))
+        return in_its_form(device, VALVE, *links)
 
-    terms = {name: term(gain_of_device, of_loop, rule) for name, rule in _OF_LOOP.items()}
+    terms = {name: term(gain_of_device, rule) for name, rule in _OF_LOOP.items()}
     if not controls_torque:
-        terms |= {
-            name: term(gain_of_joint, of_joint, rule, "controller.error_limit") for name, rule in _OF_JOINT.items()
-        }
+        terms |= {name: term(gain_of_joint, rule, "controller.error_limit") for name, rule in _OF_JOINT.items()}
     # The reach in an angle is not known: the dead zone of a law of the angle is to be given.
     if controlled != ANGLE:
-        terms |= {name: term(gain_of_device, of_reach, rule) for name, rule in _OF_REACH.items()}
+        terms |= {name: term(gain_of_device, rule) for name, rule in _OF_REACH.items()}
     has_dead_band = any(quantity.name == "dead_band" for quantity in VALVES[device.valve.kind].quantities)
     opening = opening_beyond_band if has_dead_band else gain_with_setting
-    terms[torque_loop.OPENING] = term(opening, of_loop, torque_loop.dead_zone_opening, "controller.dead_zone")
+    terms[torque_loop.OPENING] = term(opening, torque_loop.dead_zone_opening, "controller.dead_zone")
     # An integral, and what is learnt, go with the proportional gain, also where that one is given.
     gain = next((quantity.name for quantity in law.quantities if torque_loop.PROPORTIONAL_GAIN in quantity.follows), "")
     path = f"controller.{gain}"
-    terms[torque_loop.INTEGRAL_GAIN] = term(gain_with_setting, of_loop, torque_loop.integral_gain, path)
+    terms[torque_loop.INTEGRAL_GAIN] = term(gain_with_setting, torque_loop.integral_gain, path)
     terms[torque_loop.LEARNING_GAIN] = LinkFunction((path,), torque_loop.learning_gain)
     return terms

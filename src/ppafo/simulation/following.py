@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
@@ -45,11 +45,6 @@ def read_followers(
                 read = replace(quantity, default=float(link.number(number)))
             settings[path] = reading.number(path, read)
     return settings, links
-
-
-def numbers_of_sensors(sensors: Mapping[str, Any]) -> dict[str, float]:
-    """Return the settings of sensors, keyed by their path in a scenario."""
-    return {f"sensors.{name}": number for name, number in sensors.items()}
 
 
 def numbers_of_lines(lines: "SupplyLines | None") -> dict[str, float]:

@@ -2,59 +2,25 @@
 
 from dataclasses import dataclass
 
-from ppafo.control import angle_loop, torque_loop
 from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import CONTROLLED, TORQUE
-from ppafo.model.declaration import Quantity
 from ppafo.model.ports import load_torque
 from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import LinkFunction
 from ppafo.simulation.declaration import law_settings
-from ppafo.simulation.default_gains import DEAD_TIME, RATE, loop_terms
+from ppafo.simulation.default_gains import DEAD_TIME, GAIN_TERMS, RATE, loop_terms
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
 
-_OF_LOOP = frozenset(
-    (
-        torque_loop.PROPORTIONAL_GAIN,
-        torque_loop.INTEGRAL_GAIN,
-        torque_loop.INTEGRAL_RATE,
-        torque_loop.BOUNDARY,
-        torque_loop.CONVERGENCE,
-        torque_loop.DEAD_ZONE,
-        torque_loop.RELEASE,
-        torque_loop.OPENING,
-        torque_loop.LEARNING_GAIN,
-        torque_loop.LEAD,
-        angle_loop.ANGLE_STIFFNESS,
-        angle_loop.ANGLE_DAMPING,
-        angle_loop.RATE_FILTER,
-        angle_loop.INNER_GAIN,
-        angle_loop.GRAVITY,
-        angle_loop.INERTIA,
-        angle_loop.FRICTION,
-        angle_loop.STATIC_FRICTION,
-        angle_loop.LOAD_TIME,
-        angle_loop.TORQUE_LAG,
-        angle_loop.TOLERANCE,
-        angle_loop.REST_DISTANCE,
-    )
-)
-
 
 @dataclass(frozen=True, slots=True)
-class Gain:
+class _Gain:
     """Controller gain in use: name, unit and value [SI]; ``computed`` if derived from the device, otherwise given."""
 
     name: str
     unit: str
     value: float
     computed: bool
-
-    @property
-    def text(self) -> str:
-        """Name, value and unit."""
-        return f"{self.name} {self.value:.3g} {self.unit}".rstrip()
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +31,7 @@ class Gains:
     time of the loop [s].
     """
 
-    gains: tuple[Gain, ...]
+    gains: tuple[_Gain, ...]
     torque_rate: float
     dead_time: float
     unit: str = "N m"
@@ -76,18 +42,13 @@ class Gains:
     def sentence(self) -> str:
         """Gains in use and their origin."""
         loop = f"{self.torque_rate:.3g} {self.unit}/s at full opening, {1.0e3 * self.dead_time:.3g} ms late"
-        parts = [
-            f"{', '.join(gain.text for gain in self.gains if gain.computed == computed)} {origin}"
-            for computed, origin in ((False, "(given)"), (True, f"(computed from the device: {loop})"))
-            if any(gain.computed == computed for gain in self.gains)
-        ]
+        parts = []
+        for computed, origin in ((False, "(given)"), (True, f"(computed from the device: {loop})")):
+            gains = [gain for gain in self.gains if gain.computed == computed]
+            texts = [f"{gain.name} {gain.value:.3g} {gain.unit}".rstrip() for gain in gains]
+            parts += [f"{', '.join(texts)} {origin}"] if texts else []
         without = f"; without the load of {', '.join(self.unknown_loads)}" if self.unknown_loads else ""
         return f"gains: {'; '.join(parts)}{without}"
-
-
-def settings_of(scenario: Scenario, law: ControllerKind) -> tuple[Quantity, ...]:
-    """Return the settings of a scenario's controller, in units of the controlled quantity."""
-    return law_settings(law, scenario.controlled)
 
 
 def terms_of(scenario: Scenario, law: ControllerKind) -> dict[str, LinkFunction]:
@@ -99,12 +60,14 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     """Return the gains in use of a scenario's torque controller; None for a controller without such gains."""
     if scenario.controller.is_outside:
         return None
-    items = [quantity for quantity in settings_of(scenario, law) if _OF_LOOP.intersection(quantity.follows)]
+    items = [
+        quantity for quantity in law_settings(law, scenario.controlled) if GAIN_TERMS.intersection(quantity.follows)
+    ]
     if not items:
         return None
     links, terms = scenario.links, terms_of(scenario, law)
     gains = tuple(
-        Gain(
+        _Gain(
             quantity.name,
             quantity.unit,
             float(scenario.controller.settings[quantity.name]),

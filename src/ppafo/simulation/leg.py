@@ -8,7 +8,6 @@ import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.catalog import PROFILES
-from ppafo.control.kind import ProfileKind
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.in_python import over_samples
 from ppafo.engine.lanes import Floats
@@ -47,16 +46,16 @@ def plan_leg(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     leg = _leg_of(scenario)
     # Curves were made when the file was read; these two of their numbers may have been changed since, or vary.
     if leg.curves is None:
-        shank = profile_parameters(leg.shank)
+        kind, shank = PROFILES[leg.shank.kind], profile_parameters(leg.shank)
     else:
-        shank = leg.curves._replace(start=leg.shank.start, toe_lever=leg.toe_lever)
+        kind, shank = GAIT_SHANK, leg.curves._replace(start=leg.shank.start, toe_lever=leg.toe_lever)
 
     def put_on(plant: PlantParameters) -> tuple[PlantParameters, LedLeg]:
         foot = leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia
         load = foot_load(plant.inertia, plant.gravity_torque, *foot, leg.shank_length)
         return with_load(plant, load), LedLeg(load, shank)
 
-    return plan_vane(scenario, CarriedLeg(shank_kind(leg), put_on))
+    return plan_vane(scenario, CarriedLeg(kind, put_on))
 
 
 def measured_leg(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
@@ -82,10 +81,11 @@ def measured_leg(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str,
         # T_ex by the second row of equation (11): what the foot needs beside T_2. A blow at a stop is not in it.
         carried, plant = _leg_of(scenario), run.plant
         assert leg is not None, "the run has the leg of its scenario"
+        assert kind is not None, "the run has the shank of its leg"
         # The foot alone: inertia and weight of vane and foot plate are on the other side of T_ex.
         of_foot = carried.foot_mass, carried.foot_mass_centre, carried.foot_inertia
         foot = foot_load(0.0, 0.0, *of_foot, carried.shank_length)
-        now = shank_over_samples(shank_kind(carried), leg.shank, times)
+        now = shank_over_samples(kind, leg.shank, times)
         added, needed = (over_samples(torque_on_foot, load, now, angle) for load in (leg.load, foot))
         net = net_torques(run, rows, torque + added - plant.external_torque)
         # A vane at rest is held by friction or a stop.
@@ -99,11 +99,6 @@ def _leg_of(scenario: Scenario) -> Leg:
     leg: Leg | None = vane_motion(scenario).leg
     assert leg is not None, "the motion has a leg"
     return leg
-
-
-def shank_kind(leg: Leg) -> ProfileKind:
-    """Profile of the shank angle of a leg: a kind by name, or the curves of a gait."""
-    return PROFILES[leg.shank.kind] if leg.curves is None else GAIT_SHANK
 
 
 def foot_load(

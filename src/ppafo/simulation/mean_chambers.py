@@ -155,7 +155,7 @@ def shaped_growth(settings: Any, stops: Range, around: Surroundings, *, parts: _
     return mean_growth(parts.shape(settings, stops), stops, gauge, parts.chambers)
 
 
-class ChambersOf(NamedTuple):
+class _ChambersOf(NamedTuple):
     """Functions of an actuator for its ``MeanChambers`` at the usual angle, at any angle, and for its mean ``growth``.
 
     ``sources`` are the paths of their arguments and ``rows`` the types into which these are grouped. ``at`` takes the
@@ -169,7 +169,7 @@ class ChambersOf(NamedTuple):
     rows: tuple[type, ...]
 
 
-def chambers_of(device: Device) -> ChambersOf:
+def chambers_of(device: Device) -> _ChambersOf:
     """Return the functions that compute the mean chambers of a device from its numbers."""
     actuator = device.actuator
     kind = ACTUATORS[actuator.kind]
@@ -183,7 +183,7 @@ def chambers_of(device: Device) -> ChambersOf:
     )
     if actuator.kind == VANE:
         usual = made_of(usual_chambers, "usual_chambers_of_vane", _ChamberParts(vane_at))
-        return ChambersOf(function=usual, at=vane_at, growth=vane_growth, sources=sources, rows=rows)
+        return _ChambersOf(function=usual, at=vane_at, growth=vane_growth, sources=sources, rows=rows)
     name, model, shape = actuator.kind, kind.model, kind.model.prepare
     if actuator.table is not None:
         shape = made_of(measured_shape_of, f"shape_of_{name}", _MeasuredParts(model.prepare, actuator.table))
@@ -191,33 +191,32 @@ def chambers_of(device: Device) -> ChambersOf:
     at = made_of(shaped_at, f"chambers_at_of_{name}", shaped)
     middle = made_of(usual_chambers, f"usual_chambers_of_{name}", _ChamberParts(at))
     growth = made_of(shaped_growth, f"growth_of_{name}", shaped)
-    return ChambersOf(function=middle, at=at, growth=growth, sources=sources, rows=rows)
+    return _ChambersOf(function=middle, at=at, growth=growth, sources=sources, rows=rows)
 
 
 def quicker_at(device: Device, angle: float, controlled: str) -> float:
-    """Rate of a torque or pressure at an angle [rad], divided by the rate at the angle used for the gains [-]."""
-    here, there = (
-        _rate_per_flow(device, place, controlled)
-        for place in (angle, usual_place(float(device.actuator.angle_min), float(device.actuator.angle_max)))
-    )
-    return here / there if there > 0.0 else 1.0
+    """Rate of a torque or pressure at an angle [rad], divided by the rate at the angle used for the gains [-].
 
-
-def _rate_per_flow(device: Device, angle: float, controlled: str) -> float:
-    """Rate per volume flow at full opening of a torque [N m/m^3] or of a pressure [Pa/m^3], of the faster chamber."""
-    supply, plant, torque = device.supply, plant_parameters(device), static_torque(device)
+    Rates are per volume flow at full opening of the valve [N m/m^3 or Pa/m^3], for the faster chamber.
+    """
+    actuator, supply = device.actuator, device.supply
+    plant, torque, model = plant_parameters(device), static_torque(device), ACTUATORS[actuator.kind].model
     room = float(supply.atmospheric_pressure)
     full_1, full_2 = float(supply.pressure), float(supply.dorsiflexion_pressure)
     gauge_1, gauge_2 = gauge_of(full_1, room), gauge_of(full_2, room)
     half_1, half_2 = room + 0.5 * gauge_1, room + 0.5 * gauge_2
-    filled = ACTUATORS[device.actuator.kind].model.chambers(plant, angle, half_1, half_2)
-    volume_1 = float(filled.volume_1 + half_1 * filled.compliance_1)
-    volume_2 = float(filled.volume_2 + half_2 * filled.compliance_2)
-    if controlled in (TORQUE, ANGLE):
-        vented = torque(angle, room, room)
-        by_1 = abs((torque(angle, room + gauge_1, room) - vented) / gauge_1)
-        by_2 = abs((torque(angle, room, room + gauge_2) - vented) / gauge_2)
-    else:
-        by_1, by_2 = float(controlled != "pressure_2"), float(controlled != "pressure_1")
-    # What fills a chamber of a suction device is the room.
-    return max(by_1 * max(full_1, room) / volume_1, by_2 * max(full_2, room) / volume_2)
+    rates = []
+    for place in (angle, usual_place(float(actuator.angle_min), float(actuator.angle_max))):
+        filled = model.chambers(plant, place, half_1, half_2)
+        volume_1 = float(filled.volume_1 + half_1 * filled.compliance_1)
+        volume_2 = float(filled.volume_2 + half_2 * filled.compliance_2)
+        if controlled in (TORQUE, ANGLE):
+            vented = torque(place, room, room)
+            by_1 = abs((torque(place, room + gauge_1, room) - vented) / gauge_1)
+            by_2 = abs((torque(place, room, room + gauge_2) - vented) / gauge_2)
+        else:
+            by_1, by_2 = float(controlled != "pressure_2"), float(controlled != "pressure_1")
+        # What fills a chamber of a suction device is the room.
+        rates.append(max(by_1 * max(full_1, room) / volume_1, by_2 * max(full_2, room) / volume_2))
+    here, there = rates
+    return here / there if there > 0.0 else 1.0

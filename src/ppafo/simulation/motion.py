@@ -60,6 +60,7 @@ class VaneKind:
     places: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     layout: ClassVar[str] = VANE
     command: ClassVar[str] = "simulate"
+    python_call: ClassVar[str] = "ppafo.simulate({name!r}, [{overrides}])"
     is_measured_at_once: ClassVar[bool] = False
     reads_forces: ClassVar[bool] = False
     is_repeated_for_its_error: ClassVar[bool] = True
@@ -124,10 +125,6 @@ class VaneKind:
         from ppafo.simulation.ensemble.vane import lacks
 
         return lacks(scenario, metric)
-
-    def python_call(self, name: str, overrides: str) -> str:
-        """Return the Python call that runs a scenario, given by name, with overrides, which are quoted texts."""
-        return f"ppafo.simulate({name!r}, [{overrides}])"
 
     def further_command(self, _file: str) -> str:
         """Return an empty text: ``simulate`` reports everything about a vane alone."""

@@ -80,6 +80,10 @@ class MotionKind(Protocol[ScenarioType_contra]):
         """Subcommand of ``ppafo`` that shows the result of a scenario."""
 
     @property
+    def python_call(self) -> str:
+        """Template of the Python call that shows a scenario, with ``{name!r}`` and the quoted ``{overrides}``."""
+
+    @property
     def is_measured_at_once(self) -> bool:
         """True if the status of a run depends on its metrics, which are then computed at once, not on first use."""
 
@@ -125,9 +129,6 @@ class MotionKind(Protocol[ScenarioType_contra]):
 
     def lacks(self, scenario: ScenarioType_contra, metric: "MetricKind", /) -> str:
         """Return the reason why a scenario cannot have a metric; "" if the scenario has it."""
-
-    def python_call(self, name: str, overrides: str, /) -> str:
-        """Return the Python call that shows a scenario, given by name, with overrides, which are quoted texts."""
 
     def further_command(self, file: str, /) -> str:
         """Return the command that reports more about a scenario than a run does, in one line; "" if there is none."""

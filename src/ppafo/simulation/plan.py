@@ -24,7 +24,6 @@ from ppafo.errors import ScenarioError
 from ppafo.model.binding import made_of
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import (
-    Numeric,
     Problem,
     at,
     choose,
@@ -387,19 +386,15 @@ def step_counts(duration: float, time_step: float, output_interval: float, perio
     # WHOLE off first: a quotient that rounding put above a whole number would cost one more step.
     steps_per_sample = larger(1.0, rounded_up(period / time_step - WHOLE))
     step = period / steps_per_sample
+    # An integer if it differs from one only by rounding.
+    recorded = output_interval / step
+    nearest = truncated(recorded + 0.5)
     return StepCounts(
         step=step,
         step_count=rounded_up(duration / step - WHOLE),
         steps_per_sample=steps_per_sample,
-        record_every=nearly_whole(output_interval / step),
+        record_every=choose(abs(recorded - nearest) <= WHOLE * recorded, nearest, recorded),
     )
-
-
-def nearly_whole(steps: Numeric) -> Numeric:
-    """Number of steps [-], rounded to an integer if it differs only by rounding."""
-    nearest = truncated(steps + 0.5)
-    counted: Numeric = choose(abs(steps - nearest) <= WHOLE * steps, nearest, steps)
-    return counted
 
 
 def thermal_gas(walls: GasModel, gas: Gas) -> ThermalParameters:

@@ -8,7 +8,7 @@ from ppafo.control.catalog import PROFILES
 from ppafo.engine.in_python import over_samples
 from ppafo.engine.rows import rebuilt
 from ppafo.model.catalog import VALVES
-from ppafo.model.columns import at, over_runs
+from ppafo.model.columns import over_runs
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, ControlledQuantity, Ends
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
@@ -73,11 +73,6 @@ class Limits(NamedTuple):
     def text(self, value: float) -> str:
         """Value in its display unit."""
         return shown_text(value, self.unit, atmosphere=self.room)
-
-    def of_run(self, run: int) -> "Limits":
-        """Limits of one run."""
-        lowest, highest, room = (at(number, run) for number in (self.lowest, self.highest, self.room))
-        return self._replace(lowest=lowest, highest=highest, room=room)
 
 
 def stops_of(device: Device) -> Limits:

@@ -1,7 +1,6 @@
 """Compiled run that is stepped from one controller sample to the next, with the command of the caller."""
 
 import math
-from collections.abc import Callable
 from typing import Any, final
 
 from ppafo.engine.in_python import in_program
@@ -35,7 +34,6 @@ class SampledRun:
         self._rows = row_numbers(program.state_rows())
         self._plant, self._sensors = (_parameter_group(batch, name) for name in ("plant", "sensors"))
         if program.walks:
-            self._measure: Callable[[], Any] = self._walk_measurement
             self._last_measurement = NOTHING_SEEN
             # Delayed readings and gas temperatures of a walk are kept inside the compiled program alone.
             if program.late_readings or program.is_thermal:
@@ -45,7 +43,6 @@ class SampledRun:
                 )
             self._gait_sensors = _parameter_group(batch, "gait_sensors")
         else:
-            self._measure = self._vane_measurement
             effects = [_parameter_group(batch, effect.name) for effect in program.effects]
             self._shown_signals = in_program(shown_signals, program, effects)
 
@@ -66,7 +63,23 @@ class SampledRun:
 
         Walking sensors have memory: their measurement is taken once a sample.
         """
-        return self._measure()
+        program, clock = self._batch.program, self._batch.clock
+        if program.walks:
+            return self._walk_measurement()
+        # Delayed sensors show an earlier state.
+        if program.late_signals and self.sample > 0:
+            signals = self._block.late_signals(self.sample * clock.steps_per_sample)
+            angle, pressure_1, pressure_2 = signals[:, 0]
+        else:
+            groups, state = program.state_rows(), self._block.states[:, 0].tolist()
+            effect_states = {name: group_of(name, groups, state) for name in program.effect_states}
+            angle, *masses = (state[self._rows[f"state.{name}"]] for name in ("angle", "mass_1", "mass_2"))
+            pressures = program.actuator.pressures(self._plant, angle, *masses)
+            angle, pressure_1, pressure_2 = self._shown_signals(effect_states, angle, *pressures)
+        if program.ideal_sensors:
+            torque = program.actuator.torque(self._plant, angle, pressure_1, pressure_2)
+            return Measurement(angle=angle, pressure_1=pressure_1, pressure_2=pressure_2, torque=torque)
+        return measure(self._sensors, angle, pressure_1, pressure_2, self._plant, self.sample, parts=program.functions)
 
     def advance(self, command: float) -> None:
         """Advance to the next sample with a command."""
@@ -89,23 +102,6 @@ class SampledRun:
         if (rows - 1) * clock.record_every > last_recorded_step:
             rows -= 1
         return BatchResult(result.states, result.record[:rows])
-
-    def _vane_measurement(self) -> Measurement:
-        """Measurement of the present state, or of an earlier state for delayed sensors."""
-        program, clock = self._batch.program, self._batch.clock
-        if program.late_signals and self.sample > 0:
-            signals = self._block.late_signals(self.sample * clock.steps_per_sample)
-            angle, pressure_1, pressure_2 = signals[:, 0]
-        else:
-            groups, state = program.state_rows(), self._block.states[:, 0].tolist()
-            effect_states = {name: group_of(name, groups, state) for name in program.effect_states}
-            angle, *masses = (state[self._rows[f"state.{name}"]] for name in ("angle", "mass_1", "mass_2"))
-            pressures = program.actuator.pressures(self._plant, angle, *masses)
-            angle, pressure_1, pressure_2 = self._shown_signals(effect_states, angle, *pressures)
-        if program.ideal_sensors:
-            torque = program.actuator.torque(self._plant, angle, pressure_1, pressure_2)
-            return Measurement(angle=angle, pressure_1=pressure_1, pressure_2=pressure_2, torque=torque)
-        return measure(self._sensors, angle, pressure_1, pressure_2, self._plant, self.sample, parts=program.functions)
 
     def _walk_measurement(self) -> GaitMeasurement:
         """Measurement of a walking controller, of the present state."""

@@ -77,9 +77,9 @@ def measured(
         moments: Floats = np.where(np.abs(steps - whole) <= SAME_MOMENT, whole, steps) * run.step
         followed = CONTROLLED[scenario.controlled]
         channels[followed.reference] = (profile_values(scenario.reference, moments)[0], followed.unit)
-        if followed.channel not in channels:
+        if followed.name not in channels:
             value = followed.value(angle, pressure_1, pressure_2, torque)  # type: ignore[arg-type]
-            channels[followed.channel] = (np.asarray(value), followed.unit)
+            channels[followed.name] = (np.asarray(value), followed.unit)
     channels |= gas_channels(scenario.device.gas, run, rows)
     channels |= of_leg or {}
     absent = OF_SECOND_CHAMBER if run.program.has_one_chamber else frozenset()

@@ -109,7 +109,7 @@ def load_configuration(
 
 def _load(
     document: dict[str, Any],
-    source: "StudySource",
+    source: "_StudySource",
     changes: tuple[str, ...],
     draws: int | None = None,
     seed: int | None = None,
@@ -141,7 +141,7 @@ def _load(
 
 
 @dataclass(frozen=True, slots=True)
-class StudySource:
+class _StudySource:
     """Source of a study: its name in messages, folder of its relative paths, and text in bytes, None for data."""
 
     file: str
@@ -149,16 +149,16 @@ class StudySource:
     text: bytes
 
 
-def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], StudySource]:
+def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], _StudySource]:
     """Return a document that may be modified, and its source: a file of a kind, by name or path, or data."""
     if isinstance(named, Mapping):
         kind.check_depth(named, kind.noun)
-        return copy.deepcopy(dict(named)), StudySource(kind.noun, Path(), b"")
-    source = StudySource(label(str(named)), Path(named).parent, kind.read(named))
+        return copy.deepcopy(dict(named)), _StudySource(kind.noun, Path(), b"")
+    source = _StudySource(label(str(named)), Path(named).parent, kind.read(named))
     return kind.parse(source.text, source.file), source
 
 
-def _build(parsed: declared.StudyFile, document: dict[str, Any], source: StudySource) -> Study:
+def _build(parsed: declared.StudyFile, document: dict[str, Any], source: _StudySource) -> Study:
     """Return the study of a file, with everything in SI units; StudyError for a study that cannot be run.
 
     ``document`` is the file as plain data, which the study keeps.
@@ -167,7 +167,16 @@ def _build(parsed: declared.StudyFile, document: dict[str, Any], source: StudySo
     if repeated is not None:
         raise StudyError(f"there are two configurations named '{repeated}'; give each its own name")
     configurations = tuple(_configuration(configuration, source.folder) for configuration in parsed.configurations)
-    _check_requests(parsed)
+    outputs = parsed.outputs
+    if not parsed.vary and len(configurations) == 1:
+        raise StudyError("varies nothing: give at least one [[vary]] or a second configuration")
+    paths = [entry.path for entry in parsed.vary]
+    # Rows of channels over time are lists of one length, and bands are quantiles at one time.
+    if "run.duration" in paths and (outputs.trajectories or outputs.bands):
+        raise StudyError("'run.duration' cannot vary where trajectories or bands are kept: they need one length")
+    repeated = first_twice(paths)
+    if repeated is not None:
+        raise StudyError(f"'{repeated}' is varied twice; give it only one [[vary]]")
     _check_set_or_varied(parsed, configurations)
     scenarios = [configuration.scenario for configuration in configurations]
     varied_paths = {entry.path: _common_path(entry, configurations, parsed) for entry in parsed.vary}
@@ -180,7 +189,10 @@ def _build(parsed: declared.StudyFile, document: dict[str, Any], source: StudySo
     scores = _scores(parsed, drawn)
     # A grid alone is run once, with the noise that its scenarios write.
     if drawn:
-        drawn, scores = with_noise(drawn, scores, scenarios, [entry.path for entry in parsed.vary])
+        drawn, scores = with_noise(drawn, scores, scenarios, paths)
+    # The noise, which has no [[vary]] table, is a plain number.
+    units = {number.path: "-" for number in drawn}
+    units |= {path: varied.quantity.unit or "-" for path, varied in varied_paths.items()}
     # What follows a gauge pressure counts from the atmosphere of its run as well.
     followed = _followed_paths(parsed, varied_paths)
     gauge = {path for path, varied in varied_paths.items() if varied.is_gauge}
@@ -194,9 +206,9 @@ def _build(parsed: declared.StudyFile, document: dict[str, Any], source: StudySo
         same=followed,
         scores=scores,
         sample=_sample(parsed, drawn),
-        outputs=valid_outputs(parsed.outputs, scenarios),
+        outputs=valid_outputs(outputs, scenarios),
         runs_of_chunk=parsed.runs_of_chunk,
-        units=_units(varied_paths, drawn),
+        units=units,
         given={
             path: varied.given
             for path, varied in varied_paths.items()
@@ -235,20 +247,6 @@ def _configuration(entry: declared.ConfigurationSection, folder: Path, overrides
     with refused_as(StudyError, f"configuration '{entry.name}'", ScenarioError, ParameterError, DataError):
         scenario = load_scenario(placed(entry.scenario, folder), entry.overrides)
         return Configuration(entry.name, reloaded(scenario, overrides) if overrides else scenario)
-
-
-def _check_requests(parsed: declared.StudyFile) -> None:
-    """Raise an error for a study that varies nothing, or one path twice, or the duration of runs with traces."""
-    outputs = parsed.outputs
-    if not parsed.vary and len(parsed.configurations) == 1:
-        raise StudyError("varies nothing: give at least one [[vary]] or a second configuration")
-    paths = [entry.path for entry in parsed.vary]
-    # Rows of channels over time are lists of one length, and bands are quantiles at one time.
-    if "run.duration" in paths and (outputs.trajectories or outputs.bands):
-        raise StudyError("'run.duration' cannot vary where trajectories or bands are kept: they need one length")
-    repeated = first_twice(paths)
-    if repeated is not None:
-        raise StudyError(f"'{repeated}' is varied twice; give it only one [[vary]]")
 
 
 def _common_path(
@@ -314,12 +312,6 @@ def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, Varie
             )
         followed[entry.path] = entry.same_as
     return followed
-
-
-def _units(varied_paths: Mapping[str, VariedPath], drawn: Iterable[RandomValue]) -> dict[str, str]:
-    """Return the SI unit of each varied path; the noise, which has no [[vary]] table, is a plain number."""
-    units = {path: varied.quantity.unit or "-" for path, varied in varied_paths.items()}
-    return units | {number.path: "-" for number in drawn if number.path not in units}
 
 
 def _varying(entry: declared.Varied, configurations: Iterable[Configuration]) -> list[Configuration]:

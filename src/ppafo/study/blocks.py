@@ -57,19 +57,15 @@ def chunk_size(study: Study) -> int:
     size = min(runs_at_once(configuration.scenario, MAXIMUM_RUNS_OF_CHUNK) for configuration in study.configurations)
     while size > _FEWEST_RUNS_OF_CHUNK and size * bytes_of_run > _MAXIMUM_BYTES_OF_TRACES:
         size //= 2
-    steps = max(_steps_of(configuration.scenario) for configuration in study.configurations)
+    runs = [configuration.scenario.run for configuration in study.configurations]
+    steps = max(run.duration / run.step for run in runs)
     share = math.ceil(study.runs_of_configuration / _CHUNKS_OF_SMALL_STUDY)
     return min(size, max(share, _SLOW_RUNS_OF_CHUNK, math.ceil(_FEWEST_STEPS / steps)))
 
 
-def _steps_of(scenario: Scenario) -> float:
-    """Return the number of time steps of a run."""
-    return scenario.run.duration / scenario.run.step
-
-
 def runs_at_once(scenario: Scenario, most: int) -> int:
     """Return the number of runs between two progress reports: ``most``, or fewer for long runs."""
-    steps = _steps_of(scenario)
+    steps = scenario.run.duration / scenario.run.step
     while most > _FEWEST_RUNS_OF_CHUNK and most * steps > _MAXIMUM_STEPS:
         most //= 2
     return most

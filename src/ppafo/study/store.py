@@ -173,9 +173,23 @@ def compute_chunk(study: Study, number: int, threads: int | None) -> tuple[Finis
     columns = {
         **_columns_of_runs(study, part, values),
         **_columns_of_endings(study, part, values, result),
-        **_columns_of_metrics(study, result, part.runs),
-        **_columns_of_traces(study, part, result),
     }
+    outputs = study.outputs
+    for name in outputs.metrics:
+        metric = METRICS[name]
+        values_of_metric = result.metrics.get(name, np.full(part.runs, np.nan))
+        columns[name] = TableColumn(values_of_metric, stored_unit(metric.unit), metric.summary)
+        if name in result.errors:
+            unit = "Pa_d" if metric.unit == "Pa" else metric.unit
+            columns[f"{name}_error"] = TableColumn(result.errors[name], unit, f"estimated error of {name}")
+    samples = samples_of(study, study.configurations[part.configuration])
+    for channel in outputs.traces:
+        trace = result.traces[channel].T
+        trace = trace if trace.size else np.full((part.runs, samples), np.nan)
+        # What bands are read from is kept as it was computed, all else in single precision.
+        trace = trace.astype(np.float64 if channel in outputs.bands else np.float32)
+        summary = f"{CHANNELS[channel].summary}, every {outputs.every:g} s"
+        columns[trace_column(channel)] = TableColumn(lists_of(trace), stored_unit(CHANNELS[channel].unit), summary)
     facts = {"study": study.name, "chunk": str(number), "rows": str(part.runs), "every": f"{study.outputs.every!r} s"}
     content = parquet_bytes(table_of(columns, facts))
     return FinishedChunk(number, part.runs, int(np.count_nonzero(result.status))), content
@@ -224,34 +238,6 @@ def _columns_of_endings(
             "1 where the run follows its reference, 0 where not, empty where that is not known",
         ),
     }
-
-
-def _columns_of_metrics(study: Study, result: EnsembleResult, runs: int) -> dict[str, TableColumn]:
-    """Return the columns of metrics and, if the study asks for them, of estimated errors."""
-    columns = {}
-    for name in study.outputs.metrics:
-        metric = METRICS[name]
-        columns[name] = TableColumn(
-            result.metrics.get(name, np.full(runs, np.nan)), stored_unit(metric.unit), metric.summary
-        )
-        if name in result.errors:
-            unit = "Pa_d" if metric.unit == "Pa" else metric.unit
-            columns[f"{name}_error"] = TableColumn(result.errors[name], unit, f"estimated error of {name}")
-    return columns
-
-
-def _columns_of_traces(study: Study, part: Chunk, result: EnsembleResult) -> dict[str, TableColumn]:
-    """Return the columns of the traces that the study keeps."""
-    columns = {}
-    samples = samples_of(study, study.configurations[part.configuration])
-    for channel in study.outputs.traces:
-        trace = result.traces[channel].T
-        trace = trace if trace.size else np.full((part.runs, samples), np.nan)
-        # What bands are read from is kept as it was computed, all else in single precision.
-        trace = trace.astype(np.float64 if channel in study.outputs.bands else np.float32)
-        summary = f"{CHANNELS[channel].summary}, every {study.outputs.every:g} s"
-        columns[trace_column(channel)] = TableColumn(lists_of(trace), stored_unit(CHANNELS[channel].unit), summary)
-    return columns
 
 
 def trace_column(channel: str) -> str:

@@ -17,7 +17,6 @@ from ppafo.errors import PpafoError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.parameters.device import Device
 from ppafo.progress import Report, report_nothing
-from ppafo.simulation.recorded.clock import usual_interval
 from ppafo.simulation.recorded.rest import samples_at_rest
 from ppafo.simulation.recorded.usual_errors import usual_errors
 from ppafo.validation.agreement import RecordingAgreement, compare_recording
@@ -233,7 +232,7 @@ def _in_other_unit(
     if all(agreement.passes for agreement in agreements):
         return None
     # Hardly any bench samples so often, and a run a thousand times as long is not made for others.
-    is_short = max(usual_interval(measured.recording.time) for measured in read) <= _SHORT_INTERVAL
+    is_short = max(np.median(np.diff(measured.recording.time)) for measured in read) <= _SHORT_INTERVAL
     name = "seconds read as milliseconds" if is_short else "milliseconds read as seconds"
     rate, unit = _TIMES[name]
     try:

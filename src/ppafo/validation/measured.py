@@ -23,7 +23,6 @@ from ppafo.simulation.recorded.channels import (
     check_command,
     check_gaps,
 )
-from ppafo.simulation.recorded.clock import usual_interval
 from ppafo.storage.column_map import ColumnMap, column_map_of
 from ppafo.storage.files import read_bytes
 from ppafo.storage.foreign import read_foreign
@@ -132,7 +131,8 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     _check_size(recording, device, file)
     _check_pressures(recording, device, file)
     _check_change(recording, device, file)
-    wide = np.flatnonzero(np.diff(recording.time) > _REMARKED_GAP * usual_interval(recording.time))
+    intervals = np.diff(recording.time)
+    wide = np.flatnonzero(intervals > _REMARKED_GAP * np.median(intervals))
     if wide.size:
         noun, first = "gap" if wide.size == 1 else "gaps", float(recording.time[wide[0]])
         remarks += (f"{wide.size} {noun} in time, the first after {first:.6g} s; inputs were kept across",)

@@ -24,7 +24,7 @@ from ppafo.simulation.building import origin_of, read_gas_model, read_supply_lin
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE
 from ppafo.simulation.default_gains import loop_terms
 from ppafo.simulation.document import DocumentReader, ScenarioRequest, kind_at, value_at
-from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
+from ppafo.simulation.following import numbers_of_lines, read_followers
 from ppafo.simulation.hardware import read_device, read_hardware
 from ppafo.simulation.law_signals import IN_WALK, PERIOD_PATH
 from ppafo.simulation.motion_kind import MOTIONS, WALK
@@ -215,7 +215,8 @@ def _control(
         **nominal_terms(device, lines),
         **loop_terms(device, law, IN_WALK),
     }
-    present = numbers_of_sensors(sensors) | numbers_of_lines(lines) | {PERIOD_PATH: seconds}
+    present = {f"sensors.{name}": number for name, number in sensors.items()}
+    present |= numbers_of_lines(lines) | {PERIOD_PATH: seconds}
     sections = {"controller": law.quantities, "timing": timing.quantities}
     numbers, links = read_followers(reading, sections, terms, device, present)
     settings = {path.partition(".")[2]: number for path, number in numbers.items()}

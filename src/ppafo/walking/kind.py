@@ -20,6 +20,7 @@ class WalkKind:
     layout: ClassVar[str] = WALK
     places = motion.PLACES
     command: ClassVar[str] = "walk"
+    python_call: ClassVar[str] = "ppafo.walk({name!r}, overrides=[{overrides}])"
     is_measured_at_once: ClassVar[bool] = True
     reads_forces: ClassVar[bool] = True
     is_repeated_for_its_error: ClassVar[bool] = False
@@ -45,10 +46,6 @@ class WalkKind:
     def asks_gradually(self, law: ControllerKind) -> bool:
         """Return True if a control law requests partial valve openings to track its torque request."""
         return planning.requests_torque(law) and not law.only_switches
-
-    def python_call(self, name: str, overrides: str) -> str:
-        """Return the Python call that simulates the named walk with overrides, given as quoted texts."""
-        return f"ppafo.walk({name!r}, overrides=[{overrides}])"
 
     def further_command(self, file: str) -> str:
         """Return the one-line command that compares the walk in a file with others."""

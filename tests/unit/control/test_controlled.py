@@ -39,7 +39,7 @@ def test_each_has_channels_of_its_own_in_recordings() -> None:
     names = [kind.reference for kind in CONTROLLED.values()]
     assert len(set(names)) == len(names)
     for kind in CONTROLLED.values():
-        assert CHANNELS[kind.reference].unit == CHANNELS[kind.channel].unit == kind.unit
+        assert CHANNELS[kind.reference].unit == CHANNELS[kind.name].unit == kind.unit
 
 
 def test_a_gain_is_per_unit_of_what_is_controlled_and_a_default_of_another_unit_is_none() -> None:

@@ -50,7 +50,7 @@ def task_panels(before: GainResult, after: GainResult) -> list[Panel]:
     controlled = controlled_in(recording) or CONTROLLED[TORQUE]
     words, unit = controlled.words, controlled.level.unit
     level = Kind(words[:1].upper() + words[1:], unit, quantity_of_unit(unit))
-    followed = _traces(controlled.channel, before, after)
+    followed = _traces(controlled.name, before, after)
     if controlled.reference in recording:
         dashed = {"linestyle": "--", "linewidth": 1.2}
         reference = recording[controlled.reference]
@@ -143,7 +143,7 @@ def finding_of(tuned: Tuned) -> Finding[Tuned]:
     listed = ", ".join(json.dumps(line, ensure_ascii=False) for line in tuned.overrides)
     pasted = (
         f"# {tuned.verdict}\n\n# on the command line\n{options}\n\n# in a study file\noverrides = [{listed}]\n\n"
-        f"# in Python\n{motion_kind.python_call(name, listed)}\n"
+        f"# in Python\n{motion_kind.python_call.format(name=name, overrides=listed)}\n"
     )
     return Finding(
         name="tune",

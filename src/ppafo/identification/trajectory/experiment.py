@@ -20,10 +20,18 @@ from ppafo.simulation.recorded.channels import (
     check_command,
     check_gaps,
 )
+from ppafo.simulation.recorded.clock import sample_period
 from ppafo.simulation.recorded.inputs import between_stops, with_highest_supply
-from ppafo.simulation.recorded.replay import replay_control
 from ppafo.simulation.recorded.rest import value_at_rest
-from ppafo.simulation.scenario import FreeMotion, Scenario, Sensors, vane_motion, with_control
+from ppafo.simulation.scenario import (
+    PYTHON_CONTROLLER,
+    Control,
+    FreeMotion,
+    Scenario,
+    Sensors,
+    vane_motion,
+    with_control,
+)
 from ppafo.wording import nearest_name
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
@@ -131,7 +139,9 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
         scenario = replace(scenario, device=with_highest_supply(scenario.device, recording, experiment.inputs))
     if COMMAND in experiment.inputs:
         # A recorded command needs no sensors.
-        scenario = replace(with_control(scenario, replay_control(recording)), sensors=Sensors())
+        scenario = replace(
+            with_control(scenario, Control(PYTHON_CONTROLLER, {}, sample_period(recording.time))), sensors=Sensors()
+        )
     where = f"experiment '{experiment.label}'"
     if ANGLE in experiment.inputs:
         # From here the recorded angle prescribes the vane's.

@@ -147,7 +147,7 @@ def _locate_samples(prepared: _PreparedExperiment, run: Run) -> _PreparedExperim
     # Rounding of the clock must not make a sample lie between two records.
     fraction[fraction < _FITS] = 0.0
     frozen = replace(run, record_every=every, step_count=math.ceil(records * every - _FITS), needs_parts=True)
-    if recorded is not None and recorded.has(ANGLE) and isinstance(prepared.scenario.motion, FreeMotion):
+    if recorded is not None and ANGLE in recorded.names and isinstance(prepared.scenario.motion, FreeMotion):
         frozen = with_prescribed_angle(frozen, prepared.scenario.motion.angle)
     inputs = None if recorded is None else step_inputs(recorded, prepared.scenario.device, frozen)
     return replace(prepared, run=frozen, before=before, fraction=fraction, inputs=inputs)

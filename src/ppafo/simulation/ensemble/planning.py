@@ -28,7 +28,7 @@ _SHAPE = ("angle_min", "angle_max", "dead_volume_1", "dead_volume_2")
 
 
 @dataclass(slots=True)
-class ValidRuns:
+class _ValidRuns:
     """Runs not refused so far: ``members``, their indices in the ensemble, with their columns and clocks.
 
     ``reasons`` maps the index of each refused run to a line that says why. ``clock`` is None for the scenario's own
@@ -56,7 +56,7 @@ class ValidRuns:
             self._scenario = scenario
         return self._scenario
 
-    def subset(self, indices: Members) -> "ValidRuns":
+    def subset(self, indices: Members) -> "_ValidRuns":
         """Return the runs at ``indices`` among the remaining ones, with the same ``reasons``."""
         clock = self.clock
         if clock is not None:
@@ -64,7 +64,7 @@ class ValidRuns:
             selected: list[Any] = [time[indices] if isinstance(time, np.ndarray) else time for time in times]
             clock = RunTimes(*selected)
         values = {path: column[indices] for path, column in self.columns.values.items()}
-        return ValidRuns(replace(self.columns, values=values), self.members[indices], self.reasons, clock)
+        return _ValidRuns(replace(self.columns, values=values), self.members[indices], self.reasons, clock)
 
     def refuse(self, is_bad: Any, line: Callable[[int], str]) -> None:
         """Drop runs by a mask over the remaining ones, or all by one truth value; ``line(index)`` gives the reason."""
@@ -77,9 +77,9 @@ class ValidRuns:
         self.members, self.columns, self.clock, self._scenario = valid.members, valid.columns, valid.clock, None
 
 
-def screen_columns(columns: ScenarioColumns) -> ValidRuns:
+def screen_columns(columns: ScenarioColumns) -> _ValidRuns:
     """Runs whose values are in range and consistent."""
-    valid = ValidRuns(columns, np.arange(columns.runs), {})
+    valid = _ValidRuns(columns, np.arange(columns.runs), {})
     for path in columns.declared:
         # A default that follows others goes where they lead it, as it does in a single run.
         if path in columns.given or not columns.declared[path].follows:

@@ -82,27 +82,22 @@ class MeteredRuns:
                 column = slice(run, run + 1)
                 single = Batch(batch.program, batch.clock, batch.parameters[:, column], batch.states[:, column])
                 store(column, run_sampled(single, self.request.custom))
-        self._set_completed(task, states)
-        readings = task.readings(states, slice(None), None)
-        for name in task.metrics:
-            values = read_from_traces[name] if name in read_from_traces else _read(task, name, readings)
-            self.metrics[name][members] = np.where(self.is_completed[members], values, np.nan)
-
-    def _set_completed(self, task: "_MeteredBatch", states: Floats) -> None:
-        """Set the completed runs, by the rule for a single run: valid throughout, and finite at the end."""
-        members = task.members
-        result = group_of("result", task.batch.program.state_rows(), states)
-        failed = result.failure_time
-        self.too_many_parts[members] = result.too_many_parts != 0.0
-        # Meters stand below the rows of a plain batch, and what they come to says nothing about the run.
-        completed = (failed >= NEVER_FAILED) & np.isfinite(states[: task.physical]).all(axis=0)
+        # By the rule for a single run: valid throughout, and finite at the end. Meters stand below the rows of a plain
+        # batch, and what they come to says nothing about the run.
+        result = group_of("result", batch.program.state_rows(), states)
+        completed = (result.failure_time >= NEVER_FAILED) & np.isfinite(states[: task.physical]).all(axis=0)
         self.is_completed[members] = completed
+        self.too_many_parts[members] = result.too_many_parts != 0.0
         # Without a time of failure the last sample is the best that is known.
         end = task.interval * (task.samples - 1)
-        time = np.where(failed < NEVER_FAILED, failed, end)
+        time = np.where(result.failure_time < NEVER_FAILED, result.failure_time, end)
         self.failure_time[members] = np.where(completed, np.nan, time)
         for trace in self.traces.values():
             trace[:, members[~completed]] = np.nan
+        readings = task.readings(states, slice(None), None)
+        for name in task.metrics:
+            values = read_from_traces[name] if name in read_from_traces else _read(task, name, readings)
+            self.metrics[name][members] = np.where(completed, values, np.nan)
 
 
 @dataclass(frozen=True, slots=True)

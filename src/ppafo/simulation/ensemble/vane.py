@@ -68,7 +68,9 @@ def _beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, section:
         settings = {name: at(value, run) for name, value in profile.settings.items()}
         duration, step = at(scenario.run.duration, run), at(scenario.run.step, run)
         profile_of_run = ProfileChoice(profile.kind, settings)
-        problems[run] = profile_problem(limits.of_run(run), profile_of_run, duration, step, section)
+        lowest, highest, room = (at(number, run) for number in (limits.lowest, limits.highest, limits.room))
+        limits_of_run = limits._replace(lowest=lowest, highest=highest, room=room)
+        problems[run] = profile_problem(limits_of_run, profile_of_run, duration, step, section)
         outside[run] = bool(problems[run])
     return outside, lambda run: problems[run]
 

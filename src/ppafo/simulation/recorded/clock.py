@@ -23,8 +23,3 @@ def sample_period(time: Floats) -> float:
     """Return the sample interval [s], or the interval of the grid to which irregular samples are assigned."""
     shortest = min(max(float(np.diff(time).min()), SHORTEST_SAMPLE), LONGEST_STEP)
     return regular_interval(time) or shortest
-
-
-def usual_interval(time: Floats) -> float:
-    """Return the median time between two samples [s]."""
-    return float(np.median(np.diff(time)))

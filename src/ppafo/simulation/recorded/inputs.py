@@ -27,10 +27,6 @@ class RecordedInputs:
     names: tuple[str, ...]
     start: float
 
-    def has(self, name: str) -> bool:
-        """Return whether the run follows this channel."""
-        return name in self.names
-
 
 def supply_paths(device: Device) -> tuple[str, ...]:
     """Return the parameters set by a recorded supply pressure: both regulators, unless their pressures differ."""
@@ -53,17 +49,27 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
     A run that follows the angle must come from ``with_prescribed_angle``. Raises DataError for angles far beyond the
     stops.
     """
-    command = _values_at_steps(inputs, COMMAND, run) if inputs.has(COMMAND) else None
+    command = _values_at_steps(inputs, COMMAND, run) if COMMAND in inputs.names else None
     # The parameters that follow a recording [SI], for every step.
     followed: dict[str, Floats] = {}
-    if inputs.has(SUPPLY):
-        followed |= dict.fromkeys(supply_paths(device), _values_at_steps(inputs, SUPPLY, run))
-    if inputs.has(DORSIFLEXION_SUPPLY):
-        followed[_DORSIFLEXION_PATH] = _values_at_steps(inputs, DORSIFLEXION_SUPPLY, run)
-    if inputs.has(EXTERNAL_TORQUE):
-        followed["plant.external_torque"] = _values_at_steps(inputs, EXTERNAL_TORQUE, run)
-    if inputs.has(ANGLE):
-        followed |= _angle_path_at_steps(inputs, device, run)
+    # Later ones prevail: a regulator with a recording of its own does not follow the supply.
+    paths_of_channel = {
+        SUPPLY: supply_paths(device),
+        DORSIFLEXION_SUPPLY: (_DORSIFLEXION_PATH,),
+        EXTERNAL_TORQUE: ("plant.external_torque",),
+    }
+    for channel, paths in paths_of_channel.items():
+        if channel in inputs.names:
+            followed |= dict.fromkeys(paths, _values_at_steps(inputs, channel, run))
+    if ANGLE in inputs.names:
+        # The straight segment in effect at each step; after the last sample the vane stands still.
+        time = inputs.recording.time - inputs.start
+        angles = between_stops(inputs.recording[ANGLE], device, inputs.recording.label)
+        rates = np.append(np.diff(angles) / np.diff(time), 0.0)
+        begins = run.step * np.arange(run.step_count, dtype=np.float64)
+        # By the middle of a step: rounding may put a sample a little behind the step that begins with it.
+        segment = np.maximum(np.searchsorted(time, begins + 0.5 * run.step, side="right") - 1, 0)
+        followed |= {"path.start": time[segment], "path.level": angles[segment], "path.rate": rates[segment]}
     return StepInputs(command, followed)
 
 
@@ -80,20 +86,6 @@ def _values_at_steps(inputs: RecordedInputs, name: str, run: Run) -> Floats:
         first = (np.arange(run.step_count) // together * together).astype(np.float64)
         middle = run.step * (first + 0.5 * together)
     return between_samples(inputs.recording, name, middle, inputs.start)
-
-
-def _angle_path_at_steps(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:
-    """Return the straight segment of the angle in effect at each step: start time [s], level [rad], rate [rad/s].
-
-    After the last sample the vane stands still.
-    """
-    time = inputs.recording.time - inputs.start
-    angles = between_stops(inputs.recording[ANGLE], device, inputs.recording.label)
-    rates = np.append(np.diff(angles) / np.diff(time), 0.0)
-    begins = run.step * np.arange(run.step_count, dtype=np.float64)
-    # By the middle of a step: rounding may put a sample a little behind the step that begins with it.
-    piece = np.maximum(np.searchsorted(time, begins + 0.5 * run.step, side="right") - 1, 0)
-    return {"path.start": time[piece], "path.level": angles[piece], "path.rate": rates[piece]}
 
 
 def with_prescribed_angle(run: Run, angle: float) -> Run:

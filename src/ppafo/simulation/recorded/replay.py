@@ -42,17 +42,12 @@ def replay_scenario(
         run=RunSettings(duration, min(period, LONGEST_STEP), period),
         motion=motion or FreeMotion(start.angle, start.angular_velocity),
         initial=Initial(start.pressure_1, start.pressure_2),
-        controller=replay_control(recording),
+        controller=Control(PYTHON_CONTROLLER, {}, period),
         reference=ProfileChoice("constant", {"level": 0.0}),
         sensors=Sensors(),
         assumptions=(),
         origin=Origin(file, device.name, device.valve_name, (), {}),
     )
-
-
-def replay_control(recording: Recording) -> Control:
-    """Return the control of a run with a recorded command: no controller, sample period of the recording."""
-    return Control(PYTHON_CONTROLLER, {}, sample_period(recording.time))
 
 
 def locked_vane(angle: float) -> PrescribedMotion:

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import followed
 from ppafo.metrics.switching import SHUT
 from ppafo.model.controlled import ANGLE, TORQUE, error_functions
@@ -79,7 +78,16 @@ def oscillation(case: Case) -> TrackingCause | None:
     is_known = scenario.motion.motion_kind.sees(scenario).places is not anywhere
     quicker = 1.0 if is_known else quicker_at(scenario.device, angle, scenario.controlled)
     if law.only_switches:
-        return _steps_of_pair(case, law, quicker)
+        # A pair changes the quantity during its dead time, however little is wanted.
+        step, dead_time = pair_step(scenario, law)
+        step *= quicker
+        ratio = step / case.settled.wanted
+        controlled = scenario.controlled if TORQUE in law.controls else TORQUE
+        text = (
+            f"its valves change it by {change_text(controlled, step)} in their dead time of {1.0e3 * dead_time:.3g} "
+            f"ms, {ratio:.2g} times what is wanted"
+        )
+        return TrackingCause(text, smaller_pair(scenario, ratio), "take faster or smaller valves")
     names = [quantity.name for quantity in speed_settings(scenario, law).values()]
     if not names:
         return TrackingCause("its law is too fast for what is late", (), "give its law smaller gains, or a slower one")
@@ -96,20 +104,6 @@ def oscillation(case: Case) -> TrackingCause | None:
         )
         slower = TrackingCause(text, slower_loops(scenario, law, (quicker, 2.0 * quicker)))
     return gains_of_another_device(case) or slower
-
-
-def _steps_of_pair(case: Case, law: ControllerKind, quicker: float) -> TrackingCause:
-    """Cause: change by a pair of on/off valves during its dead time, as a multiple of the wanted change."""
-    scenario = case.scenario
-    step, dead_time = pair_step(scenario, law)
-    step *= quicker
-    controlled = scenario.controlled if TORQUE in law.controls else TORQUE
-    ratio = step / case.settled.wanted
-    text = (
-        f"its valves change it by {change_text(controlled, step)} in their dead time of {1.0e3 * dead_time:.3g} ms, "
-        f"{ratio:.2g} times what is wanted"
-    )
-    return TrackingCause(text, smaller_pair(scenario, ratio), "take faster or smaller valves")
 
 
 def _static_friction(case: Case) -> TrackingCause | None:

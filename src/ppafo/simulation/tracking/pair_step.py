@@ -45,7 +45,13 @@ def coarse_pair(scenario: Scenario) -> str:
     is_pair = "switching_interval" in scenario.device.valve.settings
     if law is None or not is_pair or controlled.name == ANGLE:
         return ""
-    wanted = _wanted_change(scenario)
+    if scenario.follows_reference:
+        initial = scenario.initial
+        start = float(controlled.value(0.0, initial.pressure_1, initial.pressure_2, 0.0))
+        extent = max(abs(float(bound) - start) for bound in profile_bounds(scenario.reference))
+        wanted = max(extent, smallest_change(scenario))
+    else:
+        wanted = torque_limit(scenario.controller.settings)
     if wanted == 0.0:
         return ""
     step, dead_time = pair_step(scenario, law)
@@ -59,13 +65,3 @@ def coarse_pair(scenario: Scenario) -> str:
         f"{1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the {wanted_text} wanted: {smaller}, faster valves or larger "
         "chambers make that step smaller"
     )
-
-
-def _wanted_change(scenario: Scenario) -> float:
-    """Largest change of torque or pressure that is wanted, in SI; 0 for a walk without a torque limit."""
-    if not scenario.follows_reference:
-        return torque_limit(scenario.controller.settings)
-    initial = scenario.initial
-    start = float(CONTROLLED[scenario.controlled].value(0.0, initial.pressure_1, initial.pressure_2, 0.0))
-    extent = max(abs(float(bound) - start) for bound in profile_bounds(scenario.reference))
-    return max(extent, smallest_change(scenario))

@@ -10,7 +10,8 @@ from ppafo.model.controlled import ANGLE, CONTROLLED
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import SonicOrifice
 from ppafo.report.display_units import metric_change, metric_level
-from ppafo.simulation.gains import settings_of, terms_of
+from ppafo.simulation.declaration import law_settings
+from ppafo.simulation.gains import terms_of
 from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chambers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import LARGEST_SHARE, SettledPart
@@ -79,7 +80,7 @@ def speed_settings(scenario: Scenario, law: ControllerKind | None) -> dict[str, 
         return {}
     items = {
         term: quantity
-        for quantity in settings_of(scenario, law)
+        for quantity in law_settings(law, scenario.controlled)
         for term in FASTEST_FIRST
         if term in quantity.follows and f"controller.{quantity.name}" in declared_numbers(scenario)
     }
@@ -105,7 +106,7 @@ def integral_of_device(scenario: Scenario, law: ControllerKind | None) -> list[R
     if law is None:
         return []
     terms, settings = terms_of(scenario, law), scenario.controller.settings
-    names = [item.name for item in settings_of(scenario, law) if torque_loop.INTEGRAL_GAIN in item.follows]
+    names = [item.name for item in law_settings(law, scenario.controlled) if torque_loop.INTEGRAL_GAIN in item.follows]
     default = float(terms[torque_loop.INTEGRAL_GAIN].number(lambda path: number_at(scenario, path))) if names else 0.0
     return [remedy(scenario, {f"controller.{name}": default}) for name in names if settings.get(name) == 0.0 < default]
 
@@ -154,7 +155,7 @@ def torque_asked(scenario: Scenario, law: ControllerKind | None, error: float) -
     """Torque [N m] requested at an angle error [rad] by a controller with a stiffness; None for another controller."""
     if scenario.controlled != ANGLE or law is None:
         return None
-    if not any(angle_loop.ANGLE_STIFFNESS in quantity.follows for quantity in settings_of(scenario, law)):
+    if not any(angle_loop.ANGLE_STIFFNESS in quantity.follows for quantity in law_settings(law, scenario.controlled)):
         return None
     settings = scenario.controller.settings
     return float(settings["angle_stiffness"]) * min(float(settings["error_limit"]), error)

@@ -116,23 +116,22 @@ def most_reversals(scenario: Scenario, law: ControllerKind | None, duration: flo
     if stride_time > 0.0:
         return duration * MOST_PER_STRIDE / stride_time
     # A run of tenths of a second is a transient: a few reversals are its rate, and no oscillation.
-    return max(duration, 1.0) * MOST_PER_SECOND + PER_TURN * _turns_of_reference(scenario, duration)
+    most = max(duration, 1.0) * MOST_PER_SECOND
+    # A profile whose numbers are arrays has no reversals that could be counted once.
+    if not scenario.follows_reference or any(np.ndim(number) for number in scenario.reference.settings.values()):
+        return most
+    lowest, highest = profile_bounds(scenario.reference)
+    if highest <= lowest:
+        return most
+    times = np.linspace(0.0, duration, _TIMES_OF_REFERENCE)
+    values = np.asarray(profile_values(scenario.reference, times)[0], dtype=np.float64)
+    return most + PER_TURN * reversals(values, OSCILLATION_THRESHOLD * (highest - lowest))
 
 
 def is_noisy(scenario: Scenario) -> bool:
     """True if sensor noise reverses the command of a task; reversals then count in the settled part only."""
     sensors = scenario.sensors
     return scenario.follows_reference and bool(sensors.angle_noise or sensors.pressure_noise)
-
-
-def _turns_of_reference(scenario: Scenario, duration: float) -> float:
-    """Number of reversals of a task's reference in a time [s]; 0 for a profile whose numbers are arrays."""
-    if not scenario.follows_reference or any(np.ndim(number) for number in scenario.reference.settings.values()):
-        return 0.0
-    lowest, highest = profile_bounds(scenario.reference)
-    times = np.linspace(0.0, duration, _TIMES_OF_REFERENCE)
-    values = np.asarray(profile_values(scenario.reference, times)[0], dtype=np.float64)
-    return float(reversals(values, OSCILLATION_THRESHOLD * (highest - lowest))) if highest > lowest else 0.0
 
 
 def settled_walk(recording: Recording, limit: float) -> SettledPart | None:
@@ -249,7 +248,7 @@ def failure_of_walk(settled: SettledPart, turning: float, limit: float) -> Failu
     return "overshoots" if limit > 0.0 and settled.peak > LARGEST_PEAK_WALK * limit else "does not follow"
 
 
-class TaskExcess(NamedTuple):
+class _TaskExcess(NamedTuple):
     """Numbers of a task, each divided by its limit.
 
     ``off`` is the remaining error, ``swings`` the oscillation of the value, ``peak`` the overshoot, and ``still`` the
@@ -276,7 +275,7 @@ def largest_error(settled: SettledPart, only_switches: bool) -> Floats:
     return limit
 
 
-def excess_of_task(settled: SettledPart, only_switches: bool) -> TaskExcess:
+def excess_of_task(settled: SettledPart, only_switches: bool) -> _TaskExcess:
     """Numbers of a task divided by their limits, apart from command reversals: the task follows if none is above 1.
 
     ``only_switches`` is true for a controller without gradual openings. The numbers of ``settled`` may be arrays
@@ -306,7 +305,7 @@ def excess_of_task(settled: SettledPart, only_switches: bool) -> TaskExcess:
     peak = np.where(is_counted, settled.peak / (LARGEST_PEAK * settled.wanted), 0.0)
     is_still = (share > LARGEST_SHARE) & (settled.moved <= SMALLEST_MOVE * settled.wanted)
     still = np.where(is_still, share / LARGEST_SHARE, 0.0)
-    return TaskExcess(off=off, swings=swings, peak=peak, still=still)
+    return _TaskExcess(off=off, swings=swings, peak=peak, still=still)
 
 
 def failure_of_task(settled: SettledPart, turning: float, only_switches: bool) -> Failure | None:

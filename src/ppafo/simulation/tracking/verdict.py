@@ -99,21 +99,16 @@ class Tracking:
         if self.kind == "oscillates":
             if self.span:
                 swing = change_text(self.controlled, self.span)
-                return f"the {words} swings by {swing}, of {wanted} wanted{self.time_text}"
+                return f"the {words} swings by {swing}, of {wanted} wanted{time_text(self.since)}"
             often = f"{self.reversals:.3g} reversals a {self.per}"
-            return f"the {words} loop oscillates: {often}, RMS {plain_error} of {wanted} wanted{self.time_text}"
+            return f"the {words} loop oscillates: {often}, RMS {plain_error} of {wanted} wanted{time_text(self.since)}"
         if self.kind == "overshoots":
             return f"the {words} overshoots: {plain_moved} of {wanted} wanted at most"
         if self.rests and self.at_rest:
             missing = change_text(self.controlled, abs(self.missing))
             side = "below" if self.missing < 0.0 else "above"
             return f"the {words} stays {missing} {side} its reference, of {wanted} wanted"
-        return f"the {words} does not follow its reference: RMS {plain_error} of {wanted} wanted{self.time_text}"
-
-    @property
-    def time_text(self) -> str:
-        """Words for the settled part of the run, whose error is smaller than the whole run's error in the metrics."""
-        return _time_text(self.since)
+        return f"the {words} does not follow its reference: RMS {plain_error} of {wanted} wanted{time_text(self.since)}"
 
 
 @in_units(lambda result: result.scenario.device.shown)
@@ -164,11 +159,11 @@ def following_text(result: "RecordedResult") -> str:
     is_task = case.scenario.follows_reference
     largest = float(largest_error(settled, case.only_switches)) if is_task else LARGEST_SHARE_OF_WAVE * settled.wanted
     error, allowed = (change_text(controlled.name, each) for each in (settled.error, largest))
-    since = _time_text(settled.start)
+    since = time_text(settled.start)
     return f"the {controlled.words} follows its reference: RMS error {error}{since}, {allowed} allowed"
 
 
-def _time_text(since: float) -> str:
+def time_text(since: float) -> str:
     """Words for the settled part of a run, which starts at a time [s]."""
     return f" from {since:.3g} s on" if since > 0.0 else ""
 

@@ -34,14 +34,24 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
     share = float(np.mean((above > 0.0) | (below > 0.0)))
     if share <= _OFTEN:
         return None
+    if np.mean(below > 0.0) > _OFTEN and -reaches[:, 0].min() <= ONE_WAY * reaches[:, 1].max():
+        # An actuator that pushes one way only, asked for a torque in dorsiflexion.
+        asked, lowest = float(reference[places].min()), float(reaches[:, 0].min())
+        text = (
+            f"its controller asks for {level_text('N m', asked)}, where the actuator gives "
+            f"{level_text('N m', lowest)} at most: it pushes one way only"
+        )
+        settings = scenario.controller.settings
+        unasked = {f"controller.{name}": 0.0 for name in _DORSIFLEXION if settings.get(name, 0.0) > 0.0}
+        omission = (remedy(scenario, unasked),) if unasked else ()
+        advice = "ask for no dorsiflexion, or let a spring lift the foot"
+        return TrackingCause(text, omission, advice, is_beyond_reach=True)
     lacks_most = int(np.argmax(np.maximum(above, below)))
     given = float(reaches[lacks_most, 1 if above[lacks_most] > 0.0 else 0])
     text = (
         f"in {100.0 * share:.0f} % of the time its controller asks for more than the actuator gives there, "
         f"{level_text('N m', given)} of {level_text('N m', float(reference[places][lacks_most]))} asked for at worst"
     )
-    if np.mean(below > 0.0) > _OFTEN and -reaches[:, 0].min() <= ONE_WAY * reaches[:, 1].max():
-        return _one_way_request(case, float(reaches[:, 0].min()), float(reference[places].min()))
     numbers: dict[str, float] = {}
     for path, lacking in (("supply.pressure", above), ("supply.dorsiflexion_pressure", below)):
         place = places[int(np.argmax(lacking))]
@@ -85,18 +95,6 @@ def _speed_of_gait(case: Case) -> TrackingCause:
         tuple(remedies),
         "take larger dead volumes or a quicker valve",
     )
-
-
-def _one_way_request(case: Case, lowest: float, asked: float) -> TrackingCause:
-    """Cause: the controller requests dorsiflexion torque [N m] from an actuator that pushes one way only."""
-    settings = case.scenario.controller.settings
-    text = (
-        f"its controller asks for {level_text('N m', asked)}, where the actuator gives {level_text('N m', lowest)} at "
-        "most: it pushes one way only"
-    )
-    unasked = {f"controller.{name}": 0.0 for name in _DORSIFLEXION if settings.get(name, 0.0) > 0.0}
-    remedies = (remedy(case.scenario, unasked),) if unasked else ()
-    return TrackingCause(text, remedies, "ask for no dorsiflexion, or let a spring lift the foot", is_beyond_reach=True)
 
 
 def _oscillation_of_walk(case: Case) -> TrackingCause | None:
