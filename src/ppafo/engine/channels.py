@@ -1,8 +1,5 @@
 """Channels that can be traced at a sample, and the paths of their numbers in a run."""
 
-from collections.abc import Mapping
-
-from ppafo.engine.rows import leaf_paths
 from ppafo.model.controlled import CONTROLLED
 from ppafo.signals.meter import Sample
 
@@ -31,14 +28,3 @@ TRACED_IN_WALKS: dict[str, str] = {
 """Additional channels of a walk: end of the path of a state variable, which not every controller has."""
 REQUEST = "controller_state.request.torque"
 """Path of the torque that a walking controller requests."""
-
-
-def paths_of_traces(states: Mapping[str, type], walks: bool) -> dict[str, str]:
-    """Return the path in a run of each traceable channel that is not a state variable of the same name."""
-    if not walks:
-        return TRACED
-    paths = [path for name, row in states.items() for path in leaf_paths(row, name)]
-    found = {
-        name: next((path for path in paths if path.endswith(ending)), "") for name, ending in TRACED_IN_WALKS.items()
-    }
-    return TRACED | {name: path for name, path in found.items() if path}

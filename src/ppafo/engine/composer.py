@@ -68,9 +68,6 @@ def names_of(function: FunctionType) -> FunctionNames:
 class ModuleText(Protocol):
     """Text of the module for which a function is composed."""
 
-    def add_inside(self, function: FunctionType, called: Any) -> str:
-        """Add a function or NamedTuple class that a function uses; return its name in the module."""
-
     def handed_to(self, name: str) -> tuple[str, ...]:
         """Return the names passed to a function of the module before its own arguments."""
 
@@ -82,21 +79,27 @@ class ModuleText(Protocol):
 
 
 class Composer(ast.NodeTransformer):
-    """Rewriter of the body of one function.
+    """Rewriter of the body of one function; ``add_inside`` adds what the function uses to the module.
 
     ``rows_to_receive`` are rows that called functions need and for which this function has no parameter, so that its
     callers have to pass them.
     """
 
-    def __init__(self, function: FunctionType, module: ModuleText, names: FunctionNames) -> None:
-        self.function, self.module = function, module
+    def __init__(
+        self,
+        function: FunctionType,
+        module: ModuleText,
+        names: FunctionNames,
+        add_inside: Callable[[FunctionType, Any], str],
+    ) -> None:
+        self.function, self.module, self.add_inside = function, module, add_inside
         self.local, self.parameters, self.known, self.rows = names.local, names.parameters, names.known, names.rows
         self.kinds: dict[str, Any] = {**function.__annotations__, **self.rows}
         self.rows_to_receive: set[str] = set()
 
     def add(self, item: Any) -> str:
         """Add a function or NamedTuple class that this function uses; return its name in the module."""
-        return self.module.add_inside(self.function, item)
+        return self.add_inside(self.function, item)
 
     def refuse(self, where: ast.AST, problem: str) -> ProgramError:
         """Return the error for a node of the function."""

@@ -106,18 +106,6 @@ class StepText:
         """Add a function called inside another, unless it is a composed step; return its name in the module."""
         return self.composed[called].name if called in self.composed else self.collector.add_inside(function, called)
 
-    def handed_to(self, name: str) -> tuple[str, ...]:
-        """Return the names passed to a function of the module before its own arguments."""
-        return self.collector.handed_to(name)
-
-    def constructed(self, row: Any) -> Any:
-        """Return the class that replaces a declared row in this module."""
-        return self.collector.constructed(row)
-
-    def note_read(self, scope: Mapping[str, Any], name: str, value: Any) -> None:
-        """Record a name that was looked up, and its value."""
-        self.collector.note_read(scope, name, value)
-
     def refuse_unkept(self, name: str, asking: ComposedFunction) -> ProgramError:
         """Return the error for a phase that reads a group which no phase stores: the line, and the remedy."""
         known = [function for function, composed in self.composed.items() if name in composed.effects.reads]
@@ -166,7 +154,8 @@ class StepText:
         for function, tree in reduced:
             check_grammar(tree, function.__code__.co_filename)
             names = frozenset([*local, *takes])
-            composer = Composer(function, self, FunctionNames(names, names, self.placeholders, {}))
+            function_names = FunctionNames(names, names, self.placeholders, {})
+            composer = Composer(function, self.collector, function_names, self.add_inside)
             found += [composer.visit(statement) for statement in tree.body]
         return found
 
@@ -219,7 +208,8 @@ class StepText:
         # A local name may be that of a group which this function does not ask for.
         rows = {name: kind for name, kind in self.rows.items() if name in groups}
         names = frozenset(local)
-        composer = Composer(function, self, FunctionNames(names, names, self.placeholders, rows))
+        function_names = FunctionNames(names, names, self.placeholders, rows)
+        composer = Composer(function, self.collector, function_names, self.add_inside)
         tree.returns, tree.decorator_list = None, []
         tree.body = [composer.visit(statement) for statement in tree.body]
         ast.fix_missing_locations(tree)

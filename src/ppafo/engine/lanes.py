@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from types import ModuleType
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,9 @@ from ppafo.engine.program import Program
 from ppafo.engine.source_text import MadeFrom, SourceCollector
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.progress import time_text
+
+if TYPE_CHECKING:
+    from ppafo.engine.interpreter import PythonProgram
 
 logger = logging.getLogger("ppafo")
 
@@ -100,12 +103,8 @@ class BatchResult:
     record: Floats
 
 
-class RunnableProgram(Protocol):
-    """Program that can be run: compiled, or by Python itself."""
-
-    @property
-    def advance(self) -> Callable[..., None]:
-        """Function that advances a block of runs by some steps."""
+RunnableProgram: TypeAlias = "ModuleType | PythonProgram"
+"""Program whose ``advance`` advances a block of runs by some steps: compiled, or run by Python itself."""
 
 
 def effort_for(batch: Batch) -> Effort:
@@ -121,9 +120,9 @@ def load_program(program: Program, effort: Effort = Effort.FULL) -> RunnableProg
     the program, so that code which cannot be compiled is refused with the same message on every computer.
     """
     source = _current_source(program)
-    module: Any = None if runs_by_python() else compiled(source, effort)
+    module = None if runs_by_python() else compiled(source, effort)
     if module is not None:
-        return module  # type: ignore[no-any-return]
+        return module
     from ppafo.engine.interpreter import PythonProgram  # most computers have a compiler
 
     return PythonProgram(program)
@@ -212,12 +211,20 @@ def run_blocks(
     stop = threading.Event()
 
     def work() -> None:
+        steps = batch.clock.step_count
         for start in waiting:
             members = slice(start, min(start + lanes, runs))
-            result = _run_block(module, batch, members, stop)
-            if result is None:
-                break
-            take(members, result)
+            parameters, states = batch.parameters[:, members], batch.states[:, members]
+            block = LaneBlock(module, batch.program, batch.clock, parameters, states)
+            for first_step in range(0, steps, STEPS_PER_CALL):
+                if stop.is_set():
+                    return
+                # An interrupt is seen between two calls only: compiled code cannot be stopped.
+                interrupts.check()
+                block.advance(min(STEPS_PER_CALL, steps - first_step))
+            if stop.is_set():
+                return
+            take(members, block.result())
 
     # One block needs no pool of threads, and an interrupt reaches it at once.
     if workers == 1:
@@ -231,19 +238,6 @@ def run_blocks(
                 worker.result()
         finally:
             stop.set()
-
-
-def _run_block(module: RunnableProgram, batch: Batch, members: slice, stop: threading.Event) -> BatchResult | None:
-    """Run some members of a batch to the end; None if another thread requested a stop."""
-    clock = batch.clock
-    block = LaneBlock(module, batch.program, clock, batch.parameters[:, members], batch.states[:, members])
-    for first_step in range(0, clock.step_count, STEPS_PER_CALL):
-        if stop.is_set():
-            return None
-        # An interrupt is seen between two calls only: compiled code cannot be stopped.
-        interrupts.check()
-        block.advance(min(STEPS_PER_CALL, clock.step_count - first_step))
-    return None if stop.is_set() else block.result()
 
 
 def join_results(results: Sequence[BatchResult]) -> BatchResult:

@@ -8,7 +8,7 @@ import ast
 from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from types import FunctionType
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, TypeAlias
 
 from ppafo.engine.entries import indent, parse_expression
 from ppafo.engine.generator import ComposedFunction, StepText
@@ -47,34 +47,6 @@ class Call(NamedTuple):
         return f"{slot.history}[{', '.join([*places, number])}]"
 
 
-class Rows(Protocol):
-    """Storage of the numbers of a step, as used by the generator of the loop."""
-
-    arrays: frozenset[str]
-    """Names of arrays that contain numbers, besides the arrays of the loop over steps."""
-
-    def over_lanes(self, calls: Sequence[Call]) -> list[str]:
-        """Lines that call several phases in sequence, for each run."""
-
-    def for_lane(self, call: Call) -> list[str]:
-        """Lines that call a phase for the present run."""
-
-    def with_cells(self, node: ast.expr) -> ast.expr:
-        """Expression with ``lane.GROUP.FIELD`` replaced by the storage of the present run."""
-
-    def any_of(self, condition: ast.expr, is_none: bool) -> tuple[list[str], str]:
-        """Preceding lines and expression for whether a condition on ``lane`` is true in any run, or in none."""
-
-    def action(self, method: str, arguments: Sequence[str]) -> list[str]:
-        """Lines for a function of ``lanes`` without return value: ``record``, ``set_aside`` or ``put_back``."""
-
-    def value(self, method: str, arguments: Sequence[str]) -> str:
-        """Expression for a function of ``lanes`` with return value: ``traces`` or ``slot``."""
-
-    def heading(self, function: FunctionType) -> list[ast.stmt]:
-        """First statements of a function of the loop."""
-
-
 class RowsOfLanes:
     """Row of ``x`` for each number of a program: state, parameters, intermediate values of a step and of its parts.
 
@@ -96,12 +68,8 @@ class RowsOfLanes:
         handed = [path for path in self.step_at if path.startswith(HANDED)]
         self.kept = [*self.state_at, "remaining", *handed] if step.parts.parts_are_rare else []
         self.count = self.aside + len(self.kept)
-
+        # Arrays that contain numbers, besides the arrays of the loop over steps.
         self.arrays: frozenset[str] = frozenset()
-
-    def load(self, group: str) -> str:
-        """Line that builds the group from its rows."""
-        return f"{group} = {row_expression(self.step.rows[group], group, self.cells, self.step.collector.add)}"
 
     def over_lanes(self, calls: Sequence[Call]) -> list[str]:
         """Lines of a loop over all runs of the block."""
@@ -113,7 +81,11 @@ class RowsOfLanes:
         effects, rows = call.phase.effects, self.step.rows
         if not effects.results:
             return []
-        lines = [self.load(name) for name in call.phase.handed if name in rows]
+        lines = [
+            f"{group} = {row_expression(rows[group], group, self.cells, self.step.collector.add)}"
+            for group in call.phase.handed
+            if group in rows
+        ]
         lines.append(f"{call.returned} = {call.text('lane')}")
         for group, fields in effects.groups.items():
             for path in leaf_paths(rows[group], group):
@@ -209,6 +181,10 @@ class RowsOfRun:
     def heading(self, function: FunctionType) -> list[ast.stmt]:
         """The first line of the function's docstring."""
         return [ast.Expr(ast.Constant((function.__doc__ or "").split("\n")[0]))]
+
+
+Rows: TypeAlias = RowsOfLanes | RowsOfRun
+"""Storage of the numbers of a step, as used by the generator of the loop."""
 
 
 class _Cells(ast.NodeTransformer):

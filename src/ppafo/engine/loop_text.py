@@ -43,7 +43,8 @@ class LoopText:
         assert isinstance(function, FunctionType), "it is no other callable"
         self.reduction = Reduction(self.step, function, known or {})
         local = frozenset({*function.__code__.co_varnames, *HISTORIES, "record", *self.rows.arrays})
-        self.composer = Composer(function, self.step, FunctionNames(local, local, self.step.placeholders, {"now": Now}))
+        names = FunctionNames(local, local, self.step.placeholders, {"now": Now})
+        self.composer = Composer(function, self.step.collector, names, self.step.add_inside)
         self.other = LoopText(dict(others), function) if others else None
 
     def lines(self) -> list[ast.stmt]:

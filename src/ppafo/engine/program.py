@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from ppafo.control.kind import OPEN_LOOP, ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
-from ppafo.engine.channels import REQUEST, paths_of_traces
+from ppafo.engine.channels import REQUEST, TRACED, TRACED_IN_WALKS
 from ppafo.engine.groups import Groups, Role, given, handed, kept, merged, rows_of
 from ppafo.engine.plain_python import place
 from ppafo.engine.rows import leaf_paths
@@ -180,11 +180,6 @@ class Program:
         return self.shank is not None and self.shank.until_jump is not None
 
     @property
-    def shank_rests(self) -> bool:
-        """True if the prescribed shank never moves."""
-        return self.shank is CONSTANT
-
-    @property
     def is_on_gait(self) -> bool:
         """True if a gait prescribes the shank, including the motion of the knee (``engine/step/foot.py``)."""
         return self.shank is not None and self.shank.name == "gait"
@@ -245,7 +240,14 @@ class Program:
     @property
     def traces(self) -> dict[str, str]:
         """Path in a run of each traceable channel that is not a state variable of the same name."""
-        return paths_of_traces(self.state_rows(), self.walks)
+        if not self.walks:
+            return TRACED
+        paths = [path for name, row in self.state_rows().items() for path in leaf_paths(row, name)]
+        found = {
+            name: next((path for path in paths if path.endswith(ending)), "")
+            for name, ending in TRACED_IN_WALKS.items()
+        }
+        return TRACED | {name: path for name, path in found.items() if path}
 
     @property
     def followed(self) -> str:

@@ -73,8 +73,12 @@ class Effects:
         return [*self.groups, *self.slots]
 
 
-class StepModule(ModuleText, Protocol):
-    """Text of the module for which a function of the step is reduced."""
+class StepModule(Protocol):
+    """Step functions of the module for which a function of the step is reduced."""
+
+    @property
+    def collector(self) -> ModuleText:
+        """Text of the module."""
 
     @property
     def parts(self) -> Any:
@@ -236,11 +240,11 @@ class Reduction:
         """Record the outside names in an expression, including module attributes; the text depends on their values."""
         for inner in ast.walk(node):
             if isinstance(inner, ast.Name) and inner.id in self.scope and inner.id not in self.known:
-                self.module.note_read(self.scope, inner.id, self.scope[inner.id])
+                self.module.collector.note_read(self.scope, inner.id, self.scope[inner.id])
             if isinstance(inner, ast.Attribute) and isinstance(inner.value, ast.Name):
                 owner = self.scope.get(inner.value.id)
                 if isinstance(owner, types.ModuleType) and hasattr(owner, inner.attr):
-                    self.module.note_read(vars(owner), inner.attr, getattr(owner, inner.attr))
+                    self.module.collector.note_read(vars(owner), inner.attr, getattr(owner, inner.attr))
 
     def expression_of(self, value: Any) -> ast.expr:
         """Return an expression for a known value."""
@@ -373,7 +377,7 @@ class Reduction:
                 raise self.refuse(node, f"'{called.__name__}' sets groups of its lane, so that it gives no value")
             return ast.Call(self.placeholder(called), arguments, [])
         if isinstance(called, FunctionType):
-            for row in self.module.handed_to(self.module.add_called(self.function, called, {})):
+            for row in self.module.collector.handed_to(self.module.add_called(self.function, called, {})):
                 self.group_read(row)
         if called is _UNKNOWN:
             return self.with_reduced_operands(node)

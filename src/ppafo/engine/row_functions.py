@@ -11,6 +11,9 @@ from ppafo.engine.rows import is_row, leaf_paths, leaves, rebuilt, row_expressio
 from ppafo.engine.source_text import Replacements, SourceCollector
 from ppafo.model.declaration import PlainFunction
 
+_ENTRY = "call_"
+"""Prefix of the name of an entry, before the name of its function."""
+
 
 def row_functions(*functions: PlainFunction) -> list[Callable[..., None]]:
     """Return each function with array arguments: numbers of its rows, numbers of its result, then its own numbers.
@@ -21,11 +24,7 @@ def row_functions(*functions: PlainFunction) -> list[Callable[..., None]]:
     module = compiled(row_source(functions))
     if module is None:
         return [_by_python(function) for function in functions]
-    return [getattr(module, _entry_name(function)) for function in functions]
-
-
-def _entry_name(function: PlainFunction) -> str:
-    return f"call_{function.__name__}"
+    return [getattr(module, _ENTRY + function.__name__) for function in functions]
 
 
 @cache
@@ -44,7 +43,7 @@ def row_source(functions: Sequence[PlainFunction]) -> str:
         lines += [f"result[{place}] = {path}" for place, path in enumerate(leaf_paths(result, "found"))]
         types = {f"row_{name}": ARRAY for name in rows} | {"result": ARRAY}
         types |= dict.fromkeys((name for name in hints if name not in rows), FLOAT)
-        entries.append(entry_text(_entry_name(function), types, lines))
+        entries.append(entry_text(_ENTRY + function.__name__, types, lines))
     return "\n\n\n".join([HEADER, collector.text(), *entries])
 
 

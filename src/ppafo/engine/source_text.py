@@ -161,7 +161,7 @@ class SourceCollector:
                 named_defaults=dict(function.__kwdefaults__ or {}),
             )
         )
-        composer = Composer(function, self, names_of(function))
+        composer = Composer(function, self, names_of(function), self.add_inside)
         tree.args.kwonlyargs = [argument for argument in tree.args.kwonlyargs if argument.arg not in composer.known]
         own_rows = self.replacements.rows.get(function, ())
         _compose_parameters(composer, tree, own_rows)

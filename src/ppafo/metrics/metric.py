@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -84,14 +83,14 @@ class ReadAt:
 
     def __call__(self, readings: Readings) -> Floats:
         """Metric of runs without recording (runs,)."""
-        row: Any = readings
-        numbers = [reduce(_entry, place.split("."), row) for place in self.places]
+        numbers = []
+        for place in self.places:
+            number: Any = readings
+            for name in place.split("."):
+                number = number[name] if isinstance(number, Mapping) else getattr(number, name)
+            numbers.append(number)
         found: Floats = numbers[0] if self.function is None else self.function(*numbers)
         return found
-
-
-def _entry(row: Any, name: str) -> Any:
-    return row[name] if isinstance(row, Mapping) else getattr(row, name)
 
 
 def less(number: Floats, other: Floats) -> Floats:

@@ -187,25 +187,17 @@ def _where_swinging(readings: Readings, span: Floats, count: Floats) -> Floats:
 
 _REVERSALS = "torque reversals of more than 5 % of the largest reference"
 
-_OSCILLATIONS = (
+_OSCILLATIONS = tuple(
     MetricKind(
-        "oscillations_ramp",
+        f"oscillations_{part_of.__name__}",
         "-",
-        f"{_REVERSALS}, on the ramp",
+        f"{_REVERSALS}, on the {part_of.__name__}",
         _NEEDED,
-        partial(oscillations, part_of=ramp),
-        read_oscillations_ramp,
+        partial(oscillations, part_of=part_of),
+        read,
         (OSCILLATIONS,),
-    ),
-    MetricKind(
-        "oscillations_hold",
-        "-",
-        f"{_REVERSALS}, on the hold",
-        _NEEDED,
-        partial(oscillations, part_of=hold),
-        read_oscillations_hold,
-        (OSCILLATIONS,),
-    ),
+    )
+    for part_of, read in ((ramp, read_oscillations_ramp), (hold, read_oscillations_hold))
 )
 
 METRICS = (

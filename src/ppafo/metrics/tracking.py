@@ -131,23 +131,17 @@ _RMS = "root-mean-square torque error"
 
 _OF_TORQUE = (
     MetricKind("rms_error", "N m", _RMS, _NEEDED, rms_error, read_rms_error, (SQUARED_ERROR,)),
-    MetricKind(
-        "rms_error_ramp",
-        "N m",
-        f"{_RMS} on the ramp",
-        _NEEDED,
-        partial(rms_error, part_of=ramp),
-        read_rms_error_ramp,
-        (SQUARED_ERROR,),
-    ),
-    MetricKind(
-        "rms_error_hold",
-        "N m",
-        f"{_RMS} on the hold",
-        _NEEDED,
-        partial(rms_error, part_of=hold),
-        read_rms_error_hold,
-        (SQUARED_ERROR,),
+    *(
+        MetricKind(
+            f"rms_error_{part_of.__name__}",
+            "N m",
+            f"{_RMS} on the {part_of.__name__}",
+            _NEEDED,
+            partial(rms_error, part_of=part_of),
+            read,
+            (SQUARED_ERROR,),
+        )
+        for part_of, read in ((ramp, read_rms_error_ramp), (hold, read_rms_error_hold))
     ),
     MetricKind(
         "peak_error",

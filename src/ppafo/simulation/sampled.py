@@ -18,7 +18,7 @@ class SampledRun:
     ``samples`` is the number of samples of the whole run, ``sample`` the index of the current one.
     """
 
-    def __init__(self, batch: Batch, module: RunnableProgram | None = None) -> None:
+    def __init__(self, batch: Batch, module: "RunnableProgram | None" = None) -> None:
         program, clock = batch.program, batch.clock
         self.samples = math.ceil(clock.step_count / clock.steps_per_sample)
         self.sample = 0

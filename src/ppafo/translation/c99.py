@@ -229,7 +229,10 @@ class _Writer:
         head = _wrapped(f"PPAFO_INLINE {name} make_{name}({', '.join(parameters)})")
         body = ["{", f"    {name} {variable};", *(f"    {line}" for line in fill), f"    return {variable};", "}", ""]
         if self.reading is not None:
-            declared = _merged_declarations(text for _, text in members)
+            # Neighbouring members of one type share a declaration.
+            declared = []
+            for shared, group in itertools.groupby((text.split(TIED) for _, text in members), key=lambda pair: pair[0]):
+                declared += _wrapped(f"    {shared} {', '.join(own for _, own in group)};", " " * 8)
         struct = [*([comment] if comment else []), "typedef struct {", *declared, f"}} {name};", ""]
         if self.reading is not None:
             listed = ", ".join(parameter.rpartition(TIED)[2] for parameter in parameters)
@@ -329,22 +332,16 @@ class _Body:
                     yield from self.line("} else {", level)
                     yield from self.block(statement.otherwise, level + 1)
                 yield from self.line("}", level)
-            case _:
-                yield from self.line(self.plain_line(statement), level)
-
-    def plain_line(self, statement: typed.Note | typed.LocalArray | typed.ProcedureCall | typed.LoopExit) -> str:
-        """Text of a statement that fits on one line."""
-        match statement:
             case typed.Note():
-                return _comment(statement.text)
+                yield from self.line(_comment(statement.text), level)
             case typed.LocalArray():
                 extents = "".join(f"[{extent}]" for extent in statement.type.shape)
-                return f"PPAFO_ALIGNED double {self.name(statement.name)}{extents};"
+                yield from self.line(f"PPAFO_ALIGNED double {self.name(statement.name)}{extents};", level)
             case typed.ProcedureCall():
                 name = self.writer.functions.get(statement.function, statement.function)
-                return f"{name}({', '.join(map(self.terms.term, statement.given))});"
+                yield from self.line(f"{name}({', '.join(map(self.terms.term, statement.given))});", level)
             case typed.LoopExit():
-                return f"{statement.word};"
+                yield from self.line(f"{statement.word};", level)
 
     def line(self, text: str, level: int) -> Iterator[str]:
         yield from _wrapped("    " * level + text, "    " * (level + 1))
@@ -384,14 +381,6 @@ class _Body:
             yield from self.line(f"{name} = {counter};", level + 1)
         yield from self.block(loop.body, level + 1)
         yield from self.line("}", level)
-
-
-def _merged_declarations(members: Iterable[str]) -> list[str]:
-    """Declarations of struct members; neighbouring members of one type share a declaration."""
-    lines: list[str] = []
-    for kind, group in itertools.groupby((text.split(TIED) for text in members), key=lambda pair: pair[0]):
-        lines += _wrapped(f"    {kind} {', '.join(name for _, name in group)};", " " * 8)
-    return lines
 
 
 def _wrapped(line: str, further: str = "    ") -> list[str]:

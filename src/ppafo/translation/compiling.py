@@ -41,11 +41,16 @@ def asked(
     # A compiler that is killed leaves its files here, where the whole folder goes away.
     temporary = {} if scratch is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(scratch))
     seconds = LONGEST_COMPILING if limit is None else limit
+    # zig needs a home folder, which the environment may not set.
+    home: dict[str, str] = {}
+    if not os.environ.get("HOME") and os.name == "posix":
+        with contextlib.suppress(RuntimeError):
+            home = {"HOME": str(Path("~").expanduser())}
     try:
         process = subprocess.Popen(
             line,
             cwd=folder,
-            env={**os.environ, **_home(), **temporary},
+            env={**os.environ, **home, **temporary},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -74,16 +79,6 @@ def asked(
                         os.killpg(process.pid, signal.SIGKILL)
                     else:
                         process.kill()
-
-
-def _home() -> dict[str, str]:
-    """Return the home folder of the user if the environment does not set it, because zig needs a home folder."""
-    if os.environ.get("HOME") or os.name != "posix":
-        return {}
-    try:
-        return {"HOME": str(Path("~").expanduser())}
-    except RuntimeError:
-        return {}
 
 
 def complaint(done: "subprocess.CompletedProcess[str]") -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,17 +28,14 @@ _NO_FLOATS, _FLOATS = ctypes.c_double * 0, np.dtype(np.float64)
 _NUMBERS: dict[str, Any] = {FLOAT: ctypes.c_double, INT: ctypes.c_int64}
 
 
-class Parameters(NamedTuple):
-    """Parameters of an entry: number of dimensions of each array, followed by the types of the numbers."""
-
-    dimensions: tuple[int, ...]
-    numbers: tuple[str, ...]
+Parameters: TypeAlias = tuple[tuple[int, ...], tuple[str, ...]]
+"""Parameters of an entry: number of dimensions of each array, followed by the types of the numbers."""
 
 
 def parameters_of(source: str) -> dict[str, Parameters]:
     """Return the parameters of each entry of a composed text, by its name."""
     return {
-        name: Parameters(
+        name: (
             # "float64[:, ::1]": the last index runs quickest.
             tuple(kind.count(":") - 1 for kind in types if kind not in _NUMBERS),
             tuple(kind for kind in types if kind in _NUMBERS),
@@ -86,39 +83,34 @@ class NativeEntry:
         return self.layout.pack(*numbers)
 
 
-def load_entries(library: Path, parameters: Mapping[str, Parameters]) -> dict[str, NativeEntry]:
-    """Return the entries of a library by name.
+def fill_module(module: ModuleType, library: Path, parameters: Mapping[str, Parameters]) -> None:
+    """Add the entries of a library to a module.
 
-    Raises OSError if the library cannot be loaded, AttributeError if an entry is missing, and CompilerError if the
-    arithmetic of the library does not follow IEEE 754, which environment variables and wrappers of a compiler can
-    cause.
+    Raises CompilerError if the library cannot be loaded or lacks an entry, and if its arithmetic does not follow IEEE
+    754, which environment variables and wrappers of a compiler can cause.
     """
-    loaded = ctypes.CDLL(str(library))
+    try:
+        loaded = ctypes.CDLL(str(library))
+    except OSError as error:
+        raise CompilerError(f"the library of a compiled model cannot be loaded: {one_line(error)}") from error
     # (1 + 2^-30)(1 - 2^-30) - 1 rounds to 0 where the product is rounded by itself, and to -2^-60 where it is fused.
     small = 2.0**-30
     numbers = map(ctypes.c_double, (1.0 + small, 1.0 - small, -1.0, small * small))
-    # One product tells whether the compiler fuses or reorders, whatever its flags were.
-    if not loaded[ROUNDS_AS_WRITTEN](*numbers):
+    try:
+        functions = {name: loaded[f"{name}{PACKED}"] for name in parameters}
+        # One product tells whether the compiler fuses or reorders, whatever its flags were.
+        rounds_as_written = loaded[ROUNDS_AS_WRITTEN](*numbers)
+    except AttributeError:
+        raise CompilerError("the library of a compiled model lacks its functions") from None
+    if not rounds_as_written:
         raise CompilerError(
             "the compiler joins or reorders sums and products, so that results would differ from other compilers' "
             "(look for -ffp-contract or -ffast-math in its wrapper or in the environment)"
         )
-    entries = {}
     for name, (dimensions, types) in parameters.items():
-        function = loaded[f"{name}{PACKED}"]
+        function = functions[name]
         function.restype = None
         function.argtypes = [ctypes.c_void_p, *(_NUMBERS[kind] for kind in types)]
         # An array is a pointer and its extents; the rest of three extents is padding.
         layout = struct.Struct("".join(f"P{count}q{8 * (3 - count)}x" for count in dimensions))
-        entries[name] = NativeEntry(function, dimensions, layout)
-    return entries
-
-
-def fill_module(module: ModuleType, library: Path, parameters: Mapping[str, Parameters]) -> None:
-    """Add the entries of a library to a module; CompilerError if the library cannot be loaded or lacks an entry."""
-    try:
-        module.__dict__.update(load_entries(library, parameters))
-    except OSError as error:
-        raise CompilerError(f"the library of a compiled model cannot be loaded: {one_line(error)}") from error
-    except AttributeError:
-        raise CompilerError("the library of a compiled model lacks its functions") from None
+        setattr(module, name, NativeEntry(function, dimensions, layout))

@@ -28,7 +28,7 @@ int {ROUNDS_AS_WRITTEN}(double a, double b, double c, double d)
 }}
 """
 """Function that returns 1 if each operation is rounded separately; fused or reordered operations leave a remainder for
-the arguments in ``load_entries``.
+the arguments in ``fill_module``.
 """
 
 

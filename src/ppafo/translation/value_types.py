@@ -1,9 +1,7 @@
-"""Types of values in a composed module, independent of the target language, and parameter types of its entries."""
+"""Types of values in a composed module, independent of the target language."""
 
 from dataclasses import dataclass
 from typing import TypeAlias
-
-from ppafo.engine.entries import entry_types
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,15 +60,6 @@ class RowReference:
 
 
 Type: TypeAlias = Scalar | Row | Items | Array | FunctionArgument | RowReference
-
-
-def entries_of(source: str) -> dict[str, tuple[Type, ...]]:
-    """Return the functions of a composed module that are called from outside, with their parameter types."""
-    plain: dict[str, Type] = {"int64": INT, "float64": FLOAT}
-    return {
-        name: tuple(plain.get(word) or Array(word.count(":") - 1) for word in words)
-        for name, words in entry_types(source).items()
-    }
 
 
 def is_empty(kind: Type) -> bool:

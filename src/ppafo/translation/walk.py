@@ -13,6 +13,7 @@ from itertools import chain
 from typing import Any
 
 from ppafo.engine.compilers import UntranslatableError
+from ppafo.engine.entries import entry_types
 from ppafo.engine.plain_python import parse_module, place_in, refusal
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
@@ -30,7 +31,6 @@ from ppafo.translation.value_types import (
     RowReference,
     Scalar,
     Type,
-    entries_of,
     is_empty,
     joined,
     mixes,
@@ -46,7 +46,13 @@ def walk_module(
     ``entries`` maps function names to parameter types; by default the functions that declare their types in a
     decorator. ``library`` has the functions of ``LIBRARY`` that may be called.
     """
-    walk = _ModuleWalk(source.split("\n"), entries_of(source) if entries is None else entries, library)
+    if entries is None:
+        plain: dict[str, Type] = {"int64": INT, "float64": FLOAT}
+        entries = {
+            name: tuple(plain.get(word) or Array(word.count(":") - 1) for word in words)
+            for name, words in entry_types(source).items()
+        }
+    walk = _ModuleWalk(source.split("\n"), entries, library)
     for node in parse_module(source).body:
         if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call) and isinstance(node.targets[0], ast.Name):
             walk.rows[node.targets[0].id] = ast.literal_eval(node.value.args[1])

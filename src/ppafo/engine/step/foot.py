@@ -1,5 +1,6 @@
 """Foot on a prescribed shank, without ground contact, in an integration step: torque on an unconstrained vane."""
 
+from ppafo.control.profiles import CONSTANT
 from ppafo.engine.program import Program
 from ppafo.engine.scheme.motion import SAME_INSTANT
 from ppafo.engine.step.lane import Lane
@@ -28,7 +29,7 @@ def until_jump(parts: Program, lane: Lane, time: float) -> float:
 
 def torque(parts: Program, lane: Lane, time: float, angle: float) -> float:
     """Return the torque on the vane [N m] at a time [s] and an angle [rad], positive in plantarflexion."""
-    if parts.shank_rests:
+    if parts.shank is CONSTANT:
         # A shank that rests needs one sine instead of two in each part of a step.
         return torque_on_resting_foot(lane.load, lane.shank.level, angle)
     return torque_on_foot(lane.load, shank(parts, lane, time), angle)

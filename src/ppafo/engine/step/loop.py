@@ -136,9 +136,10 @@ def take_sample(
             for lane in lanes:
                 meters.update_meters(parts, lane, elapsed, index, interval)
     if parts.traced and lanes.traces(index, trace_every):
-        slot = lanes.slot(index, trace_every)
+        # A name of its own: what is not used is dropped by its name, and the caller has another ``slot``.
+        trace_slot = lanes.slot(index, trace_every)
         for lane in lanes:
-            meters.store_trace(parts, lane, elapsed, index, interval, slot)
+            meters.store_trace(parts, lane, elapsed, index, interval, trace_slot)
 
 
 def summarise_reference(parts: Program, lanes: Lanes, interval: float, last_record: int) -> None:
