@@ -151,26 +151,20 @@ def _remedy(module: str) -> str:
 
 
 def _imported(module: str, folder: str) -> Any:
-    with _searched_last(folder):
+    # The folder is searched last, so that it hides no other module.
+    is_added = folder not in ("", *sys.path)
+    if is_added:
+        sys.path.append(folder)
+        importlib.invalidate_caches()
+    try:
         loaded = importlib.import_module(module)
+    finally:
+        if is_added:
+            sys.path.remove(folder)
     files = [*getattr(loaded, "__path__", ()), getattr(loaded, "__file__", None) or ""]
     if folder and not any(Path(file).is_relative_to(folder) for file in files):
         raise KindError(f"the module '{module}' of {folder} has the name of another one ({files[-1]}); rename it")
     return loaded
-
-
-@contextmanager
-def _searched_last(folder: str) -> Iterator[None]:
-    """Context in which modules are also found in a folder, after all others, so that it hides none of them."""
-    if not folder or folder in sys.path:
-        yield
-        return
-    sys.path.append(folder)
-    importlib.invalidate_caches()
-    try:
-        yield
-    finally:
-        sys.path.remove(folder)
 
 
 @contextmanager

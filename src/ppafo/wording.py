@@ -3,6 +3,7 @@
 import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from os.path import commonprefix
 
 LONGEST_SHOWN = 40
 """Maximum number of characters of a name or cell quoted in a message."""
@@ -45,7 +46,7 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
     if near:
         # Of names that are as near, the one that begins like it: 'time_02' and not 'time_31' for 'time_01'.
         alike = [name for name in known if name in near and _likeness(name, word) == _likeness(near[0], word)]
-        near = [max(alike, key=lambda name: _letters_shared(name, word))]
+        near = [max(alike, key=lambda name: len(commonprefix([name, word])))]  # noqa: RUF071 - of names, no paths
     else:
         # A word at the beginning of a name, else anywhere in it, as ``rms`` is in ``rms_error``.
         words = [(re.split(r"[^0-9A-Za-z]+", name), name) for name in known]
@@ -57,12 +58,6 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
 
 def _likeness(name: str, word: str) -> float:
     return difflib.SequenceMatcher(None, name, word).ratio()
-
-
-def _letters_shared(name: str, word: str) -> int:
-    """Return the length of the common prefix of two names."""
-    pairs = enumerate(zip(name, word, strict=False))
-    return next((number for number, (own, other) in pairs if own != other), min(len(name), len(word)))
 
 
 def first_twice(names: Iterable[str]) -> str | None:

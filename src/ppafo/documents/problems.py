@@ -16,6 +16,12 @@ LABEL = r"^[^\x00-\x20\x7f-\xa0](?:[^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\xa0])?
 """Pattern of a display name: a line of text without leading or trailing space."""
 QUANTITY = r"^\s*[+-]?(\d|\.\d)"
 """Pattern of the start of a number with its unit."""
+_TEXT_RULES = {
+    NAME: "must consist of lower-case letters, digits, '-' and '_'",
+    LABEL: "must be a line of text without spaces around it",
+    QUANTITY: "does not start with a number; write for example '1.3 m/s'",
+}
+"""Ends of the messages on a text without a pattern, by pattern."""
 _LONGEST_VALUE = 60
 _MAXIMUM_PROBLEMS = 5
 _MAXIMUM_TABLES = 3
@@ -81,7 +87,9 @@ def _key_at(location: Iterable[int | str], model: type[BaseModel]) -> _Key:
     table: Any = model
     value_type: Any = model
     for name in map(str, location):
-        if kinds := _tables_by_kind(value_type):
+        tables = [item for item in _tables_in(value_type) if "kind" in item.model_fields]
+        if tables:
+            kinds = {get_args(item.model_fields["kind"].annotation)[0]: item for item in tables}
             value_type = kinds.get(name)
             continue
         table = value_type
@@ -113,18 +121,16 @@ def _tables_in(value_type: Any) -> list[type[BaseModel]]:
     return [item for item in get_args(value_type) if _is_model(item)] if is_union else []
 
 
-def _tables_by_kind(value_type: Any) -> dict[str, type[BaseModel]]:
-    """Return the tables of a union by their kind; empty for any other type."""
-    tables = [table for table in _tables_in(value_type) if "kind" in table.model_fields]
-    return {get_args(table.model_fields["kind"].annotation)[0]: table for table in tables}
-
-
 def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
     """Return the message on a problem at a key of a document."""
     assignment = f"{key.path} = {quote(detail['input'])}"
     match detail["type"]:
         case "extra_forbidden":
-            return _unknown_key(key, model)
+            allowed, name = list(key.table.model_fields), key.path.rpartition(".")[2]
+            tables = _tables_with(name, model)
+            is_elsewhere = 0 < len(tables) <= _MAXIMUM_TABLES
+            hint = f", which is a key of {' and '.join(tables)}" if is_elsewhere else nearest_name(name, allowed)
+            return f"unknown key '{key.path}'{hint}; allowed here: {', '.join(allowed)}"
         case "literal_error":
             words = detail["ctx"]["expected"].replace(" or ", ",")
             return f"{assignment} is not allowed{_allowed_words(detail['input'], words)}"
@@ -132,8 +138,12 @@ def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
             kind = detail["ctx"]["tag"]
             words = _allowed_words(kind, detail["ctx"]["expected_tags"])
             return f"{key.path}.kind = {quote(kind)} is not known{words}"
+        case "string_pattern_mismatch" if detail["loc"][-1] == "[key]":
+            # Pydantic marks a name that is the key of a table.
+            table = one_line(".".join(map(str, detail["loc"][:-2])))
+            return f"{table}: the name {quote(detail['input'])} must consist of letters, digits, '-' and '_'"
         case "string_pattern_mismatch":
-            return _wrong_text(assignment, detail)
+            return f"{assignment} {_TEXT_RULES.get(detail['ctx']['pattern'], _TEXT_RULES[NAME])}"
         case "string_type":
             return f"{assignment} must be a text in quotation marks"
         case "model_type" | "model_attributes_type" | "dict_type":
@@ -148,32 +158,10 @@ def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
     return f"{assignment}: must {one_line(requirement)}"
 
 
-def _wrong_text(assignment: str, detail: ErrorDetails) -> str:
-    """Return the message on a text that does not have the pattern of a name, a quantity or a label."""
-    # Pydantic marks a name that is the key of a table.
-    if detail["loc"][-1] == "[key]":
-        table = one_line(".".join(map(str, detail["loc"][:-2])))
-        return f"{table}: the name {quote(detail['input'])} must consist of letters, digits, '-' and '_'"
-    if detail["ctx"]["pattern"] == QUANTITY:
-        return f"{assignment} does not start with a number; write for example '1.3 m/s'"
-    if detail["ctx"]["pattern"] == LABEL:
-        return f"{assignment} must be a line of text without spaces around it"
-    return f"{assignment} must consist of lower-case letters, digits, '-' and '_'"
-
-
 def _allowed_words(word: object, allowed: str) -> str:
     """Return the end of a message on an unknown word: nearest and allowed ones, which pydantic separates by commas."""
     words = [item.strip(" '") for item in allowed.split(",")]
     return f"{nearest_name(str(word), words)}; allowed: {', '.join(words)}"
-
-
-def _unknown_key(key: _Key, model: type[BaseModel]) -> str:
-    """Return the message on an unknown key, with the tables that have such a key or the nearest allowed name."""
-    allowed, name = list(key.table.model_fields), key.path.rpartition(".")[2]
-    tables = _tables_with(name, model)
-    is_elsewhere = 0 < len(tables) <= _MAXIMUM_TABLES
-    hint = f", which is a key of {' and '.join(tables)}" if is_elsewhere else nearest_name(name, allowed)
-    return f"unknown key '{key.path}'{hint}; allowed here: {', '.join(allowed)}"
 
 
 def _tables_with(name: str, model: type[BaseModel]) -> list[str]:

@@ -210,13 +210,14 @@ def outside(graph: Graph, *sections: str) -> dict[str, tuple[LinkedDefault, ...]
 
 def holding(graph: Graph, present: Mapping[str, Any]) -> dict[str, tuple[LinkedDefault, ...]]:
     """Return the links that still hold for the numbers ``present``, which may have been changed independently."""
-    links_held = {path: tuple(link for link in links if _holds(path, link, present)) for path, links in graph.items()}
-    return {path: links for path, links in links_held.items() if links}
-
-
-def _holds(path: str, link: LinkedDefault, present: Mapping[str, Any]) -> bool:
-    number, followed = present[path], link.number(present.__getitem__)
-    if link.when_set:
-        return bool(np.all(np.isclose(number, followed, rtol=SAME_PRESSURE, atol=0.0)))
-    # Exactly: what follows was computed by this same link.
-    return bool(np.all(number == followed))
+    links_held: dict[str, tuple[LinkedDefault, ...]] = {}
+    for path, links in graph.items():
+        for link in links:
+            number, followed = present[path], link.number(present.__getitem__)
+            # Exactly, unless two pressures were given: what follows was computed by this same link.
+            is_held = (
+                np.isclose(number, followed, rtol=SAME_PRESSURE, atol=0.0) if link.when_set else number == followed
+            )
+            if np.all(is_held):
+                links_held[path] = (*links_held.get(path, ()), link)
+    return links_held

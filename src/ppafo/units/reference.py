@@ -114,7 +114,15 @@ def read_unit(unit: str) -> tuple[ParsedUnit, str]:
             f"'{unit}' {'does not say the gas' if not gases else 'says two gases'}: write '{example}', or with another "
             f"of the gases {', '.join(MOLAR_MASSES)}, or a molar mass in kg/mol"
         )
-    factor = Decimal(repr(density(condition, _molar_mass(gases[0]))))
+    word = gases[0]
+    molar_mass = {name.lower(): mass for name, mass in MOLAR_MASSES.items()}.get(word.lower())
+    if molar_mass is None:
+        match = re.fullmatch(r"\s*(\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)\s*(\S+)\s*", word)
+        of_gas = None if match is None else parse_unit(match[2])[0]
+        if match is None or of_gas is None or of_gas.dimensions != _MOLAR_MASS or not float(match[1]) > 0.0:
+            raise UnitError(f"'{word}' is not a molar mass, such as '0.044 kg/mol'")
+        molar_mass = float(of_gas.in_base(Decimal(match[1])))
+    factor = Decimal(repr(density(condition, molar_mass)))
     return ParsedUnit(DECIMALS.multiply(parsed.scale, factor), Decimal(0), MASS_FLOW), ""
 
 
@@ -181,14 +189,3 @@ def _condition_and_gases(words: str) -> tuple[str, list[str]]:
     known = [name.lower() for name in MOLAR_MASSES]
     gases = [word for word in said if word.lower() in known or word.endswith("/mol")]
     return ", ".join(word for word in said if word not in gases), gases
-
-
-def _molar_mass(word: str) -> float:
-    known = {name.lower(): mass for name, mass in MOLAR_MASSES.items()}
-    if word.lower() in known:
-        return known[word.lower()]
-    match = re.fullmatch(r"\s*(\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)\s*(\S+)\s*", word)
-    parsed = None if match is None else parse_unit(match[2])[0]
-    if match is None or parsed is None or parsed.dimensions != _MOLAR_MASS or not float(match[1]) > 0.0:
-        raise UnitError(f"'{word}' is not a molar mass, such as '0.044 kg/mol'")
-    return float(parsed.in_base(Decimal(match[1])))

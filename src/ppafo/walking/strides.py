@@ -64,23 +64,19 @@ def samples_of(chosen: NDArray[np.bool_], starts: NDArray[np.intp], samples: int
     return np.asarray(np.cumsum(edges)[:-1] > 0.5)
 
 
-def mean_curves(
-    recording: Recording, starts: NDArray[np.intp], chosen: NDArray[np.bool_] | None = None
-) -> dict[str, Curves]:
-    """Return mean and deviation of every channel over time-normalised strides, in SI units; {} without strides.
+def mean_curves(recording: Recording, starts: NDArray[np.intp], chosen: NDArray[np.bool_]) -> dict[str, Curves]:
+    """Return mean and deviation of every channel over the chosen time-normalised strides, in SI units; {} without any.
 
-    ``chosen`` (strides,) selects strides, all by default. Channels that are constant between samples, such as the
-    command, have no mean.
+    ``chosen`` is of shape (strides,). Channels that are constant between samples, such as the command, have no mean.
     """
-    if starts.size < 2 or (chosen is not None and not chosen.any()):
+    if not chosen.any():
         return {}
-    times = times_of_phases(recording.time, starts)
-    times = times if chosen is None else times[chosen]
-    names = [name for name in recording.names if not (name in CHANNELS and CHANNELS[name].is_held)]
+    times = times_of_phases(recording.time, starts)[chosen]
     curves = {}
-    for name in names:
-        strides = np.interp(times, recording.time, recording[name])
-        curves[name] = Curves(strides.mean(axis=0), strides.std(axis=0), recording.unit(name))
+    for name in recording.names:
+        if name not in CHANNELS or not CHANNELS[name].is_held:
+            strides = np.interp(times, recording.time, recording[name])
+            curves[name] = Curves(strides.mean(axis=0), strides.std(axis=0), recording.unit(name))
     return curves
 
 

@@ -140,9 +140,13 @@ def plan_task_sequence(
     planner = _Planner(frequency, STANDS_AT * timing.heel_off, load)
     spans: list[TimedSegment] = []
     for index, segment in enumerate(sequence.segments):
-        start = planner.time
+        start, title = planner.time, segment.kind
+        if "speed" in segment.values:
+            title += f", {segment.values['speed']:.3g} m/s"
+        elif "cadence" in segment.values:
+            title += f", {60.0 * segment.values['cadence']:.3g} steps/min"
         _plan_segment(planner, segment, _ratio(sequence, index, gait), strike_angle)
-        spans.append(TimedSegment(segment.kind, _title(segment), start, planner.time))
+        spans.append(TimedSegment(segment.kind, title, start, planner.time))
     duration = planner.time
     if planner.ratio == 0.0:
         # The last part is endless, for steps after the last segment.
@@ -238,16 +242,6 @@ def _ratio(sequence: TaskSequence, index: int, gait: Gait) -> float:
             f"{SLOWEST:g} to {FASTEST:g} m/s",
         )
     return ratio
-
-
-def _title(segment: TaskSegment) -> str:
-    """Return the name of a segment with its speed or cadence, for tables."""
-    values = segment.values
-    if "speed" in values:
-        return f"{segment.kind}, {values['speed']:.3g} m/s"
-    if "cadence" in values:
-        return f"{segment.kind}, {60.0 * values['cadence']:.3g} steps/min"
-    return segment.kind
 
 
 def pace_in_time(sequence: TimedSequence, time: Floats) -> tuple[Floats, Floats, Floats]:

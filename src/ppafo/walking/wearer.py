@@ -242,7 +242,13 @@ def read_wearer(reading: DocumentReader, gait: Gait, is_named: bool) -> Wearer:
     With a given stature, the default segments are scaled with stature and body mass.
     """
     # Without a named gait the wearer is the paper's subject, not the subject of the built-in gait.
-    subject = _subject_of(gait) if is_named else _PAPER
+    subject = _PAPER
+    if is_named:
+        # An unknown stature is the paper's.
+        stature = _PAPER.stature if gait.stature is None else gait.stature
+        of_stature = 1.0 if gait.stature is None else SHANK_SHARE * stature / _PAPER.shank_length
+        of_mass = gait.body_mass / _PAPER.body_mass
+        subject = replace(_PAPER, stature=stature, **scaled(_PAPER, of_mass, of_stature))
     if value_at(reading.document, STATURE) is not None:
         declared = {quantity.name: quantity for quantity in _quantities(subject)}
         paths = {STATURE: "stature", BODY_MASS: "body_mass"}
@@ -263,14 +269,6 @@ def read_wearer(reading: DocumentReader, gait: Gait, is_named: bool) -> Wearer:
                 f"{quantity.maximum:g} {quantity.unit}: give {path}"
             )
     return Wearer(**reading.section("wearer", quantities))
-
-
-def _subject_of(gait: Gait) -> Wearer:
-    """Return the paper's subject scaled to the subject of a gait; an unknown stature is the paper's."""
-    if gait.stature is None:
-        return replace(_PAPER, **scaled(_PAPER, gait.body_mass / _PAPER.body_mass, 1.0))
-    stature = SHANK_SHARE * gait.stature / _PAPER.shank_length
-    return replace(_PAPER, stature=gait.stature, **scaled(_PAPER, gait.body_mass / _PAPER.body_mass, stature))
 
 
 def _quantities(subject: Wearer) -> tuple[Quantity, ...]:

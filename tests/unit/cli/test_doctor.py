@@ -59,8 +59,8 @@ def test_warming_compiles_every_scenario_of_the_package(
     assert "programs: 0" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("fully_compiled")
 def test_model_that_was_compiled_for_later_is_the_one_that_a_run_uses(fresh_cache: Path) -> None:
-    loading._load_by.cache_clear()
     simulate.compile_models([load_scenario("torque-task-proportional")])
     simulate.simulate(load_scenario("torque-task-proportional", ["run.duration=10 ms"]))
     assert not [kept for kept in list_programs(fresh_cache) if "_quick_" in kept.path.name]

@@ -69,7 +69,17 @@ def findings_of(audited: ParameterSet, parent: ParameterSet | None = None) -> li
     evidence = Evidence(with_followers(audited), audited.declarations())
     findings = [finding for check in CHECKS.values() for finding in check(evidence)]
     changed, ids = overridden_paths(audited), {finding.id for finding in findings}
-    judged = [_judge(finding, audited, changed, of_parent) for finding in findings]
+    judged = []
+    for finding in findings:
+        reason = audited.accepted.get(finding.id, "")
+        is_copied = of_parent is not None and of_parent.accepted.get(finding.id) == reason
+        # An override, or a change in a copy, of a value of the finding makes the author's reason lapse.
+        others = changed_paths(audited, of_parent) if is_copied else changed
+        if reason and not any(value.path in others for value in finding.values):
+            severity = "warning" if finding.severity == "error" else finding.severity
+            judged.append(replace(finding, severity=severity, accepted=reason))
+        else:
+            judged.append(finding)
     # With overrides a finding may be gone for that reason alone: its acceptance is not idle.
     idle = {} if changed else {name: why for name, why in audited.accepted.items() if name not in ids}
     judged += [
@@ -90,16 +100,3 @@ def changed_paths(parameter_set: ParameterSet, parent: ParameterSet | None) -> f
     """Return the paths of all values that come from overrides or differ from the parent's."""
     of_file = frozenset[str]() if parent is None else {change.path for change in changes(parameter_set, parent)}
     return overridden_paths(parameter_set) | of_file
-
-
-def _judge(
-    finding: AuditFinding, parameter_set: ParameterSet, overridden: frozenset[str], parent: ParameterSet | None
-) -> AuditFinding:
-    """Apply the author's accepting reason, unless an override or a change in a copy affects a value of the finding."""
-    reason = parameter_set.accepted.get(finding.id, "")
-    is_copied = parent is not None and parent.accepted.get(finding.id) == reason
-    others = changed_paths(parameter_set, parent) if is_copied else overridden
-    if not reason or any(value.path in others for value in finding.values):
-        return finding
-    severity = "warning" if finding.severity == "error" else finding.severity
-    return replace(finding, severity=severity, accepted=reason)

@@ -102,7 +102,7 @@ def life_on_bottle(
     supply: BottleSupply,
     stride_time: float,
     schedule: Schedule,
-    progress: Callable[[float, float], None] = lambda _done, _total: None,
+    progress: Callable[[float, float], None],
 ) -> BottleLife:
     """Walk until the bottle is exhausted, with the rests of the schedule; a task sequence is repeated.
 

@@ -10,7 +10,6 @@ from ppafo.report.display_units import display_value
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
-from ppafo.walking.bottle.course import SupplyCourse
 from ppafo.walking.figures.axes import time_axis
 from ppafo.walking.result import WalkResult
 
@@ -51,12 +50,19 @@ def bottle_figure(result: WalkResult) -> "Figure":
     if supply.supply.line.freezes > 0.5:
         dry_ice = supply.supply.line.temperatures[0]
         temperatures.append(Mark("level", y=dry_ice, label="dry ice", colour=VERMILION, style=_DASHED))
+    # The regulator's largest outlet pressure, and the pressure range of the line in each stride.
+    delivered = values["regulated_pressure"]
+    behind = [Mark("line", times, delivered, label="delivered at most", colour=GREY, style=_DASHED)]
+    if result.starts.size > 1:
+        line, strikes = recording["line_pressure_1"], recording.time[result.starts[:-1]]
+        span = tuple(pick.reduceat(line, result.starts)[:-1] for pick in (np.minimum, np.maximum))
+        behind.append(Mark("band", strikes, span, label="line, in a stride", style={"alpha": 0.3}))
     regulator = supply.supply.bottle.regulator
     needed = regulator.set_pressure + regulator.pressure_margin
     panel = partial(_panel, end, Mark("at", supply.ending.time, colour=VERMILION, style={"linewidth": 1.0}))
     return draw_panels(
         [
-            panel(Kind("Pressure behind the regulator", "Pa_a", "pressure"), _marks_behind(result, supply)),
+            panel(Kind("Pressure behind the regulator", "Pa_a", "pressure"), behind),
             panel(
                 Kind("Pressure in the bottle", "Pa_a", "pressure"),
                 [
@@ -78,21 +84,6 @@ def bottle_figure(result: WalkResult) -> "Figure":
         note=f"End: {supply.ending.message}.",
         kind=recording.kind,
     )
-
-
-def _marks_behind(result: WalkResult, supply: SupplyCourse) -> list[Mark]:
-    """Return the regulator's largest outlet pressure, and the pressure range of the line in each stride, as marks."""
-    recording, starts = result.recording, result.starts
-    delivered = supply.values["regulated_pressure"]
-    marks = [Mark("line", supply.times, delivered, label="delivered at most", colour=GREY, style=_DASHED)]
-    if starts.size > 1:
-        line = recording["line_pressure_1"]
-        lowest, highest = (pick.reduceat(line, starts)[:-1] for pick in (np.minimum, np.maximum))
-        look = {"alpha": 0.3}
-        marks.append(
-            Mark("band", recording.time[starts[:-1]], (lowest, highest), label="line, in a stride", style=look)
-        )
-    return marks
 
 
 def _panel(end: float, ended: Mark, kind: Kind, marks: Sequence[Mark], largest: float | None = None) -> Panel:

@@ -22,14 +22,22 @@ _BINS = 40
 """Largest number of bins of a histogram; for few wearers about the square root of their number."""
 _MAXIMUM_POINTS = 2000
 """Largest number of wearers drawn as points; of more wearers, an evenly spaced subset is drawn."""
+_KINDS = {name: Kind(title, "", quantity) for name, (title, quantity, _) in SHOWN.items()}
 _OWN = {"linestyle": "", "marker": "o", "markersize": 6, "clip_on": False, "zorder": 5}
 
 
 def population_figure(population: Population) -> "Figure":
     """Return the figure of a population: four histograms with quantiles, two scatter plots of outcome against trait."""
-    histograms = [_histogram(population, name) for name in _OUTCOMES]
+    panels = [_histogram(population, name) for name in _OUTCOMES]
+    points = {"linestyle": "", "marker": ".", "markersize": 4.0, "alpha": 0.5, "markeredgewidth": 0.0}
+    for trait, outcome in _PAIRS:
+        x, y = population.traits[trait], population.outcomes[outcome]
+        # A picture of a million points shows no more than one of two thousand.
+        thin = slice(None, None, max(1, x.size // _MAXIMUM_POINTS))
+        marks = [Mark("line", x[thin], y[thin], style=points), Mark("line", x[:1], y[:1], colour=VERMILION, style=_OWN)]
+        panels.append(Panel(_KINDS[trait], _KINDS[outcome], marks, then=_set_ticks))
     return draw_panels(
-        [*histograms, *(_pair(population, *pair) for pair in _PAIRS)],
+        panels,
         across=2,
         size=(2.7, 1.9),
         title=f"{population.scenario.name}: {population.count} wearers, {population.minutes:.3g} min each",
@@ -45,21 +53,7 @@ def _histogram(population: Population, name: str) -> Panel:
         look = {"linewidth": 1.2, "linestyle": dashes}
         marks.append(Mark("at", float(np.quantile(values, fraction)), colour=BLACK, style=look))
     marks.append(Mark("line", values[:1], np.zeros(1), colour=VERMILION, style=_OWN))
-    return Panel(_kind_of(name), Kind("Wearers"), marks, then=_set_ticks)
-
-
-def _pair(population: Population, trait: str, outcome: str) -> Panel:
-    x, y = population.traits[trait], population.outcomes[outcome]
-    # A picture of a million points shows no more than one of two thousand.
-    thin = slice(None, None, max(1, x.size // _MAXIMUM_POINTS))
-    points = {"linestyle": "", "marker": ".", "markersize": 4.0, "alpha": 0.5, "markeredgewidth": 0.0}
-    marks = [Mark("line", x[thin], y[thin], style=points), Mark("line", x[:1], y[:1], colour=VERMILION, style=_OWN)]
-    return Panel(_kind_of(trait), _kind_of(outcome), marks, then=_set_ticks)
-
-
-def _kind_of(name: str) -> Kind:
-    title, quantity, _ = SHOWN[name]
-    return Kind(title, "", quantity)
+    return Panel(_KINDS[name], Kind("Wearers"), marks, then=_set_ticks)
 
 
 def _set_ticks(axes: "Axes") -> None:
