@@ -104,9 +104,9 @@ class Bench:
         acceleration = 0.0
         if way != 0.0:
             torque, pressed = self.drive(y)
-            friction = rig.transient + pressed
+            friction = rig.dynamic + pressed
             if extra.stribeck > 0.0:
-                friction += 0.9 * (rig.static - rig.transient) * math.exp(-((velocity / extra.stribeck) ** 2))
+                friction += 0.9 * (rig.static - rig.dynamic) * math.exp(-((velocity / extra.stribeck) ** 2))
             acceleration = (torque - rig.viscous * velocity - way * friction) / rig.inertia
         to_1, to_2 = min(max(opening, 0.0), 1.0), min(max(-opening, 0.0), 1.0)
         line_rates = [0.0, 0.0]

@@ -348,7 +348,7 @@ def rates(rig: Rig, time: float, state: Any, way: float, coils: Any, target: flo
     angle, velocity = place_of(rig, time, y)
     pressure_1, pressure_2, warmth_1, warmth_2 = gas_of(rig, angle, y)
     if abs(way) == 1.0:
-        torque = net_torque(rig, time, angle, pressure_1, pressure_2) - rig.viscous * velocity - way * rig.transient
+        torque = net_torque(rig, time, angle, pressure_1, pressure_2) - rig.viscous * velocity - way * rig.dynamic
         slope[ANGLE] = velocity
         slope[VELOCITY] = torque / turning_inertia(rig)
     source_1, vent_1, source_2, vent_2 = shares_of(rig, y, coils)
