@@ -119,9 +119,9 @@ VANE_FEATURES: dict[str, Feature] = {
         "effects.line_resistance.area=6 mm^2", "effects.line_resistance.discharge_coefficient=0.6"
     ),
     "second virial": _feature("effects.second_virial.share=1", "effects.second_virial.coefficient=-1e-5 m^3/mol"),
-    "silencer": _feature("effects.silencer.sonic_conductance=2e-9 m^3/(s Pa)", "initial.pressure_2=40 psi_g"),
+    "silencer": _feature("effects.silencer.sonic_conductance=2e-9 m^3/(s Pa)", "initial.pressure_1=40 psi_g"),
     "ice": _feature(
-        "effects.ice.blockage_per_gas=1e4 1/kg", "effects.ice.melting_time=30 ms", "initial.pressure_2=40 psi_g"
+        "effects.ice.blockage_per_gas=1e4 1/kg", "effects.ice.melting_time=30 ms", "initial.pressure_1=40 psi_g"
     ),
     "leak that opens": _feature("effects.leak_opening.pressure=3 psi_d", "effects.leak_opening.rise=2"),
     "laminar leak": _feature("effects.laminar_leak.coefficient=1e-16 kg/(s Pa^2)"),

@@ -9,6 +9,7 @@ from typing import Any
 
 from ppafo.errors import ParameterError
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
+from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
 from ppafo.parameters.overrides import Override, check_valve, read_overrides, with_overrides
@@ -55,6 +56,7 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
                 f"--set device.valve={parameter_set.default_valve}"
             )
         name = chosen_valve(parameter_set, valve)
+        of_file = _overrides_for(of_file, parameter_set, section["set"] == in_file.get("set"))
         parameter_set = with_overrides(parameter_set, of_file, valve)
         if of_file and section["set"] != in_file.get("set"):
             _report_file_overrides(reading.file, section["set"], ", ".join(map(str, of_file)))
@@ -63,6 +65,13 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
     before = atmospheric_pressure(parameter_set) if overrides else None
     changed = with_overrides(parameter_set, overrides, valve)
     return Hardware(changed, name, links_of_set(changed, {override.typed for override in overrides}, before))
+
+
+def _overrides_for(of_file: tuple[Override, ...], parameter_set: ParameterSet, is_own: bool) -> tuple[Override, ...]:
+    """Return the overrides of a file that another set than its own takes; one chamber has no second supply."""
+    if is_own or not parameter_set.has_one_chamber:
+        return of_file
+    return tuple(item for item in of_file if item.typed not in OF_SECOND_CHAMBER)
 
 
 @functools.lru_cache(maxsize=64)
@@ -77,9 +86,11 @@ def parameter_set_of(origin: Origin) -> ParameterSet:
     Raises ParameterError if the set can no longer be read.
     """
     folder = Path() if origin.file is None else Path(origin.file).parent
-    of_file = read_overrides(origin.content.get("device", {}).get("overrides", ()))
+    in_file = origin.content.get("device", {})
+    of_file = read_overrides(in_file.get("overrides", ()))
     of_caller = [override for override in read_overrides(origin.overrides) if is_of_device(override.typed)]
     parameter_set = load_parameter_set(set_name(origin.parameter_set, folder))
+    of_file = _overrides_for(of_file, parameter_set, origin.parameter_set == in_file.get("set"))
     return with_overrides(with_overrides(parameter_set, of_file, origin.valve), of_caller, origin.valve)
 
 

@@ -149,14 +149,14 @@ def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
         lead += f"interval with {100.0 * comparison.confidence:g} % confidence"
     pareto = Section(
         "Error against gas",
-        panels=lambda: [_pareto(comparison, task) for task in comparison.tasks],
+        panels=partial(_pareto_panels, comparison),
         name="pareto",
         caption=_PARETO,
         is_detail=True,
     )
     change = Section(
         "Spread of the change",
-        panels=lambda: [_change(comparison, task, metric) for task in comparison.tasks for metric in (_ERROR, _GAS)],
+        panels=partial(_change_panels, comparison),
         name="change",
         caption="Change against the baseline in each draw; the dashed line is the nominal device.",
         across=2,
@@ -295,6 +295,14 @@ _TICKS_OF_CHANGE = 4
 """Largest number of intervals between ticks: labels such as -98.85 do not touch."""
 _SHOWN_PERCENTILES = (0.5, 99.5)
 """Percentiles between which changes are plotted; a few distant ones would squeeze all others into one bar."""
+
+
+def _pareto_panels(comparison: ComparisonResult) -> list[Panel]:
+    return [_pareto(comparison, task) for task in comparison.tasks]
+
+
+def _change_panels(comparison: ComparisonResult) -> list[Panel]:
+    return [_change(comparison, task, metric) for task in comparison.tasks for metric in (_ERROR, _GAS)]
 
 
 def _pareto(comparison: ComparisonResult, task: TaskComparison) -> Panel:

@@ -1,6 +1,7 @@
 """Report of a sensitivity analysis: a table for each metric, and panels of the indices and their convergence."""
 
 import math
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -47,7 +48,7 @@ def finding_of(influences: Influences) -> Finding[Influences]:
         sentences.append(influences.gains)
     figure = Section(
         "Indices and their convergence",
-        panels=lambda: [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)],
+        panels=partial(_panels, influences),
         name="sensitivity",
         caption=_CAPTION.format(
             filled=_TITLES[method.shown[0]], open="".join(f", {_TITLES[name]} open" for name in method.shown[1:])
@@ -126,6 +127,10 @@ def remarks(influences: Influences, metric: MetricSensitivity) -> list[str]:
 def _colour_of(rank: int) -> str:
     """Return the colour of a value by its rank; grey for values beyond the lines of the convergence panel."""
     return COLOURS[rank] if rank < _MAXIMUM_LINES else GREY
+
+
+def _panels(influences: Influences) -> list[Panel]:
+    return [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)]
 
 
 def _bars(influences: Influences, metric: MetricSensitivity) -> Panel:

@@ -55,6 +55,10 @@ def test_the_columns_of_a_linear_model_are_differences_of_its_rates(case: str) -
     way = float(np.sign(values["angular_velocity"])) if "angular_velocity" in values else 0.0
     known = {"external_torque": 0.0, "angular_velocity": 0.0, "angle": run.initial.angle, **values}
     known = {**dict.fromkeys(valve_states(run.program), 0.0), **known}
+    # An actuator with one chamber has one supply and one pressure; nothing passes its other port.
+    room = scenario.device.supply.atmospheric_pressure
+    gas = {"pressure_2": room, "temperature_2": scenario.device.gas.temperature}
+    known = {"dorsiflexion_pressure": room, **gas, **known}
     plant = plant_of(run, way, known)
     for column, variable in enumerate(model.states):
         step = 1.0e-6 * max(abs(variable.value), 1.0)
