@@ -399,15 +399,20 @@ def after_commands(command: float, seconds: float) -> SafetyState:
 
 @pytest.mark.parametrize(("command", "name"), [(1.0, "pressure_1"), (-1.0, "pressure_2")])
 def test_a_chamber_that_was_filled_shows_pressure(command: float, name: str) -> None:
+    nominal = RULES.nominal._replace(nominal_dorsiflexion_pressure=4.0e5)
+    rules = RULES._replace(nominal=nominal)
     filled = GOOD._replace(pressure_1=3.0e5, pressure_2=3.0e5)
     empty = filled._replace(**{name: 1.0e5})
-    assert found(empty, state=after_commands(command, 0.052)) == fault_flags.NO_RISE
-    assert not vents(filled, state=after_commands(command, 0.052))
-    assert not vents(empty, state=after_commands(command, 0.048))
-    assert not vents(empty, state=after_commands(0.5 * command, 0.098)), "half open it takes twice as long"
-    assert vents(empty, state=after_commands(0.5 * command, 0.104))
-    assert not vents(empty, state=after_commands(0.05 * command, 20.0)), "within the overlap of a valve"
+    assert found(empty, state=after_commands(command, 0.052), rules=rules) == fault_flags.NO_RISE
+    assert not vents(filled, state=after_commands(command, 0.052), rules=rules)
+    assert not vents(empty, state=after_commands(command, 0.048), rules=rules)
+    assert not vents(empty, state=after_commands(0.5 * command, 0.098), rules=rules), "half open it takes twice as long"
+    assert vents(empty, state=after_commands(0.5 * command, 0.104), rules=rules)
+    assert not vents(empty, state=after_commands(0.05 * command, 20.0), rules=rules), "within the overlap of a valve"
     assert not vents(empty, state=after_commands(-command, 1.0))
+    if name == "pressure_2":
+        plugged = RULES._replace(nominal=RULES.nominal._replace(nominal_dorsiflexion_pressure=1.0e5))
+        assert not vents(empty, state=after_commands(command, 0.052), rules=plugged), "one chamber has no second port"
 
 
 @pytest.mark.parametrize("name", ["pressure_1", "pressure_2"])
