@@ -13,6 +13,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -187,15 +188,16 @@ def is_working_folder(folder: str | Path) -> bool:
         is_here = os.path.samefile(folder or ".", ".")  # noqa: PTH121
     except OSError:  # the search path has folders that are not there
         return False
-    return is_here and Path.cwd().resolve() not in _editable_folders()
+    return is_here and Path.cwd().resolve() not in _pth_folders(*site.getsitepackages(), site.getusersitepackages())
 
 
-def _editable_folders() -> set[Path]:
-    """Return the folders that path files (``.pth``) of the installed packages put on the search path."""
+# Python reads path files when it starts, and every lookup of a kind in a notebook asks for them.
+@lru_cache(maxsize=4)
+def _pth_folders(*packages: str) -> frozenset[Path]:
+    """Return the folders that path files (``.pth``) in folders of packages put on the search path."""
     folders = set()
-    for packages in map(Path, (*site.getsitepackages(), site.getusersitepackages())):
-        for file in packages.glob("*.pth"):
-            lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
-            folders |= {(packages / line.strip()).resolve() for line in lines if not line.startswith(("import", "#"))}
-        folders.discard(packages.resolve())
-    return folders
+    for file in (file for folder in packages for file in Path(folder).glob("*.pth")):
+        lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
+        folders |= {(file.parent / line.strip()).resolve() for line in lines if not line.startswith(("import", "#"))}
+    # An empty line stands for the folder of packages itself.
+    return frozenset(folders - {Path(folder).resolve() for folder in packages})

@@ -139,13 +139,14 @@ def test_a_law_is_named_by_module_and_object_from_the_working_folder(
 def test_the_folder_of_an_editable_package_is_searched_from_within_as_from_elsewhere(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    own, packages = tmp_path / "own", tmp_path / "packages"
-    own.mkdir()
-    packages.mkdir()
-    monkeypatch.chdir(own)
-    monkeypatch.setattr(plugins.site, "getsitepackages", lambda: [str(packages)])
-    assert plugins.is_working_folder(own)
+    own, empty, packages = (tmp_path / name for name in ("own", "empty", "packages"))
+    for folder in (own, empty, packages):
+        folder.mkdir()
     (packages / "mine.pth").write_text(f"import something\n{own}\n")
+    monkeypatch.chdir(own)
+    monkeypatch.setattr(plugins.site, "getsitepackages", lambda: [str(empty)])
+    assert plugins.is_working_folder(own)
+    monkeypatch.setattr(plugins.site, "getsitepackages", lambda: [str(packages)])
     assert not plugins.is_working_folder(own)
 
 

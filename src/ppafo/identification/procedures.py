@@ -287,7 +287,7 @@ def run_procedure(
     try:
         result = problem.run(sources, context)
     except IdentificationError as error:
-        # What is wrong with a file is told by its name, what is wrong with a procedure by its label in the problem.
+        # An error of a file names the file; an error of a procedure names the label of the procedure in the problem.
         if str(error).startswith((context.label, *(source.name for source in sources))):
             raise
         raise IdentificationError(f"{context.label}: {error}") from error

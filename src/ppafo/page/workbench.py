@@ -176,6 +176,7 @@ def known_intervals() -> Mapping[str, Interval]:
 
 
 def _title(joint: str) -> str:
+    """Return the title of a page for a joint by name; "joint" stands for devices of several joints."""
     if joint == ANKLE.name:
         return TITLE
     return "Powered orthoses, live" if joint == "joint" else f"The powered {joint} orthosis, live"

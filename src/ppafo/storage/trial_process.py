@@ -26,7 +26,7 @@ def read_on_trial(reader: str, library: str, path: str) -> int:
     import_module(library)
     read = pkgutil.resolve_name(reader)
     sizes = Path("/proc/self/statm")
-    # Only Linux tells the memory that is taken already, and limits what comes on top.
+    # Only Linux reports the memory in use and limits what is allocated beyond it.
     if sizes.exists():
         import resource
 

@@ -24,7 +24,7 @@ _REMEDY = "install gcc, clang or 'pip install ppafo[native]' anew"
 class _Platform:
     """Platform: its folder in a unit of FMI 2 (None: unsupported) and of FMI 3, compiler target and file suffix.
 
-    ``trial`` tells how the authors ran the binary of this platform.
+    ``trial`` describes how the authors ran the binary of this platform.
     """
 
     folder_2: str | None

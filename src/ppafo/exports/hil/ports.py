@@ -49,7 +49,7 @@ class _UdpPort:
         """Send a packet to the peer, if known."""
         if self._peer is None:
             return
-        # A full buffer or an answer that nobody listens is a lost packet, which is what UDP may do.
+        # A full buffer, or a peer that does not listen, loses the packet, as UDP allows.
         with contextlib.suppress(OSError):
             self._socket.sendto(data, self._peer)
 

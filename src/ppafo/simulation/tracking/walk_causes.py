@@ -35,7 +35,7 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
     if share <= _OFTEN:
         return None
     if np.mean(below > 0.0) > _OFTEN and -reaches[:, 0].min() <= ONE_WAY * reaches[:, 1].max():
-        # An actuator that pushes one way only, asked for a torque in dorsiflexion.
+        # Dorsiflexion torque requested from an actuator that pushes in plantarflexion only.
         asked, lowest = float(reference[places].min()), float(reaches[:, 0].min())
         text = (
             f"its controller asks for {level_text('N m', asked)}, where the actuator gives "
