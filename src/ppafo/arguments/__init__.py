@@ -14,6 +14,7 @@ from ppafo.arguments.words import Angle as Angle
 from ppafo.arguments.words import Confidence as Confidence
 from ppafo.arguments.words import Count as Count
 from ppafo.arguments.words import Duration as Duration
+from ppafo.arguments.words import FigureWidth as FigureWidth
 from ppafo.arguments.words import File as File
 from ppafo.arguments.words import FileOrName as FileOrName
 from ppafo.arguments.words import Flow as Flow

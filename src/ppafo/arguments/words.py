@@ -103,6 +103,7 @@ Minutes = Annotated[
 ]
 Mass = Annotated[float, _quantity_word("MASS", "kg", ABOVE_ZERO)]
 Length = Annotated[float, _quantity_word("LENGTH", "m", ABOVE_ZERO)]
+FigureWidth = Annotated[float, _quantity_word("WIDTH", "m", NumberRange(lowest=0.06, highest=0.4))]
 Time = Annotated[float, _quantity_word("TIME", "s")]
 Duration = Annotated[float, _quantity_word("TIME", "s", FROM_ZERO)]
 Patience = Annotated[float, _quantity_word("TIME", "s", NumberRange(above=0.0, highest=3600.0))]

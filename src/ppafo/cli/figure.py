@@ -1,6 +1,6 @@
 """``ppafo export figure DIR``: redraws the figures of a result folder without a new run."""
 
-from ppafo.arguments import File, Folder
+from ppafo.arguments import FigureWidth, File, Folder
 from ppafo.cli import output
 from ppafo.cli.output import CommandOutput
 from ppafo.errors import DataError
@@ -8,13 +8,14 @@ from ppafo.errors import DataError
 _FORMATS = ("png", "svg")
 
 
-def export_figure(folder: Folder, *, out: File | None = None) -> CommandOutput:
+def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth | None = None) -> CommandOutput:
     """Redraw the figures of a result folder.
 
     Figures of runs, walks, studies and rig recordings are drawn again; of other results it is said which there are.
 
     folder: a result folder written by ppafo
     out: a .png, .svg or .pdf file; default figure.png and figure.svg in DIR
+    width: width in print, such as "84 mm" for a column: 8 pt text, panels rearranged; default 145 mm and 10 pt
 
     >>> import ppafo
     >>> folder = ppafo.simulate("step-response").save("step")
@@ -22,7 +23,7 @@ def export_figure(folder: Folder, *, out: File | None = None) -> CommandOutput:
     written: step/figure.png, step/figure.svg
     """
     from ppafo.report.recording_figure import FIGURE_FORMATS
-    from ppafo.report.style import render_figure
+    from ppafo.report.style import drawn_at, render_figure
     from ppafo.storage.files import write_file
     from ppafo.storage.result_folder import add_to_folder
 
@@ -37,7 +38,8 @@ def export_figure(folder: Folder, *, out: File | None = None) -> CommandOutput:
 
     names = names_in(folder)
     load_drawing()
-    drawn = draw_folder(folder, names)
+    with drawn_at(width):
+        drawn = draw_folder(folder, names)
     if not drawn:
         message, document = what_is_there(folder, names)
         if out is not None:

@@ -16,7 +16,7 @@ from ppafo.report.display_units import display_unit, display_value, display_valu
 from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel
-from ppafo.report.style import BLACK, GREY, ORANGE
+from ppafo.report.style import BLACK, GREY, ORANGE, font_size
 from ppafo.units.shown import quantity_of_unit
 
 if TYPE_CHECKING:
@@ -202,7 +202,13 @@ def _panel(gait: Gait, name: str, imported: ImportedGait | None, is_first: bool)
         for at, height, text in ((0.0, 0.05, "heel strike"), (toe_off, 0.85, "toe-off")) if is_first else ():
             place, offset = ("data", "axes fraction"), "offset points"
             axes.annotate(
-                text, (at, height), xycoords=place, xytext=(3, 0), textcoords=offset, color=GREY, fontsize=8.5
+                text,
+                (at, height),
+                xycoords=place,
+                xytext=(3, 0),
+                textcoords=offset,
+                color=GREY,
+                fontsize=font_size(8.5),
             )
 
     legend = "inside" if is_first else ""

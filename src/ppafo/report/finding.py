@@ -16,7 +16,7 @@ from ppafo.errors import ArgumentError
 from ppafo.report.kind import PLAIN, ConfidenceInterval, Kind
 from ppafo.report.notebook import shown
 from ppafo.report.panels import Panel, draw_panels
-from ppafo.report.style import render_figure
+from ppafo.report.style import drawn_at, render_figure
 from ppafo.report.writing import align_columns, inline_figure, render_page
 from ppafo.signals import RecordingKind
 from ppafo.units.shown import in_units, units_in_force
@@ -236,11 +236,15 @@ class Finding(Generic[T_co]):
         return dict(plain(self.found) if document is None else document())
 
     @in_units(_units_of)
-    def plot(self, name: str | None = None) -> "matplotlib.figure.Figure":
-        """Return a figure of the report by name, by default the first; raises ArgumentError if there is none."""
+    def plot(self, name: str | None = None, width: float | str | None = None) -> "matplotlib.figure.Figure":
+        """Return a figure of the report by name, by default the first; raises ArgumentError if there is none.
+
+        ``width`` is the width in print, such as "84 mm", or a number [m], for which text and panels are arranged.
+        """
         figures = self.figures
         chosen = figures.get(name or next(iter(figures), ""))
-        drawn = None if chosen is None else chosen.drawn(self.kind)
+        with drawn_at(width):
+            drawn = None if chosen is None else chosen.drawn(self.kind)
         if drawn is None or isinstance(drawn, bytes):
             named = f"no figure '{name}'" if name else "no figure"
             available = (

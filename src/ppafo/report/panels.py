@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ppafo.report.kind import Kind
-from ppafo.report.style import BLUE, DASHES, VERMILION, house_style, mark_kind
+from ppafo.report.style import (
+    BLUE,
+    DASHES,
+    VERMILION,
+    font_size,
+    house_style,
+    lay_out,
+    mark_kind,
+    print_scale,
+    printed_width,
+)
 from ppafo.signals import RecordingKind
 from ppafo.units import without_exponent
 
@@ -78,6 +88,8 @@ _ENTRY, _ENTRY_LETTERS = 0.53, 14.5
 """Width of a legend entry without its name [inches], and letters of names per inch."""
 _ROW, _ABOVE = 13.0, 6.0
 """Height of a legend row, and distance from the axes to a title [points]."""
+_EDGES, _NARROWEST = 0.3, 2.4
+"""Width of a figure outside its panels, and least width of a panel beside another, at a font of 10 pt [inches]."""
 _LABEL_LETTERS, _AXIS_ROOM = 13.0, 0.55
 """Letters of an axis label per inch, and part of the panel height outside the axis [inches]."""
 _DASHED_SHAPES = ("line", "bars")
@@ -129,7 +141,9 @@ SHAPES: "Mapping[str, Callable[[Axes, Mark, Any, Any], object]]" = {
     "map": lambda axes, mark, x, y: axes.pcolormesh(
         x, y, mark.to, shading="nearest", rasterized=True, cmap="cividis", **mark.style
     ),
-    "text": lambda axes, mark, x, y: axes.text(x, y, mark.label, color=mark.colour, **mark.style),
+    "text": lambda axes, mark, x, y: axes.text(
+        x, y, mark.label, color=mark.colour, **{**mark.style, "fontsize": font_size(mark.style.get("fontsize", 10.0))}
+    ),
     "points": lambda axes, mark, x, y: axes.scatter(
         x, y, c=mark.to, s=9, linewidths=0, cmap="cividis", rasterized=True, **mark.style
     ),
@@ -157,12 +171,20 @@ def draw_panels(
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+    scale = print_scale()
+    # In inches of a figure with fonts of 10 points; all of it is smaller by the scale of the fonts.
+    width = printed_width(scale * (size[0] * across + _EDGES)) / scale
+    fitting = max(1, int((width - _EDGES) / _NARROWEST))
+    if fitting < across:
+        across = fitting
+        # What only kept a place beside another has none to keep.
+        panels = [panel for panel in panels if panel.marks or across > 1]
+    size = ((width - _EDGES) / across, size[1])
     rows = max(1, -(-len(panels) // across))
     heights = [max((panel.tall for panel in panels[across * row :][:across]), default=1.0) for row in range(rows)]
     # About 15 letters of this size go on an inch.
     notes = textwrap.wrap(note, round(15.0 * size[0] * across))
     below = _LINE * len(notes)
-    width = size[0] * across + 0.3
     # Beside the title stands what kind of numbers these are.
     lines = textwrap.wrap(title, max(_FEWEST_LETTERS, round(_LETTERS * (width - _KIND))))
     shared = next((panel for panel in panels if panel.legend == "figure"), None)
@@ -173,7 +195,8 @@ def draw_panels(
     height = size[1] * sum(heights) + 0.4 + below + legend_height
     with house_style():
         rect = (0.0, below / height, 1.0, 1.0 - (above + below) / height)
-        figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, rect=rect))
+        layout = ConstrainedLayoutEngine(w_pad=0.1 * scale, h_pad=0.08 * scale, rect=rect)
+        figure = Figure(figsize=(scale * width, scale * height), layout=layout)
         grid = list(figure.subplots(rows, across, squeeze=False, height_ratios=heights).flat)
         widened = _widened(panels, across)
         for number in widened:
@@ -201,12 +224,12 @@ def draw_panels(
             figure.legend(*handles, loc="upper left", bbox_to_anchor=anchor, ncols=names, **_OF_LEGEND)
         # Names and messages come from files: a dollar sign in them begins no formula.
         if title:
-            figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=11, parse_math=False)
+            figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=font_size(_TITLE_SIZE), parse_math=False)
         if notes:
-            figure.text(
-                0.012, 0.06 / height, "\n".join(notes), va="bottom", fontsize=9, color=VERMILION, parse_math=False
-            )
+            style = {"fontsize": font_size(9.0), "color": VERMILION, "parse_math": False}
+            figure.text(0.012, 0.06 / height, "\n".join(notes), va="bottom", **style)
         mark_kind(figure, kind)
+        lay_out(figure)
         return figure
 
 
@@ -282,7 +305,7 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float], title_size: flo
             )
         elif panel.legend == "inside":
             axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", handlelength=2.2)
-    axes.set_title(title, pad=pad, fontsize=title_size)
+    axes.set_title(title, pad=print_scale() * pad, fontsize=font_size(title_size))
     # Last, so that it can undo what Matplotlib chose.
     if panel.then is not None:
         panel.then(axes)

@@ -14,6 +14,7 @@ from ppafo.errors import DataError, UnitError
 from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.report.notebook import shown
 from ppafo.report.recording_figure import recording_figure
+from ppafo.report.style import drawn_at
 from ppafo.signals import Recording
 from ppafo.storage import StoredResult, read_stored
 from ppafo.storage.result_folder import RUN_FILE
@@ -47,7 +48,7 @@ def read_result(folder: str | Path) -> StoredResult:
     return replace(read_stored(folder), drawn_by=draw_stored_result)
 
 
-def draw_stored_result(stored: StoredResult) -> "Figure":
+def draw_stored_result(stored: StoredResult, width: float | str | None = None) -> "Figure":
     """Return the figure of a saved result, identical to the figure of ``Result.plot``.
 
     Raises DataError that names the invalid key of ``run.json``.
@@ -63,7 +64,7 @@ def draw_stored_result(stored: StoredResult) -> "Figure":
         if not isinstance(word, str):
             raise _other_form(file, f"scenario.device.joint.{name}", word, "a text")
     names = JointNames(**{name: one_line(word)[:_LONGEST_SHOWN] for name, word in joint.items()})
-    with shown_in(stated_units(file, document, device=("scenario", "device"))):
+    with shown_in(stated_units(file, document, device=("scenario", "device"))), drawn_at(width):
         return shown(recording_figure(stored.recording, one_line(title), _ending(file, document), valve, names))
 
 

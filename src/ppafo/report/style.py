@@ -3,10 +3,13 @@
 import io
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ppafo.arguments.values import accepted_values
+from ppafo.arguments.words import FigureWidth
 from ppafo.signals import RecordingKind
 
 if TYPE_CHECKING:
@@ -74,12 +77,9 @@ _SETTINGS: Any = MappingProxyType(
     {
         "font.family": "sans-serif",
         "font.sans-serif": ["DejaVu Sans"],
-        "font.size": 10.0,
-        "axes.titlesize": 11.0,
         "axes.titleweight": "normal",
         "axes.titlelocation": "left",
         "axes.titley": 1.0,  # where it stands anyway; to find that out costs a quarter of the time of drawing
-        "axes.labelsize": 10.0,
         "axes.edgecolor": GREY,
         "axes.labelcolor": BLACK,
         "axes.linewidth": 0.8,
@@ -99,7 +99,6 @@ _SETTINGS: Any = MappingProxyType(
         "lines.linewidth": 1.6,
         "lines.solid_capstyle": "round",
         "legend.frameon": False,
-        "legend.fontsize": 9.0,
         "figure.facecolor": "white",
         "savefig.dpi": RESOLUTION,
         # Letters as outlines, as a page fetches no font; ids that are the same every time.
@@ -107,6 +106,47 @@ _SETTINGS: Any = MappingProxyType(
         "svg.hashsalt": "ppafo",
     }
 )
+
+
+_FONT_SIZES = MappingProxyType(
+    {"font.size": 10.0, "axes.titlesize": 11.0, "axes.labelsize": 10.0, "legend.fontsize": 9.0}
+)
+"""Font sizes at full width [points]."""
+_FULL_WIDTH = 5.7
+"""Width of a figure from which on its font is 10 pt [inches]: 145 mm, the text of a thesis."""
+_SMALLEST_SCALE, _SMALLEST_TEXT = 0.8, 7.0
+"""Smallest size of fonts relative to a figure of full width, 8 pt for 10 pt, and smallest font size [points]."""
+_INCHES_PER_METRE = 1.0 / 0.0254
+_width: ContextVar[float | None] = ContextVar("_width", default=None)
+
+
+@contextmanager
+def drawn_at(width: float | str | None) -> Iterator[None]:
+    """Draw figures within a ``with`` block at a width: a text with its unit, or a number [m]; None for their own.
+
+    Raises ArgumentError for any other width.
+    """
+    metres = None if width is None else accepted_values(FigureWidth).take("width", width)
+    token = _width.set(_width.get() if metres is None else metres * _INCHES_PER_METRE)
+    try:
+        yield
+    finally:
+        _width.reset(token)
+
+
+def print_scale() -> float:
+    """Return the size of fonts and heights relative to a figure of full width [-]; 1 without a width."""
+    return min(1.0, max(_SMALLEST_SCALE, (_width.get() or _FULL_WIDTH) / _FULL_WIDTH))
+
+
+def printed_width(own: float) -> float:
+    """Return the width of a figure [inches]: the one asked for, else its own."""
+    return _width.get() or own
+
+
+def font_size(size: float) -> float:
+    """Return the font size [points] of a text that has this size at full width."""
+    return max(_SMALLEST_TEXT, size * print_scale())
 
 
 @contextmanager
@@ -118,6 +158,7 @@ def house_style() -> Iterator[None]:
         # Settings of the user's own file would change figures from computer to computer.
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS)
+        matplotlib.rcParams.update({name: font_size(size) for name, size in _FONT_SIZES.items()})
         yield
 
 
@@ -125,16 +166,21 @@ def render_figure(figure: "Figure", file_formats: Iterable[str]) -> dict[str, by
     """Return the content of files by format (``png``, ``svg``, ``pdf``); equal figures give equal bytes."""
     # A date would give the same figure other bytes every second.
     undated: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-    files, layout = {}, figure.get_layout_engine()
+    files = {}
     with house_style():
         for file_format in file_formats:
             buffer = io.BytesIO()
             figure.savefig(buffer, format=file_format, metadata=undated.get(file_format))
             files[file_format] = buffer.getvalue()
-            # Laid out once for all formats: measuring every text anew takes as long as drawing.
-            figure.set_layout_engine("none")
-    figure.set_layout_engine(layout)
     return files
+
+
+def lay_out(figure: "Figure") -> None:
+    """Place the panels once and for all: drawing is quicker, and another size of the figure keeps the proportions."""
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        layout.execute(figure)
+        figure.set_layout_engine("none")
 
 
 def mark_kind(figure: "Figure", kind: RecordingKind) -> None:
@@ -143,7 +189,8 @@ def mark_kind(figure: "Figure", kind: RecordingKind) -> None:
         return
     # In inches from the edge, as figures have many heights.
     inch = 1.0 / figure.get_figheight()
-    figure.text(0.972, 1.0 - 0.12 * inch, kind, ha="right", va="top", color=GREY, fontsize=9, style="italic")
+    size = font_size(9.0)
+    figure.text(0.972, 1.0 - 0.12 * inch, kind, ha="right", va="top", color=GREY, fontsize=size, style="italic")
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,8 +36,8 @@ class RecordedResult(Protocol):
     def status(self) -> Any:
         """End of the run: a ``Status``."""
 
-    def plot(self) -> "Figure":
-        """Return the figure of the result."""
+    def plot(self, width: float | str | None = None) -> "Figure":
+        """Return the figure of the result at a width in print."""
 
 
 def channel_values(self: RecordedResult, channel: str | tuple[str, str]) -> Floats:

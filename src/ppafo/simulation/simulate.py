@@ -149,15 +149,20 @@ class Result:
         return "\n".join([f"{self.scenario.name}: {self.status.kind}", *said, "", *metrics_lines(self.metrics)])
 
     @in_units(_units_of)
-    def plot(self) -> "Figure":
-        """Return a figure of angle, pressures, torque, command and gas; ``.savefig(...)`` saves it."""
+    def plot(self, width: float | str | None = None) -> "Figure":
+        """Return a figure of angle, pressures, torque, command and gas; ``.savefig(...)`` saves it.
+
+        ``width`` is the width in print, such as "84 mm", or a number [m]; by default 145 mm.
+        """
         from ppafo.report.notebook import shown
         from ppafo.report.recording_figure import recording_figure
+        from ppafo.report.style import drawn_at
 
         remark = "" if self.status.is_completed else self.status.message
         valve = self.scenario.device.valve.kind
         joint = self.scenario.device.joint
-        return shown(recording_figure(self.recording, self.scenario.name, remark, valve, joint))
+        with drawn_at(width):
+            return shown(recording_figure(self.recording, self.scenario.name, remark, valve, joint))
 
     @in_units(_units_of)
     def error(self) -> "ErrorEstimate":

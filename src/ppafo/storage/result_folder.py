@@ -38,21 +38,21 @@ SCHEMA_VERSION = 1
 class StoredResult:
     """Content of a result folder: the recording, and ``run.json`` as plain data.
 
-    ``drawn_by`` is the function that draws the figure.
+    ``drawn_by`` is the function that draws the figure at a width.
     """
 
     folder: Path
     recording: Recording
     document: Mapping[str, Any]
-    drawn_by: "Callable[[StoredResult], Figure] | None" = field(default=None, compare=False)
+    drawn_by: "Callable[[StoredResult, float | str | None], Figure] | None" = field(default=None, compare=False)
 
     def __repr__(self) -> str:
         return f"StoredResult in {self.folder}: {', '.join(self.document)}\n{self.recording!r}"
 
-    def plot(self) -> "Figure":
+    def plot(self, width: float | str | None = None) -> "Figure":
         """Return the same figure as ``Result.plot``; ``.savefig(...)`` writes it to a file."""
         assert self.drawn_by is not None, "read by ppafo.read_result"
-        return self.drawn_by(self)
+        return self.drawn_by(self, width)
 
 
 def write_result(

@@ -253,12 +253,17 @@ class WalkResult:
         return "\n".join([f"{self.scenario.name}: {self.status.kind}", *verdict, "", *metrics_lines(self.metrics)])
 
     @in_units(_units_of)
-    def plot(self) -> "Figure":
-        """Return a figure of the mean stride and of the healthy gait; ``.savefig(...)`` writes the figure to a file."""
+    def plot(self, width: float | str | None = None) -> "Figure":
+        """Return a figure of the mean stride and of the healthy gait; ``.savefig(...)`` writes the figure to a file.
+
+        ``width`` is the width in print, such as "84 mm", or a number [m]; by default 145 mm.
+        """
         from ppafo.report.notebook import shown
+        from ppafo.report.style import drawn_at
         from ppafo.walking.figures.mean_stride import walk_figure
 
-        return shown(walk_figure({self.scenario.name: self}))
+        with drawn_at(width):
+            return shown(walk_figure({self.scenario.name: self}))
 
     __getitem__ = at_hand.channel_values
     _ipython_key_completions_ = at_hand.channel_names

@@ -22,6 +22,7 @@ from ppafo.report.style import (
     REFERENCE,
     SOLENOID,
     DrawingStyle,
+    font_size,
 )
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
@@ -126,10 +127,10 @@ def _enlarge(frame: tuple[float, float, float, float], ends: tuple[float, float]
             copied.set_linewidth(line.get_linewidth())
     inset.margins(y=0.08)
     inset.set_xlim(-0.05 * _ENLARGED, _ENLARGED)
-    inset.tick_params(labelsize=7.0, length=2.0)
+    inset.tick_params(labelsize=font_size(7.0), length=2.0)
     inset.set_xticks([0.0, 0.5 * _ENLARGED, _ENLARGED])
     inset.locator_params(axis="y", nbins=3)
-    inset.set_title(f"first {_ENLARGED:.0f} ms", fontsize=7.5, color=GREY, loc="center", pad=2.0)
+    inset.set_title(f"first {_ENLARGED:.0f} ms", fontsize=font_size(7.5), color=GREY, loc="center", pad=2.0)
 
 
 _TORQUE, _GAS = Kind("Torque", "N m", "torque"), Kind("CO$_2$", "kg", "gas mass")

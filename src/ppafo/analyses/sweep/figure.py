@@ -12,7 +12,7 @@ from ppafo.report.finding import Section
 from ppafo.report.kind import TIME, Kind, of_channel, of_path
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
-from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
+from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION, font_size
 from ppafo.signals.recording import CHANNELS
 from ppafo.studies.sampling import NOISE
 
@@ -220,4 +220,4 @@ def _band(results: StudyResults, channel: str, names: Sequence[str]) -> Panel:
     kind = of_channel(channel, CHANNELS[channel].unit)
     percentages = ", ".join(f"{100.0 * fraction:g}" for fraction in fractions)
     title = f"{percentages} % of runs below"
-    return Panel(TIME, kind, marks, then=lambda axes: axes.set_title(title, fontsize=9))
+    return Panel(TIME, kind, marks, then=lambda axes: axes.set_title(title, fontsize=font_size(9.0)))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.report.display_units import axis_unit, display_value, display_values
-from ppafo.report.style import GREY, FigureMargins, figure_of_panels, house_style, mark_kind
+from ppafo.report.style import GREY, FigureMargins, figure_of_panels, font_size, house_style, mark_kind
 from ppafo.signals.recording import Floats
 from ppafo.walking.figures.legs import CHAMBERS, GHOST, draw_ground, last_phases, leg_artists, legs_of
 from ppafo.walking.figures.mean_stride import WITH
@@ -95,7 +95,7 @@ def strip_figure(result: WalkResult) -> "Figure":
         title = f"{result.scenario.name}: functional tasks of the paper's figure 1A over the stride"
         figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
         remark = "height of each colour: fraction of strides"
-        figure.text(0.12 / width, 1.0 - 0.34 / height, remark, ha="left", va="top", fontsize=8.5, color=GREY)
+        figure.text(0.12 / width, 1.0 - 0.34 / height, remark, ha="left", va="top", fontsize=font_size(8.5), color=GREY)
         mark_kind(figure, result.recording.kind)
         return figure
 
@@ -122,12 +122,20 @@ def _draw_band(axes: "Axes", label: str, fractions: Floats, states: tuple[_State
             left, right = _PERCENT[first], _PERCENT[last - 1]
             x, y = 0.5 * (left + right), float(np.mean(middle[first:last]))
             if right - left >= _NARROW:
-                axes.text(x, y, state.name, ha="center", va="center", fontsize=9.0)
+                axes.text(x, y, state.name, ha="center", va="center", fontsize=font_size(9.0))
             elif right - left >= _NARROWEST:
-                axes.text(x, y, state.short, ha="center", va="center", fontsize=8.0, rotation=90)
+                axes.text(x, y, state.short, ha="center", va="center", fontsize=font_size(8.0), rotation=90)
         below = below + fraction
     if not below.any():
-        axes.text(50.0, 0.5, "no gait phases in this controller", ha="center", va="center", fontsize=9.0, color=GREY)
+        axes.text(
+            50.0,
+            0.5,
+            "no gait phases in this controller",
+            ha="center",
+            va="center",
+            fontsize=font_size(9.0),
+            color=GREY,
+        )
     axes.set_ylim(0.0, 1.0)
     axes.set_yticks([])
     axes.grid(visible=False)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.report.style import CHAMBER_1, CHAMBER_2, GREY, house_style, mark_kind
+from ppafo.report.style import CHAMBER_1, CHAMBER_2, GREY, font_size, house_style, mark_kind
 from ppafo.signals.recording import Floats
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.gait_series import Posture, ankle_path, gait_timing
@@ -135,7 +135,7 @@ def frames_figure(comparison: WalkComparison) -> "Figure":
         name = comparison.with_device.scenario.name
         figure.text(0.12 / width, 1 - 0.12 / height, f"{name}: one stride", ha="left", va="top", fontweight="bold")
         remark = "grey outline: the healthy foot; cross: toes more than 1 cm below ground; percent of the stride below"
-        figure.text(0.12 / width, 1 - 0.36 / height, remark, ha="left", va="top", fontsize=9, color=GREY)
+        figure.text(0.12 / width, 1 - 0.36 / height, remark, ha="left", va="top", fontsize=font_size(9.0), color=GREY)
         mark_kind(figure, comparison.with_device.recording.kind)
         return figure
 
@@ -154,8 +154,8 @@ def _draw_frames(axes: "Axes", result: WalkResult, label: str, colour: str) -> N
             toe = legs.worn.toe[index] - (offset, 0.0)
             axes.plot(toe[0], toe[1], "x", color=DRAGS, markersize=9, markeredgewidth=2.2, zorder=5)
         percent = f"{100.0 * (turns[index] % 1.0):.0f} %"
-        axes.text(middle, -0.135, percent, ha="center", va="top", fontsize=8.5, color=GREY)
-    axes.text(0.0, 0.66, label, ha="left", va="top", color=colour, fontsize=10.5)
+        axes.text(middle, -0.135, percent, ha="center", va="top", fontsize=font_size(8.5), color=GREY)
+    axes.text(0.0, 0.66, label, ha="left", va="top", color=colour, fontsize=font_size(10.5))
     axes.set_xlim(0.0, _SLOT * turns.size)
     axes.set_ylim(-0.22, 0.68)
     axes.set_aspect("equal", adjustable="box")

@@ -9,7 +9,7 @@ from ppafo.gait.gait import clinical_angle
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
-from ppafo.report.style import BLACK, GREY
+from ppafo.report.style import BLACK, GREY, font_size
 from ppafo.signals.recording import Floats, Recording
 from ppafo.walking.figures.axes import GAS, GROUND, THIN, TOES
 from ppafo.walking.figures.mean_stride import ANGLE, WITH, WITHOUT
@@ -100,7 +100,7 @@ def _name_segments(worn: WalkResult, pace: Floats, axes: "Axes") -> None:
             rotation=90.0 if is_narrow else 0.0,
             ha="center",
             va="top",
-            fontsize=8,
+            fontsize=font_size(8.0),
             color=BLACK,
         )
         # Readable where a line goes through it.

@@ -10,7 +10,7 @@ import numpy as np
 from ppafo.model.helping import HELPS, LIFTS, PAUSED, STOPPED
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
-from ppafo.report.style import BLACK, GREY, VERMILION
+from ppafo.report.style import BLACK, GREY, VERMILION, font_size
 from ppafo.signals.recording import Recording
 from ppafo.walking.figures.axes import GAS, GROUND, THIN, TOES, time_axis
 from ppafo.walking.result import WalkResult
@@ -85,7 +85,7 @@ def _name_failures(failed: Mapping[str, float], end: float, axis: Kind, axes: "A
             xycoords=("data", "axes fraction"),
             ha="left" if time < _TURNS * end else "right",
             va="top",
-            fontsize=8.5,
+            fontsize=font_size(8.5),
             color=GREY,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
         )
@@ -111,7 +111,7 @@ def _level_panel(recording: Recording, axis: Kind) -> Panel:
 
     def name_levels(axes: "Axes") -> None:
         for middle, name in names.items():
-            axes.text(middle, 0.5, name, ha="center", va="center", fontsize=9.0)
+            axes.text(middle, 0.5, name, ha="center", va="center", fontsize=font_size(9.0))
         axes.set_ylim(0.0, 1.0)
         axes.set_yticks([])
         axes.grid(visible=False)
