@@ -71,8 +71,9 @@ class Kind:
 
     @property
     def axis(self) -> str:
-        """Label with unit, for an axis."""
-        return f"{self.words} ({self.axis_unit})" if self.axis_unit else self.words
+        """Label with unit, for an axis; a remark in the label, after a semicolon, stands behind the unit."""
+        words, semicolon, remark = self.words.partition(";")
+        return f"{words} ({self.axis_unit}){semicolon}{remark}" if self.axis_unit else self.words
 
     @property
     def axis_unit(self) -> str:

@@ -13,7 +13,8 @@ from ppafo.report.kind import Kind
 from ppafo.report.style import (
     BLUE,
     DASHES,
-    VERMILION,
+    FULL_WIDTH,
+    GREY,
     font_size,
     house_style,
     lay_out,
@@ -88,6 +89,8 @@ _ENTRY, _ENTRY_LETTERS = 0.53, 14.5
 """Width of a legend entry without its name [inches], and letters of names per inch."""
 _ROW, _ABOVE = 13.0, 6.0
 """Height of a legend row, and distance from the axes to a title [points]."""
+_HIGHEST = 9.4
+"""Largest height of a figure [inches]: the text of a page."""
 _EDGES, _NARROWEST = 0.3, 2.4
 """Width of a figure outside its panels, and least width of a panel beside another, at a font of 10 pt [inches]."""
 _LABEL_LETTERS, _AXIS_ROOM = 13.0, 0.55
@@ -173,7 +176,7 @@ def draw_panels(
 
     scale = print_scale()
     # In inches of a figure with fonts of 10 points; all of it is smaller by the scale of the fonts.
-    width = printed_width(scale * (size[0] * across + _EDGES)) / scale
+    width = printed_width(min(scale * (size[0] * across + _EDGES), FULL_WIDTH)) / scale
     fitting = max(1, int((width - _EDGES) / _NARROWEST))
     if fitting < across:
         across = fitting
@@ -192,7 +195,15 @@ def draw_panels(
     legend_height = 0.0 if shared is None else _LINE * max(1, legend_rows) + _UNDER_NAMES
     # A title makes its own room.
     above = legend_height if title else max(_TOP, legend_height)
-    height = size[1] * sum(heights) + 0.4 + below + legend_height
+    # Rows of a legend beyond the first one take their height from no panel.
+    legends = [
+        max(0, _legend_rows(panel, _title(panel), size[0] - _AXIS_ROOM)[1] - 1) if panel.legend == "above" else 0
+        for panel in panels
+    ]
+    legend_lines = sum(max(legends[across * row :][:across], default=0) for row in range(rows))
+    around = 0.4 + below + legend_height + _LINE * legend_lines
+    height = min(size[1] * sum(heights) + around, _HIGHEST / scale)
+    size = (size[0], (height - around) / sum(heights))
     with house_style():
         rect = (0.0, below / height, 1.0, 1.0 - (above + below) / height)
         layout = ConstrainedLayoutEngine(w_pad=0.1 * scale, h_pad=0.08 * scale, rect=rect)
@@ -226,7 +237,7 @@ def draw_panels(
         if title:
             figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=font_size(_TITLE_SIZE), parse_math=False)
         if notes:
-            style = {"fontsize": font_size(9.0), "color": VERMILION, "parse_math": False}
+            style = {"fontsize": font_size(9.0), "color": GREY, "parse_math": False}
             figure.text(0.012, 0.06 / height, "\n".join(notes), va="bottom", **style)
         mark_kind(figure, kind)
         lay_out(figure)

@@ -1,6 +1,7 @@
 """Common style of all figures: fonts, colours, sizes, grids of panels, and rendering to bytes."""
 
 import io
+import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -112,7 +113,7 @@ _FONT_SIZES = MappingProxyType(
     {"font.size": 10.0, "axes.titlesize": 11.0, "axes.labelsize": 10.0, "legend.fontsize": 9.0}
 )
 """Font sizes at full width [points]."""
-_FULL_WIDTH = 5.7
+FULL_WIDTH = 5.7
 """Width of a figure from which on its font is 10 pt [inches]: 145 mm, the text of a thesis."""
 _SMALLEST_SCALE, _SMALLEST_TEXT = 0.8, 7.0
 """Smallest size of fonts relative to a figure of full width, 8 pt for 10 pt, and smallest font size [points]."""
@@ -136,7 +137,7 @@ def drawn_at(width: float | str | None) -> Iterator[None]:
 
 def print_scale() -> float:
     """Return the size of fonts and heights relative to a figure of full width [-]; 1 without a width."""
-    return min(1.0, max(_SMALLEST_SCALE, (_width.get() or _FULL_WIDTH) / _FULL_WIDTH))
+    return min(1.0, max(_SMALLEST_SCALE, (_width.get() or FULL_WIDTH) / FULL_WIDTH))
 
 
 def printed_width(own: float) -> float:
@@ -188,7 +189,7 @@ def mark_kind(figure: "Figure", kind: RecordingKind) -> None:
     if kind == "measured":
         return
     # In inches from the edge, as figures have many heights.
-    inch = 1.0 / figure.get_figheight()
+    inch = print_scale() / figure.get_figheight()
     size = font_size(9.0)
     figure.text(0.972, 1.0 - 0.12 * inch, kind, ha="right", va="top", color=GREY, fontsize=size, style="italic")
 
@@ -213,7 +214,7 @@ def figure_of_panels(
     columns: int = 1,
     heights: Sequence[float] | None = None,
 ) -> "tuple[Figure, list[list[Axes]]]":
-    """Return a figure of this width and height [inches] and its panels by row, with a shared horizontal axis."""
+    """Return a figure of a width and height [inches] at full width, and its panels by row over a shared axis."""
     figure, panel_width = figure_with_margins(size, margins, rows, columns)
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False, height_ratios=heights).tolist()
     for axes in figure.axes:
@@ -224,13 +225,15 @@ def figure_of_panels(
 def figure_with_margins(
     size: tuple[float, float], margins: FigureMargins, rows: int, columns: int
 ) -> "tuple[Figure, float]":
-    """Return an empty figure with margins, and the width of a panel [inches]."""
+    """Return an empty figure with margins, and the width of a panel [inches], both at full width."""
     from matplotlib.figure import Figure
 
-    width, height = size
+    scale, height = print_scale(), size[1]
+    # In inches of a figure of full width; all of it is smaller by the scale of the fonts.
+    width = printed_width(scale * size[0]) / scale
     panel_width = (width - margins.left - margins.right - (columns - 1) * margins.column_gap) / columns
     panel_height = (height - margins.top - margins.bottom - (rows - 1) * margins.row_gap) / rows
-    figure = Figure(figsize=size)
+    figure = Figure(figsize=(scale * width, scale * height))
     figure.subplots_adjust(
         left=margins.left / width,
         bottom=margins.bottom / height,
@@ -240,3 +243,14 @@ def figure_with_margins(
         hspace=margins.row_gap / panel_height,
     )
     return figure, panel_width
+
+
+def write_head(figure: "Figure", title: str, remark: str, kind: RecordingKind) -> None:
+    """Write title, grey remark below it, and kind of the numbers at the top of a figure without a layout engine."""
+    width, height = (length / print_scale() for length in figure.get_size_inches())
+    # About 15 letters of the remark go on an inch.
+    below = "\n".join(textwrap.wrap(remark, round(15.0 * width)))
+    for text, top, size, colour in ((title, 0.12, 11.0, BLACK), (below, 0.36, 9.0, GREY)):
+        style: dict[str, Any] = {"fontsize": font_size(size), "color": colour, "parse_math": False}
+        figure.text(0.12 / width, 1.0 - top / height, text, ha="left", va="top", **style)
+    mark_kind(figure, kind)

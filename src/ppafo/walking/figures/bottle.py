@@ -59,7 +59,9 @@ def bottle_figure(result: WalkResult) -> "Figure":
         behind.append(Mark("band", strikes, span, label="line, in a stride", style={"alpha": 0.3}))
     regulator = supply.supply.bottle.regulator
     needed = regulator.set_pressure + regulator.pressure_margin
-    panel = partial(_panel, end, Mark("at", supply.ending.time, colour=VERMILION, style={"linewidth": 1.0}))
+    panel = partial(
+        _panel, end, Mark("at", supply.ending.time, label="end", colour=VERMILION, style={"linewidth": 1.0})
+    )
     return draw_panels(
         [
             panel(Kind("Pressure behind the regulator", "Pa_a", "pressure"), behind),
@@ -79,7 +81,7 @@ def bottle_figure(result: WalkResult) -> "Figure":
             ),
             panel(Kind("Left in the bottle", "kg", "gas mass"), left, largest=supply.supply.mass),
         ],
-        size=(5.6, 1.6),
+        size=(5.4, 1.6),
         title=f"{result.scenario.name} on {supply.supply.bottle.name}",
         note=f"End: {supply.ending.message}.",
         kind=recording.kind,

@@ -9,7 +9,16 @@ from numpy.typing import NDArray
 
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.report.display_units import axis_unit, display_value, display_values
-from ppafo.report.style import GREY, FigureMargins, figure_of_panels, font_size, house_style, mark_kind
+from ppafo.report.style import (
+    GREY,
+    FigureMargins,
+    figure_of_panels,
+    font_size,
+    house_style,
+    print_scale,
+    printed_width,
+    write_head,
+)
 from ppafo.signals.recording import Floats
 from ppafo.walking.figures.legs import CHAMBERS, GHOST, draw_ground, last_phases, leg_artists, legs_of
 from ppafo.walking.figures.mean_stride import WITH
@@ -20,16 +29,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_SIZE = (9.4, 6.0)
-"""Width and height [inch]."""
-_MARGINS = FigureMargins(left=1.3, right=0.2, top=0.55, bottom=0.52, row_gap=0.22, label=0.5)
-_HEIGHTS = (1.75, 0.7, 0.7, 0.7, 1.35)
+_SIZE = (5.7, 6.1)
+"""Width and height at full width [inch]."""
+_MARGINS = FigureMargins(left=0.85, right=0.22, top=0.62, bottom=0.52, row_gap=0.34, label=0.42)
+_HEIGHTS = (1.5, 0.72, 0.72, 0.72, 1.3)
 """Heights of the rows relative to each other: legs, three bands, pressures."""
 _PERCENT = 100.0 * PHASES
-_FRAMES = 8
-"""Number of legs over the stride."""
-_NARROW, _NARROWEST = 9.0, 2.5
-"""Width of a block [percent of the stride] below which its name is vertical, and below which the name is left out."""
+_FRAMES, _FEW_FRAMES = 8, 5
+"""Number of legs over the stride, and in a narrower figure."""
+_LETTER, _LINE = 0.082, 0.14
+"""Width of a letter, and height of a line, of a name in a block at full width [inches]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,12 +100,8 @@ def strip_figure(result: WalkResult) -> "Figure":
         _draw_pressures(rows[4], result)
         rows[4].set_xlabel("Stride (%)")
         rows[4].set_xlim(0.0, 100.0)
-        width, height = _SIZE
-        title = f"{result.scenario.name}: functional tasks of the paper's figure 1A over the stride"
-        figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
         remark = "height of each colour: fraction of strides"
-        figure.text(0.12 / width, 1.0 - 0.34 / height, remark, ha="left", va="top", fontsize=font_size(8.5), color=GREY)
-        mark_kind(figure, result.recording.kind)
+        write_head(figure, f"{result.scenario.name}: tasks over the stride", remark, result.recording.kind)
         return figure
 
 
@@ -115,16 +120,18 @@ def _draw_band(axes: "Axes", label: str, fractions: Floats, states: tuple[_State
     below = np.zeros(PHASES.size)
     for state, fraction in zip(states, fractions, strict=True):
         axes.fill_between(_PERCENT, below, below + fraction, color=state.colour, linewidth=0.0, step="mid")
-        # Write the name into every block that is wide enough and holds for most strides.
+        # Write the name into every block that holds for most strides, as it fits: whole, short, upright, or not.
         middle = below + 0.5 * fraction
         inside = np.flatnonzero(np.diff(np.concatenate([[0], (fraction > 0.5).astype(int), [0]])))
         for first, last in zip(inside[::2], inside[1::2], strict=True):
             left, right = _PERCENT[first], _PERCENT[last - 1]
             x, y = 0.5 * (left + right), float(np.mean(middle[first:last]))
-            if right - left >= _NARROW:
-                axes.text(x, y, state.name, ha="center", va="center", fontsize=font_size(9.0))
-            elif right - left >= _NARROWEST:
-                axes.text(x, y, state.short, ha="center", va="center", fontsize=font_size(8.0), rotation=90)
+            space = 0.01 * (right - left) * (printed_width(_SIZE[0]) / print_scale() - _MARGINS.left - _MARGINS.right)
+            name = next((name for name in (state.name, state.short) if _LETTER * len(name) <= space), state.short)
+            if _LETTER * len(name) <= space:
+                axes.text(x, y, name, ha="center", va="center", fontsize=font_size(9.0))
+            elif space >= _LINE:
+                axes.text(x, y, name, ha="center", va="center", fontsize=font_size(8.0), rotation=90)
         below = below + fraction
     if not below.any():
         axes.text(
@@ -141,18 +148,16 @@ def _draw_band(axes: "Axes", label: str, fractions: Floats, states: tuple[_State
     axes.grid(visible=False)
     axes.spines["left"].set_visible(False)
     axes.tick_params(axis="x", length=0.0)
-    axes.set_ylabel(label, rotation=0, ha="right", va="center")
-    axes.yaxis.set_label_coords(-0.012, 0.5)
+    axes.set_title(label, pad=3.0, fontsize=font_size(10.0))
 
 
 def _draw_legs(axes: "Axes", result: WalkResult) -> None:
     """Draw stick figures above the strip, each at its instant, in axes scaled in metres over the same percent axis."""
-    turns = last_phases(result, 1, _FRAMES) + 0.5 / _FRAMES
+    frames = _FRAMES if printed_width(_SIZE[0]) >= _SIZE[0] else _FEW_FRAMES
+    turns = last_phases(result, 1, frames) + 0.5 / frames
     legs = legs_of(result, turns)
-    panel_width = _SIZE[0] - _MARGINS.left - _MARGINS.right
-    panel_height = axes.get_position().height * _SIZE[1]
-    height = 0.7
-    metres = height * panel_width / panel_height
+    box, height = axes.get_window_extent(), 0.7
+    metres = height * box.width / box.height
     inner = axes.inset_axes((0.0, 0.0, 1.0, 1.0))
     draw_ground(inner, 0.0, metres)
     for index in range(turns.size):
@@ -172,7 +177,8 @@ def _draw_pressures(axes: "Axes", result: WalkResult) -> None:
             mean = display_values(result.averages[channel].mean, "pressure")
             axes.plot(_PERCENT, mean, color=look.colour, linestyle=look.line, label=name)
     axes.axhline(display_value(atmosphere, "pressure"), color=GREY, linewidth=0.8)
-    axes.set_ylabel(f"Chambers\n({axis_unit('pressure')})", rotation=0, ha="right", va="center")
-    axes.yaxis.set_label_coords(-0.045, 0.5)
+    axes.set_ylabel(f"Pressure\n({axis_unit('pressure')})")
     axes.locator_params(axis="y", nbins=4)
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderaxespad=0.1, handlelength=1.6)
+    axes.legend(
+        loc="lower right", bbox_to_anchor=(1.02, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.6, columnspacing=1.0
+    )

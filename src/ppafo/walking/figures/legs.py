@@ -5,7 +5,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.report.style import CHAMBER_1, CHAMBER_2, GREY, font_size, house_style, mark_kind
+from ppafo.report.style import (
+    CHAMBER_1,
+    CHAMBER_2,
+    GREY,
+    font_size,
+    house_style,
+    print_scale,
+    printed_width,
+    write_head,
+)
 from ppafo.signals.recording import Floats
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.gait_series import Posture, ankle_path, gait_timing
@@ -28,12 +37,14 @@ DRAG_LIMIT = -0.01
 CHAMBERS = (("pressure_1", "plantarflexion", CHAMBER_1), ("pressure_2", "dorsiflexion", CHAMBER_2))
 """Channel, name and line style of each chamber."""
 
-_SIZE = (10.4, 3.75)
-"""Width and height of the frames [inch]."""
-_FRAMES = 10
-"""Number of legs in the picture of one stride."""
+_WIDTH, _EDGE, _HEAD = 5.7, 0.015, 0.66
+"""Width of the figure [inch], margin at its sides [widths], and height of its title and remark [inch]."""
+_FRAMES, _FEW_FRAMES = 10, 5
+"""Number of legs in the picture of one stride, and in a narrower one."""
 _SLOT = 0.62
 """Width of the ground under one frame [m]."""
+_VIEW = (-0.36, 0.86)
+"""Lowest and highest point of a row [m]: below the ground is the percent of the stride, above the legs the name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,41 +133,46 @@ def drags(legs: LegPostures, index: int) -> bool:
 
 
 def frames_figure(comparison: WalkComparison) -> "Figure":
-    """Return a figure of ten instants of one stride, without the device (top) and with the device (bottom)."""
+    """Return a figure of instants of one stride, without the device (top) and with the device (bottom)."""
     from matplotlib.figure import Figure
 
     with house_style():
-        figure = Figure(figsize=_SIZE)
-        figure.subplots_adjust(left=0.012, right=0.988, top=0.86, bottom=0.01, hspace=0.04)
+        width, scale = printed_width(_WIDTH), print_scale()
+        count = _FRAMES if width >= _WIDTH else _FEW_FRAMES
+        # As high as the legs of a row are in frames of this width.
+        row = (1.0 - 2.0 * _EDGE) * width * (_VIEW[1] - _VIEW[0]) / (_SLOT * count)
+        height = scale * _HEAD + 2.0 * row
+        figure = Figure(figsize=(width, height))
+        figure.subplots_adjust(left=_EDGE, right=1.0 - _EDGE, top=1.0 - scale * _HEAD / height, bottom=0.01, hspace=0.0)
         rows = figure.subplots(2, 1, sharex=True)
-        _draw_frames(rows[0], comparison.without_device, "without the device", WITHOUT)
-        _draw_frames(rows[1], comparison.with_device, "with the device", WITH)
-        width, height = _SIZE
-        name = comparison.with_device.scenario.name
-        figure.text(0.12 / width, 1 - 0.12 / height, f"{name}: one stride", ha="left", va="top", fontweight="bold")
-        remark = "grey outline: the healthy foot; cross: toes more than 1 cm below ground; percent of the stride below"
-        figure.text(0.12 / width, 1 - 0.36 / height, remark, ha="left", va="top", fontsize=font_size(9.0), color=GREY)
-        mark_kind(figure, comparison.with_device.recording.kind)
+        _draw_frames(rows[0], comparison.without_device, "without the device", WITHOUT, count)
+        _draw_frames(rows[1], comparison.with_device, "with the device", WITH, count)
+        remark = "outline: healthy foot; cross: toes more than 1 cm below ground"
+        worn = comparison.with_device
+        write_head(figure, f"{worn.scenario.name}: one stride", remark, worn.recording.kind)
         return figure
 
 
-def _draw_frames(axes: "Axes", result: WalkResult, label: str, colour: str) -> None:
-    """Draw the legs of one stride side by side, each with the healthy leg and its percent of the stride."""
-    turns = last_phases(result, 1, _FRAMES)
+def _draw_frames(axes: "Axes", result: WalkResult, label: str, colour: str, count: int) -> None:
+    """Draw ``count`` legs of one stride side by side, each with the healthy leg and its percent of the stride."""
+    turns = last_phases(result, 1, count)
+    if count < _FRAMES:
+        # Of few instants some are in the middle of stance, of push-off and of the swing.
+        turns = turns + 0.5 / count
     legs = legs_of(result, turns)
     draw_ground(axes, 0.0, _SLOT * turns.size)
     for index in range(turns.size):
         middle = _SLOT * (index + 0.47)
         offset = legs.healthy.ankle[index, 0] - middle
-        leg_artists(axes, GHOST, 1.5, is_ghost=True).place(legs.healthy, index, offset)
-        leg_artists(axes, colour, 3.0).place(legs.worn, index, offset)
+        leg_artists(axes, GHOST, 1.0, is_ghost=True).place(legs.healthy, index, offset)
+        leg_artists(axes, colour, 2.2).place(legs.worn, index, offset)
         if drags(legs, index):
             toe = legs.worn.toe[index] - (offset, 0.0)
-            axes.plot(toe[0], toe[1], "x", color=DRAGS, markersize=9, markeredgewidth=2.2, zorder=5)
+            axes.plot(toe[0], toe[1], "x", color=DRAGS, markersize=7, markeredgewidth=1.8, zorder=5)
         percent = f"{100.0 * (turns[index] % 1.0):.0f} %"
-        axes.text(middle, -0.135, percent, ha="center", va="top", fontsize=font_size(8.5), color=GREY)
-    axes.text(0.0, 0.66, label, ha="left", va="top", color=colour, fontsize=font_size(10.5))
+        axes.text(middle, -0.19, percent, ha="center", va="top", fontsize=font_size(8.5), color=GREY)
+    axes.text(0.0, 0.8, label, ha="left", va="top", color=colour, fontsize=font_size(10.0))
     axes.set_xlim(0.0, _SLOT * turns.size)
-    axes.set_ylim(-0.22, 0.68)
+    axes.set_ylim(*_VIEW)
     axes.set_aspect("equal", adjustable="box")
     axes.set_axis_off()

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 WITH, WITHOUT, HEALTHY = BLUE, VERMILION, BLACK
 STRIDE = Kind("Stride", "1", "fraction")
-ANGLE = Kind("Ankle angle, 0 neutral, dorsiflexion positive", "rad", "angle")
-PRESSURE = Kind("Gauge pressures; dashed: dorsiflexion chamber", "Pa_d", "pressure change")
+ANGLE = Kind("Ankle angle; 0 neutral, dorsiflexion positive", "rad", "angle")
+PRESSURE = Kind("Gauge pressure; dashed: dorsiflexion chamber", "Pa_d", "pressure change")
 ONE_PRESSURE = Kind("Gauge pressure", "Pa_d", "pressure change")
 TOES = Kind("Toe height above ground; below -1 the toes drag", "m", "body length")
 _CHANNELS = {

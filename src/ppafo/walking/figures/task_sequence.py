@@ -9,7 +9,7 @@ from ppafo.gait.gait import clinical_angle
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
-from ppafo.report.style import BLACK, GREY, font_size
+from ppafo.report.style import BLACK, GREY, font_size, print_scale, printed_width
 from ppafo.signals.recording import Floats, Recording
 from ppafo.walking.figures.axes import GAS, GROUND, THIN, TOES
 from ppafo.walking.figures.mean_stride import ANGLE, WITH, WITHOUT
@@ -29,8 +29,8 @@ _PHASES = {
 }
 """Name and colour of each phase in the strip below the torque; the colours also differ in greyscale."""
 _SHADED, _LESS_HELP = "#f3f3f3", "#cc3311"
-_LETTER = 0.0135
-"""Width of a letter as a fraction of the task sequence; a name that does not fit is written vertically."""
+_WIDTH, _LETTER = 5.7, 0.0145
+"""Width of the figure [inches], and of a letter as a fraction of it; a name that does not fit is written vertically."""
 _ROOM = 2.2
 """Height of the pace panel relative to its curve, to make room for the names of the segments."""
 _STRIP, _STRIP_GAP = 0.18, 0.05
@@ -44,11 +44,16 @@ def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
     recording, time = worn.recording, worn.recording.time
     walks = {WITHOUT: bare.recording, WITH: worn.recording}
     names = {WITHOUT: "without the device", WITH: "with it"}
+    # Pale and not dashed: in many strides dashes cannot be told apart, and in grey the colours neither.
+    looks = {WITHOUT: {**THIN, "alpha": 0.5, "linestyle": "-"}, WITH: {**THIN, "linestyle": "-"}}
     angles = [
-        Mark("line", walk.time, clinical_angle(walk["angle"]), label=names[colour], colour=colour, style=THIN)
+        Mark("line", walk.time, clinical_angle(walk["angle"]), label=names[colour], colour=colour, style=looks[colour])
         for colour, walk in walks.items()
     ]
-    toes = [Mark("line", walk.time, walk["toe_height"], colour=colour, style=THIN) for colour, walk in walks.items()]
+    toes = [
+        Mark("line", walk.time, walk["toe_height"], colour=colour, style=looks[colour])
+        for colour, walk in walks.items()
+    ]
     forces = [
         Mark("line", time, recording["heel_force"], label="heel", colour=BLACK, style=THIN),
         Mark("line", time, recording["toe_force"], label="toes", colour=GREY, style=THIN),
@@ -57,7 +62,7 @@ def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
     marks_by_kind = {
         ANGLE: angles,
         Kind("Force under heel and toes", "N", "force"): forces,
-        Kind("Actuator torque; strip: controller", "N m", "torque"): torque,
+        Kind("Actuator torque; strip: phase of the controller", "N m", "torque"): torque,
         TOES: [GROUND, *toes],
         GAS: [Mark("line", time, recording["supplied_mass"], colour=WITH)],
     }
@@ -78,9 +83,9 @@ def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
     sequence = walk_of(worn.scenario).task_sequence
     return draw_panels(
         panels,
-        size=(5.8, 1.45),
+        size=(5.4, 1.45),
         title=f"{worn.scenario.name}, task sequence {'' if sequence is None else sequence.name}",
-        note="upright line: the controller helps less",
+        note="upright line: the controller helps less" if losses else "",
         kind=recording.kind,
     )
 
@@ -90,8 +95,9 @@ def _name_segments(worn: WalkResult, pace: Floats, axes: "Axes") -> None:
     from matplotlib.patheffects import withStroke
 
     end = float(worn.recording.time[-1])
+    letter = _LETTER * print_scale() * _WIDTH / printed_width(_WIDTH)
     for segment in worn.segments:
-        is_narrow = segment.end - segment.start < _LETTER * len(segment.kind) * end
+        is_narrow = segment.end - segment.start < letter * len(segment.kind) * end
         name = axes.text(
             0.5 * (segment.start + segment.end),
             0.96,

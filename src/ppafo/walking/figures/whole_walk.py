@@ -63,7 +63,7 @@ def whole_walk_figure(result: WalkResult) -> "Figure":
     if "safe_state" in recording:
         panels.append(_level_panel(recording, axis))
     title = f"{result.scenario.name}: the whole walk"
-    figure = draw_panels(panels, size=(5.6, 1.5), title=title, kind=recording.kind)
+    figure = draw_panels(panels, size=(5.4, 1.5), title=title, kind=recording.kind)
     # Panels that share an axis take the limits of the one below when they are joined, so limits come last.
     figure.axes[0].set_xlim(0.0, float(axis.values(end)))
     return figure
