@@ -246,6 +246,8 @@ class Finding(Generic[T_co]):
         with drawn_at(width):
             drawn = None if chosen is None else chosen.drawn(self.kind)
         if drawn is None or isinstance(drawn, bytes):
+            if drawn is not None:
+                raise ArgumentError(f"'{name}' is an animation, not a figure: save() writes it as {name}.gif")
             named = f"no figure '{name}'" if name else "no figure"
             available = (
                 f": available are {', '.join(figures)}" if figures else ": print it, or save() its text and page"

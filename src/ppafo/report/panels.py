@@ -144,9 +144,10 @@ SHAPES: "Mapping[str, Callable[[Axes, Mark, Any, Any], object]]" = {
     "map": lambda axes, mark, x, y: axes.pcolormesh(
         x, y, mark.to, shading="nearest", rasterized=True, cmap="cividis", **mark.style
     ),
+    # A long text makes no panel narrower.
     "text": lambda axes, mark, x, y: axes.text(
         x, y, mark.label, color=mark.colour, **{**mark.style, "fontsize": font_size(mark.style.get("fontsize", 10.0))}
-    ),
+    ).set_in_layout(False),
     "points": lambda axes, mark, x, y: axes.scatter(
         x, y, c=mark.to, s=9, linewidths=0, cmap="cividis", rasterized=True, **mark.style
     ),
@@ -237,7 +238,7 @@ def draw_panels(
         if title:
             figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=font_size(_TITLE_SIZE), parse_math=False)
         if notes:
-            style = {"fontsize": font_size(9.0), "color": GREY, "parse_math": False}
+            style: dict[str, Any] = {"fontsize": font_size(9.0), "color": GREY, "parse_math": False}
             figure.text(0.012, 0.06 / height, "\n".join(notes), va="bottom", **style)
         mark_kind(figure, kind)
         lay_out(figure)
@@ -315,7 +316,10 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float], title_size: flo
                 **_OF_LEGEND,
             )
         elif panel.legend == "inside":
-            axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", handlelength=2.2)
+            legend = axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", handlelength=2.2)
+            for entry in legend.get_texts():
+                letters = _ENTRY_LETTERS * (size[0] - 1.3 * _AXIS_ROOM - _ENTRY)
+                entry.set_text("\n".join(textwrap.wrap(entry.get_text(), max(_FEWEST_LETTERS // 2, round(letters)))))
     axes.set_title(title, pad=print_scale() * pad, fontsize=font_size(title_size))
     # Last, so that it can undo what Matplotlib chose.
     if panel.then is not None:

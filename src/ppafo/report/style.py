@@ -159,7 +159,8 @@ def house_style() -> Iterator[None]:
         # Settings of the user's own file would change figures from computer to computer.
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS)
-        matplotlib.rcParams.update({name: font_size(size) for name, size in _FONT_SIZES.items()})
+        sizes: Any = {name: font_size(size) for name, size in _FONT_SIZES.items()}
+        matplotlib.rcParams.update(sizes)
         yield
 
 
@@ -180,8 +181,16 @@ def lay_out(figure: "Figure") -> None:
     """Place the panels once and for all: drawing is quicker, and another size of the figure keeps the proportions."""
     layout = figure.get_layout_engine()
     if layout is not None:
+        # Twice: the ticks follow the length of their axis, and their labels take room.
+        layout.execute(figure)
         layout.execute(figure)
         figure.set_layout_engine("none")
+    for axes in figure.axes:
+        title, box = axes._left_title, axes.get_window_extent()  # type: ignore[attr-defined]
+        # A title that is longer than its panel is wide begins further left.
+        excess = title.get_window_extent().x1 - figure.bbox.x1 + 8.0 if title.get_text() else 0.0
+        if excess > 0.0:
+            title.set_x(-min(excess, box.x0) / box.width)
 
 
 def mark_kind(figure: "Figure", kind: RecordingKind) -> None:

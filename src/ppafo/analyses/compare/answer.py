@@ -366,7 +366,7 @@ def _change(comparison: ComparisonResult, task: TaskComparison, metric: str) -> 
         axes.locator_params(axis="y", integer=True)
 
     axis, draws = Kind(words, "%"), Kind("Draws" if is_first else "")
-    return Panel(axis, draws, marks, title, legend="" if is_first else "above", then=limit_changes if ends else None)
+    return Panel(axis, draws, marks, title, legend="" if is_first else "figure", then=limit_changes if ends else None)
 
 
 def _relative(baseline: Floats, other: Floats) -> Floats:
