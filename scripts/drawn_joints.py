@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.errors import PpafoError
+from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.reach import torque_reach
 from ppafo.running import tried
 from ppafo.simulation.loading import scenario_from_dict
@@ -125,6 +126,9 @@ def draw_joint(draw: random.Random, kind: str, folder: Path, number: int) -> Pat
         ("valves.pair.closing_delay", log(2.0, 20.0), "ms"),
         ("valves.pair.switching_interval", log(4.0, 50.0), "ms"),
     ]
+    if kind == "bladder":
+        # Its one chamber refuses the numbers of a second one.
+        numbers = [item for item in numbers if item[0] not in OF_SECOND_CHAMBER]
     head = (
         f'schema_version = 1\nname = "joint{number}"\ntitle = "Drawn joint {number}: {kind}"\ndefault_valve = "prop"\n'
         f'[valves.prop]\nkind = "proportional"\n[valves.pair]\nkind = "solenoid"\n{section}'

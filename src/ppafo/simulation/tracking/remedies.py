@@ -51,6 +51,10 @@ class Remedy:
         return " and ".join(f"`{override.replace('=', ' = ', 1)}`" for override in self.overrides)
 
 
+CASCADE = Remedy({}, ("controller.kind=cascade",))
+"""Remedy for a law that opens the valve by an angle alone: a torque loop inside."""
+
+
 def remedy(scenario: Scenario, numbers: Mapping[str, float]) -> Remedy:
     """Remedy with its overrides in the units of the device."""
     declared, numbers = declared_numbers(scenario), of_its_chambers(numbers, scenario.device)

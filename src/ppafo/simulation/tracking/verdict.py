@@ -20,6 +20,7 @@ from ppafo.simulation.tracking.rule import (
     is_noisy,
     largest_error,
     most_reversals,
+    only_switches,
     settled_task,
     settled_walk,
     torque_limit,
@@ -193,7 +194,7 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None
     counted = settled.reversals * max(recording.duration, 1.0) if is_noisy(scenario) else reversals
     turning = counted / most_reversals(scenario, law, recording.duration, stride_time)
     if is_task:
-        failure = failure_of_task(settled, turning, law is not None and law.only_switches)
+        failure = failure_of_task(settled, turning, only_switches(scenario, law))
     else:
         failure = failure_of_walk(settled, turning, limit)
     case = Case(scenario=scenario, law=law, recording=recording, settled=settled, failure=failure)
