@@ -6,6 +6,7 @@ range and how often the valve is thrown over. Runs near its limits are counted a
 they are good. All is synthetic.
 """
 
+import ast
 import json
 import math
 import random
@@ -288,8 +289,8 @@ def judge(result: Result, only_switches: bool) -> str:
 
 def printed_remedy(sentence: str) -> list[str]:
     """Overrides of the remedy that a sentence prints as tried; none where it prints none."""
-    found = re.search(r"; with (.*) it follows, as a further run shows", sentence)
-    return [] if found is None else [text.replace(" = ", "=", 1) for text in re.findall(r"`([^`]*)`", found[1])]
+    found = re.search(r"; with overrides=(.*) it follows, as a further run shows", sentence)
+    return [] if found is None else list(ast.literal_eval(found[1]))
 
 
 def run_joints(seed: int, joints: int, log: Path, kinds: Sequence[str] = KINDS) -> list[dict[str, Any]]:

@@ -211,7 +211,7 @@ def _law_without_torque_loop(case: Case) -> TrackingCause | None:
     if torque_asked(case.scenario, law, case.settled.error) is not None:
         return None
     text = f"`{law.name}` acts on the angle without a torque loop inside, and is slow against load and friction"
-    return TrackingCause(text, (CASCADE,), "take `controller.kind = cascade`")
+    return TrackingCause(text, (CASCADE,), f"take {CASCADE.text}")
 
 
 def _is_settling(case: Case) -> bool:

@@ -43,9 +43,10 @@ class Tracking:
     ``missing`` the mean error and ``moved`` the range of the value, all in SI of the ``controlled`` quantity.
     ``reversals`` is the number of command reversals per stride or second, as ``per`` says. ``cause`` is the cause, with
     ``advice``; ``remedies`` are the remedies, most promising first; ``others`` are further, less certain causes;
-    ``tried`` is the result of tried remedies. ``accepted`` is the scenario's reason for a reference beyond reach, else
-    "". ``at_rest`` is true if reference and joint stand still. ``since`` [s] is the start of the settled part, 0 for a
-    walk. ``span`` is the range of the error of an angle that swings slowly, else 0.
+    ``tried`` is the result of tried remedies, and ``mended`` the overrides with which the run follows. ``accepted`` is
+    the scenario's reason for a reference beyond reach, else "". ``at_rest`` is true if reference and joint stand still.
+    ``since`` [s] is the start of the settled part, 0 for a walk. ``span`` is the range of the error of an angle that
+    swings slowly, else 0.
     """
 
     kind: Failure
@@ -62,6 +63,7 @@ class Tracking:
     others: tuple[TrackingCause, ...] = ()
     accepted: str = ""
     tried: str = ""
+    mended: tuple[str, ...] = ()
     at_rest: bool = True
     since: float = 0.0
     span: float = 0.0
