@@ -85,9 +85,11 @@ def design(
         # Stature, toes and catalogue may be left out, so they are not among them.
         missing = [f"--{name}" for name, value in wished.items() if value is None]
         if len(missing) == len(wished) and stature is None:
-            raise StudyError(f"no design was given: name one, give a .toml file, or for a wearer {FOR_A_WEARER}")
+            raise StudyError(
+                f"no design was given; name a design, give a .toml file, or describe the wearer: {FOR_A_WEARER}"
+            )
         if mass is None or torque is None or pressure is None or minutes is None:
-            raise StudyError(f"for a wearer give {', '.join(missing)} too, for example {FOR_A_WEARER}")
+            raise StudyError(f"a design for a wearer also needs {', '.join(missing)}, for example {FOR_A_WEARER}")
         requirements = DesignRequirements(mass, stature, float(torque), float(pressure), 60.0 * minutes, toes)
         with shown_in(units_given({"Pa_a": pressure, "N m": torque})):
             parts = DEFAULT if catalogue is None else catalogue
@@ -95,7 +97,9 @@ def design(
     of_a_wearer = {**wished, "stature": stature, "toes": toes, "catalogue": catalogue, "bottle": bottle}
     named = [f"--{name}" for name, value in of_a_wearer.items() if value is not None]
     if named:
-        raise StudyError(f"{', '.join(named)}: the design file states what is wanted; give one or the other")
+        raise StudyError(
+            f"{', '.join(named)} cannot be combined with a design file, which states the requirements; omit one of them"
+        )
     chosen = load_design(problem) if isinstance(problem, str | Path) else problem
     warn_of_coarse_pairs([chosen.scenario])
     return profile.finding_of(size_for_profile(chosen, threads, report))

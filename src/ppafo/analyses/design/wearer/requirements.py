@@ -97,8 +97,8 @@ def check_requirements(requirements: DesignRequirements) -> None:
         raise StudyError(f"--mass: {weight:g} kg: must be at least {mass.minimum:g} kg and at most {mass.maximum:g} kg")
     if requirements.stature is None and not low <= height <= high:
         raise StudyError(
-            f"--mass: {weight:g} kg: with a body mass index of {BODY_MASS_INDEX:g} kg/m^2 the wearer would be "
-            f"{height:.3g} m tall, but {known}; give --stature"
+            f"--mass: {weight:g} kg: with a body mass index of {BODY_MASS_INDEX:g} kg/m^2 the stature would be "
+            f"{height:.3g} m, but {known}; give --stature"
         )
     if not requirements.pressure > STANDARD_ATMOSPHERE:
         raise StudyError("--pressure: must be above the atmosphere, for example '50 psi_g'")
@@ -112,7 +112,9 @@ def check_requirements(requirements: DesignRequirements) -> None:
         highest = 1000.0 * _HIGHEST_TOES
         raise StudyError(f"--toes: {1000.0 * toes:g} mm: must be at least 0 mm and at most {highest:g} mm")
     if requirements.stature is not None and not low <= height <= high:
-        raise StudyError(f"--stature: {height:g} m: {known}; give a gait and a wearer of your own in a walk file")
+        raise StudyError(
+            f"--stature: {height:g} m: {known}; for another stature write a walk file with its own gait and wearer"
+        )
 
 
 def shown_clearance(toes: float) -> float:
