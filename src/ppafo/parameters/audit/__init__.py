@@ -22,6 +22,7 @@ from ppafo.parameters.audit.inertia import check_inertia
 from ppafo.parameters.audit.orifices import check_bores, check_orifices
 from ppafo.parameters.audit.torque import check_published_torque, check_torque_ceiling, check_vacuum
 from ppafo.parameters.audit.values import (
+    check_contradictions,
     check_dimensions,
     check_gas_data,
     check_ideal_gas,
@@ -36,6 +37,7 @@ __all__ = ["AuditFinding", "ComparedNumber", "NamedValue", "Severity", "changed_
 
 CHECKS: dict[str, Callable[[Evidence], Iterator[AuditFinding]]] = {
     "missing": check_missing,
+    "contradictions": check_contradictions,
     "statements": check_statements,
     "dimensions": check_dimensions,
     "ranges": check_ranges,

@@ -143,21 +143,8 @@ _SAME_TURN = 1.01
 
 
 def check_rotation(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for stops in the wrong order, a warning for a range larger than the actuator's designation."""
+    """Yield a warning for a range of angles larger than the actuator's designation."""
     rated, angles = evidence.number(_RATED), evidence.angle_range()
-    stops = evidence.numbers("actuator.angle_min", "actuator.angle_max")
-    if stops is not None and not stops[0] < stops[1]:
-        yield AuditFinding(
-            id="stops",
-            severity="error",
-            title="the lower stop is not below the upper one",
-            values=evidence.values_of("actuator.angle_min", "actuator.angle_max"),
-            sides=(
-                ComparedNumber("actuator.angle_min", stops[0], "rad"),
-                ComparedNumber("actuator.angle_max", stops[1], "rad"),
-            ),
-            paragraph="No run can be made with these stops. Exchange them, or correct the wrong one.",
-        )
     if rated is None or angles is None or angles[3] - angles[1] <= _SAME_TURN * rated:
         return
     turn = angles[3] - angles[1]
