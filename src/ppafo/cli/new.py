@@ -173,7 +173,7 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     from ppafo.documents.toml_text import TomlKind
     from ppafo.parameters.bottles.bottle import bottle_parts
 
-    if kind == "bottle" and source in bottle_parts():
+    if kind == "bottle" and source is not None and source in bottle_parts():
         return _bottle_text(source, name)
     templates = resources.files("ppafo.cli") / "templates"
     shipped = resources.files("ppafo").joinpath(*KINDS[kind].shipped.split("/"))
