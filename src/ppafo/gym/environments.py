@@ -31,8 +31,9 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
     a walk the wearer and the gait. ``duration`` is the length of an episode [s]. The reward of a sample is
     -(error_weight error^2 period + gas_weight gas), with the error in N m or rad, the period in s and the gas in g. An
     action applies to ``frame_skip`` samples, whose rewards are added up. ``observations`` are 'physical', or 'scaled'
-    to -1 to 1. With ``render_mode`` 'rgb_array' an episode can be rendered as a picture. ``plugins`` are modules of
-    your own, files or names, whose objects files may name. Raises ScenarioError or ParameterError for bad input.
+    to -1 to 1; ``observed`` has the names of their numbers. With ``render_mode`` 'rgb_array' an episode can be
+    rendered as a picture. ``plugins`` are modules of your own, files or names, whose objects files may name. Raises
+    ScenarioError or ParameterError for bad input.
     """
 
     metadata: dict[str, Any] = {"render_modes": [PICTURE], "render_fps": 25}  # noqa: RUF012 - Gymnasium's own declaration
@@ -42,7 +43,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
             raise ScenarioError(f"render_mode = {render_mode!r}: must be '{PICTURE}' or None")
         self.world = World(task, settings_of(settings))
         self.observation_space, self.action_space = self.world.observation_space, self.world.action_space
-        self.render_mode = render_mode
+        self.observed, self.render_mode = self.world.observed, render_mode
         self._drawn: Floats | None = None
         self._lanes = self.world.lanes(1)
         self._period = 0.0
@@ -98,7 +99,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
             return None
         if not self._frames:
             raise SimulationError("there is no episode yet: call reset")
-        return picture(self._frames, self.world.task.unit, self._period)
+        return picture(self._frames, self.world.task.unit, self._period, self.world.episodes.base.device)
 
     def _remember(self, error: float) -> None:
         """Store the current frame for the picture."""
@@ -136,7 +137,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
         self.single_observation_space = self.world.observation_space
-        self.single_action_space = self.world.action_space
+        self.single_action_space, self.observed = self.world.action_space, self.world.observed
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._lanes = self.world.lanes(num_envs)
