@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.analyses.linearise.point import equilibrium
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.plant import plant_of
 from ppafo.processor.firmware import firmware
@@ -238,8 +237,6 @@ def test_the_pressure_loop_that_ships_settles_on_its_level() -> None:
 
 def test_what_knows_a_torque_alone_says_so() -> None:
     pressure = load_scenario("pressure-loop", ["run.duration=0.1 s"])
-    with pytest.raises(ScenarioError, match="an equilibrium is found for a torque; give --at"):
-        equilibrium(pressure)
     with pytest.raises(ScenarioError, match="the link transmits torque references only"):
         plant_of(pressure)
     with pytest.raises(
