@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+import ppafo.engine.step.loop  # noqa: F401 - its numbers are in the key of a text, whether one is written or not
 from ppafo import interrupts
 from ppafo.engine.cache.texts import kept_bytes
 from ppafo.engine.compilers import Effort

@@ -32,7 +32,7 @@ from ppafo.simulation.tracking import Tracking
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
-from ppafo.walking.bottle.course import lasted, minutes_text
+from ppafo.walking.bottle.course import duration_text, lasted
 from ppafo.walking.figures.animation import animation
 from ppafo.walking.figures.gait_strip import strip_figure
 from ppafo.walking.figures.legs import frames_figure
@@ -257,7 +257,7 @@ def _remarks(comparison: WalkComparison) -> list[str]:
     bottle, supply = "", worn.supply
     if supply is not None:
         time = lasted(supply)
-        ended = "" if time is None else f"lasts {minutes_text(time)}: "
+        ended = "" if time is None else f"lasts {duration_text(time)}: "
         bottle = f"bottle {supply.supply.bottle.name}: {ended}{supply.ending.message}"
     elif "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
         walk_on_it = f"walk on it, {argument_text('bottle', PAPER_BOTTLE)}"

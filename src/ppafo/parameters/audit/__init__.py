@@ -11,6 +11,7 @@ from ppafo.parameters.audit.chambers import (
     check_filling,
     check_rotation,
     check_rounded_table,
+    check_stroke,
     check_virtual_work,
     check_volumes,
 )
@@ -52,6 +53,7 @@ CHECKS: dict[str, Callable[[Evidence], Iterator[AuditFinding]]] = {
     "volumes": check_volumes,
     "rounded table": check_rounded_table,
     "rotation": check_rotation,
+    "stroke": check_stroke,
     "filling": check_filling,
     "vacuum": check_vacuum,
     "torque ceiling": check_torque_ceiling,

@@ -314,3 +314,14 @@ discharge_coefficient = { value = 0.6, unit = "", origin = "assumed", source = "
     path.write_text(BLADDER.read_text(encoding="utf-8") + valve, encoding="utf-8")
     errors = [finding for finding in findings_of(load_parameter_set(path)) if finding.severity == "error"]
     assert [error.id for error in errors] == ["valves-recycling"]
+
+
+def test_the_stroke_of_a_cylinder_between_its_stops_is_compared_with_a_data_sheet() -> None:
+    found = _of_set("cylinder-lever")["stroke"]
+    ends = [side(found, f"distance of the pins at the {stop} stop") for stop in ("lower", "upper")]
+    # What is measured between the pins gives the offset, as the page on sets says: 25 and 200 mm from the joint.
+    for apart, degrees in zip(ends, (20.0, 130.0), strict=True):
+        between = math.acos((0.025**2 + 0.2**2 - apart**2) / (2.0 * 0.025 * 0.2))
+        assert math.degrees(between) - degrees == pytest.approx(15.0)
+    assert f"runs {1e3 * (ends[1] - ends[0]):.4g} mm" in found.title
+    assert "stroke" not in findings()

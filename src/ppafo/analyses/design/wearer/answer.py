@@ -19,7 +19,7 @@ from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.simulation.gains import gains_of
-from ppafo.walking.bottle.course import minutes_text
+from ppafo.walking.bottle.course import duration_text
 from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
@@ -88,7 +88,7 @@ def _sections(requirements: DesignRequirements, device: SizedDevice) -> tuple[fi
     share = device.torque / requirements.torque
     # A walk on a bottle may end at nine tenths of the request, so how far it fell short is said.
     short = f" ({100.0 * share:.0f} % of the request: pressure falls with the bottle)" if share < 1.0 else ""
-    duration, lasts = f"{requirements.seconds / 60.0:.4g} min", minutes_text(device.life.discharge.walking_time)
+    duration, lasts = duration_text(requirements.seconds), duration_text(device.life.discharge.walking_time)
     last = TORQUE.text(float(walked.peak_torques[-1]))
     rows = (
         ("controller", f"{walked.scenario.controller.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
