@@ -106,7 +106,7 @@ def _values(
     for name, value in by_name.items():
         if name not in parameters:
             hint = nearest_name(name, parameters)
-            raise ArgumentError(f"{function}() has no argument '{name}'{hint}; it has {', '.join(parameters)}")
+            raise ArgumentError(f"{function}() has no argument '{name}'{hint}; available: {', '.join(parameters)}")
         if name in values:
             raise ArgumentError(f"{function}(): {name} is given twice, by position and by name")
         values[name] = value

@@ -95,7 +95,7 @@ class TomlKind:
             remedy = "; write a path with / or in single quotation marks, 'C:\\data\\run.csv'" * is_escape
             raise self.error(f"{file}: is not valid TOML: {one_line(error)}{remedy}{self._remedy(file)}") from error
         except (RecursionError, ValueError) as error:
-            raise self.error(f"{file}: is not usable TOML: nested too deeply or a number too long") from error
+            raise self.error(f"{file}: is not usable TOML: it is nested too deeply, or a number is too long") from error
         self.check_depth(document, file)
         return document
 
@@ -115,7 +115,9 @@ def _float(text: str) -> float:
     """Return the number of a text; refuses a nonzero number so small that it would become 0, as in quantities."""
     value = float(text)
     if value == 0.0 and text.lower().partition("e")[0].strip("+-0_."):
-        raise tomllib.TOMLDecodeError(f"{one_line(text)} is below the smallest 64-bit number and would become 0")
+        raise tomllib.TOMLDecodeError(
+            f"{one_line(text)} is below the smallest 64-bit number and would become 0; write 0 or a larger number"
+        )
     return value
 
 

@@ -102,7 +102,7 @@ def gait_of(document: dict[str, Any], file: str) -> Gait:
     curves: dict[str, Any] = {name: _curve(document[name], name, file) for name in CURVES if name in document}
     # Required by the schema already: this tells the type checker.
     if numbers["stride.time"] is None or numbers["stride.stance_share"] is None or numbers["subject.body_mass"] is None:
-        raise DataError(f"{file}: [subject] and [stride] are not complete")
+        raise DataError(f"{file}: [subject] and [stride] are incomplete; import the gait again")
     return Gait(
         name=document["name"],
         title=document.get("title", ""),
@@ -131,9 +131,7 @@ def _number(document: dict[str, Any], path: str, file: str) -> float | None:
     with refused_as(DataError, f"{file}: {path} = {text!r}", UnitError):
         value = parse_quantity(text, unit)
     if not low <= value <= high:
-        raise DataError(
-            f"{file}: {path} = {text!r} is not allowed; it lies between {low:g} and {high:g} {unit}".strip()
-        )
+        raise DataError(f"{file}: {path} = {text!r}: must be from {low:g} to {high:g} {unit}".strip())
     return value
 
 
@@ -141,7 +139,7 @@ def _curve(table: dict[str, Any], name: str, file: str) -> GaitCurve:
     # The schema checks each list by itself; that both agree is said here.
     if len(table["cosine"]) != len(table["sine"]):
         counts = f"{len(table['cosine'])} numbers in cosine and {len(table['sine'])} in sine"
-        raise DataError(f"{file}: {name} has {counts}; a series has as many of both")
+        raise DataError(f"{file}: {name} has {counts}; both lists must have the same length")
 
     def si(value: float) -> float:
         return to_si(float(value), plain_unit(table["unit"]), plain_unit(CURVES[name]))
