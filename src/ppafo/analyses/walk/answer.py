@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.analyses.walk.benefit import benefit_sentence
 from ppafo.analyses.walk.bottle import bottle_data, bottle_parts
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes, versions, walk_document
 from ppafo.analyses.walk.task_sequence import (
@@ -204,7 +205,8 @@ def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
     mended = reloaded(configuration, verdict.mended) if verdict is not None and verdict.mended else None
     # How the torque follows what is requested, and the gains in force with their origin.
     in_force = gains_of(configuration, law_of(configuration))
-    first_lines = [*worn.verdict_lines(verdict), "" if in_force is None else in_force.sentence]
+    torque = worn.torque_sentence(verdict)
+    first_lines = [benefit_sentence(comparison), torque, "" if in_force is None else in_force.sentence]
     gait, overrides = motion.gait, configuration.origin.overrides
     title = f" ({gait.title})" if gait.title else ""
     set_up = (
