@@ -15,6 +15,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
 
 import ppafo
@@ -30,6 +31,7 @@ from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.device import Valve
 from ppafo.parameters.loading import parse_parameter_set
+from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion
@@ -314,6 +316,22 @@ def elbow(tmp_path: Path) -> Path:
     (tmp_path / "mine.toml").write_text(shipped[:before] + extension('kind = "table"') + "\n" + kept, encoding="utf-8")
     (tmp_path / "measured-bladder.csv").write_bytes((MEASURED / "measured-bladder.csv").read_bytes())
     return tmp_path / "mine.toml"
+
+
+def test_the_lines_of_the_page_make_volumes_of_torques(elbow: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    degrees, gauges = np.meshgrid(np.linspace(0.0, 90.0, 7), np.linspace(0.0, 60.0, 4), indexing="ij")
+    torques = 1e-3 * gauges * (60.0 - 20.0 * np.radians(degrees)) * (1.0 + gauges / 600.0)
+    columns = np.stack([degrees.ravel(), gauges.ravel(), torques.ravel()], axis=1)
+    np.savetxt(elbow.parent / "bend.csv", columns, "%.4f", ",", header="deg,kPa_g,N m", comments="")
+    monkeypatch.chdir(elbow.parent)
+    exec(extension('np.loadtxt("bend.csv"'), {})
+    elbow.write_text(elbow.read_text(encoding="utf-8").replace("measured-bladder.csv", "soft.csv"), encoding="utf-8")
+    stops = ["actuator.angle_min=0 deg", "actuator.angle_max=90 deg", "actuator.passive_stiffness=0 N m/rad"]
+    plant = plant_parameters(ppafo.load_device(elbow, overrides=[*stops, "supply.pressure=60 kPa_g"]))
+    room = plant.atmospheric_pressure
+    for degree, gauge, torque in columns.tolist():
+        modelled = ACTUATORS["table"].model.torque(plant, math.radians(degree), room + 1e3 * gauge, room)
+        assert modelled == pytest.approx(torque, abs=2e-3 * torques.max())
 
 
 WITHIN = ("actuator.angle_max=110 deg", "supply.pressure=60 kPa_g")

@@ -45,6 +45,10 @@ def test_the_python_of_the_page_reads_what_the_study_wrote(tmp_path: Path, monke
     frame = names["frame"]
     assert isinstance(frame, pandas.DataFrame)
     assert len(frame) == 32
+    units = names["units"]
+    assert isinstance(units, dict)
+    assert (units["gas_supplied"], units["supply.pressure"]) == ("kg", "Pa_a")
+    assert set(units) == set(frame.columns)
     assert set(frame["configuration"]) == {"proportional", "solenoid"}
     assert (tmp_path / "study.png").stat().st_size > 10_000
 

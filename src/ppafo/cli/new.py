@@ -112,8 +112,8 @@ def new(
     if kind not in known:
         raise DataError(f"there is no kind of file '{kind}'{nearest_name(kind, known)}; available: {', '.join(known)}")
     if name is None or not _NAME.fullmatch(name):
-        given = "is missing, and" if name is None else f"{one_line(name)}:"
-        raise DataError(f"NAME {given} must consist of letters, digits, - and _; use --out for the path")
+        given = "is missing; it" if name is None else f"{one_line(name)}:"
+        raise DataError(f"NAME {given} must consist of letters, digits, - and _; give a path with --out")
     chosen, path = KINDS[kind], out or Path(name + _SUFFIX)
     if path.suffix != _SUFFIX:
         raise DataError(f"--out {path}: the name must end in {_SUFFIX}")
@@ -136,6 +136,24 @@ def new(
     return CommandOutput(f"written: {path}; next: {command}", document)
 
 
+def _bottle_text(part: str, name: str) -> str:
+    """Return the file of a bottle of the catalogue of parts, under a new name."""
+    from ppafo.parameters.bottles.bottle import load_bottle
+
+    bottle = load_bottle(part)
+    gas = {"value": bottle.fluid.name, "origin": "derived", "source": f"bottle {part} of the catalogue of parts"}
+    tables = {"gas": gas, **{path: entry.model_dump(exclude_defaults=True) for path, entry in bottle.entries.items()}}
+    lines = ["schema_version = 1", f'name = "{name}"', f"title = {json.dumps(bottle.title, ensure_ascii=False)}"]
+    for path, table in tables.items():
+        # A text or a number in JSON is one in TOML too.
+        lines += [
+            "",
+            f"[{path}]",
+            *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in table.items()),
+        ]
+    return "\n".join(lines) + "\n"
+
+
 def list_kinds() -> list[dict[str, str]]:
     """Return each value of KIND with its meaning, and the bundled files that ``--from`` copies."""
     from importlib import resources
@@ -153,7 +171,10 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     from importlib import resources
 
     from ppafo.documents.toml_text import TomlKind
+    from ppafo.parameters.bottles.bottle import bottle_parts
 
+    if kind == "bottle" and source is not None and source in bottle_parts():
+        return _bottle_text(source, name)
     templates = resources.files("ppafo.cli") / "templates"
     shipped = resources.files("ppafo").joinpath(*KINDS[kind].shipped.split("/"))
     files = TomlKind(KINDS[kind].noun, _SCHEMAS.get(kind, kind), shipped, DataError)

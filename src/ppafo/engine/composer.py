@@ -28,7 +28,7 @@ COMPILED_BUILTINS = frozenset(
 Row = TypeVar("Row", bound=tuple[Any, ...])
 _AT_RUN_TIME = object()
 """Placeholder for a value that is known only while the function runs."""
-_REMEDIES = {"print": "; take it out: under PPAFO_BACKEND=python a debugger stops in the function"}
+_REMEDIES = {"print": "; remove it: with PPAFO_BACKEND=python a debugger stops in the function"}
 """Remedies for built-in functions that cannot be compiled."""
 
 
@@ -135,7 +135,11 @@ class Composer(ast.NodeTransformer):
         unsigned = (side.operand if isinstance(side, ast.UnaryOp) else side for side in (left, right))
         if isinstance(node.op, ast.Pow) and any(isinstance(side, ast.Constant) for side in unsigned):
             times = {"2": 2, "2.0": 2, "3": 3, "3.0": 3}.get(ast.unparse(right), 0)
-            product = f"write '{' * '.join([ast.unparse(node.left)] * times)}'" if times else "make both parameters"
+            product = (
+                f"write '{' * '.join([ast.unparse(node.left)] * times)}'"
+                if times
+                else "pass base and exponent as parameters"
+            )
             raise self.refuse(node, f"'{ast.unparse(node)}' cannot be compiled; {product}")
         return ast.copy_location(ast.BinOp(left, node.op, right), node)
 
@@ -151,7 +155,9 @@ class Composer(ast.NodeTransformer):
             return self.passed_value(value, node)
         owner = self.value_of(node.value)
         if owner is not _AT_RUN_TIME and not isinstance(owner, tuple):
-            raise self.refuse(node, f"'{ast.unparse(node)}' is of a {type(owner).__name__}, which cannot be compiled")
+            raise self.refuse(
+                node, f"'{ast.unparse(node)}' is an attribute of a {type(owner).__name__}, which cannot be compiled"
+            )
         row = self.module.constructed(self.row_of(node.value))
         if row is not None and node.attr not in row._fields:
             hint = nearest_name(node.attr, row._fields)
@@ -170,7 +176,9 @@ class Composer(ast.NodeTransformer):
             if isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
                 return self.replaced(node, node.func.value)
             if isinstance(node.func, ast.Attribute):
-                raise self.refuse(node, f"'{ast.unparse(node.func)}()' is a method, which is not compiled")
+                raise self.refuse(
+                    node, f"'{ast.unparse(node.func)}()' is a method, which cannot be compiled; call a plain function"
+                )
             self.generic_visit(node)
             return node
         called, node = self.with_parts(called, node)
@@ -194,7 +202,7 @@ class Composer(ast.NodeTransformer):
             return called, node
         parts = self.value_of(given.value)
         if not is_made_of(parts):
-            raise self.refuse(node, f"'parts={ast.unparse(given.value)}' must be parts of this function")
+            raise self.refuse(node, f"'parts={ast.unparse(given.value)}' must be 'parts', or an attribute of it")
         others = [keyword for keyword in node.keywords if keyword is not given]
         # What a function hands on as it was given by a phase is the same for all of a program.
         frame = frame_of(self.function)
@@ -216,7 +224,9 @@ class Composer(ast.NodeTransformer):
         """Text of a value that is passed but not called. ProgramError for a function that needs rows of effects."""
         composed = self.composed_value(value, node)
         if isinstance(composed, ast.Name) and self.module.handed_to(composed.id):
-            raise self.refuse(node, f"an effect acts inside '{ast.unparse(node)}', so that it can only be called")
+            raise self.refuse(
+                node, f"'{ast.unparse(node)}' contains an active effect, so it cannot be passed as a value; call it"
+            )
         return composed
 
     def default_arguments(self, called: Any, node: ast.Call) -> list[ast.expr]:
@@ -313,7 +323,7 @@ class Composer(ast.NodeTransformer):
                 raise self.refuse(node, f"'{node.id}' cannot be compiled{_REMEDIES.get(node.id, '')}")
             hint = nearest_name(node.id, [*self.local, *scope, *COMPILED_BUILTINS])
             remedy = "; import math" if node.id == "math" else ""
-            raise self.refuse(node, f"there is no '{node.id}'{hint}{remedy}")
+            raise self.refuse(node, f"the name '{node.id}' is not defined{hint}{remedy}")
         if not isinstance(node, ast.Attribute):
             return _AT_RUN_TIME
         owner = self.value_of(node.value)
@@ -346,7 +356,7 @@ class Composer(ast.NodeTransformer):
         name = ast.unparse(node)
         if getattr(value, "__module__", "") == "numpy" or own.startswith("numpy"):
             raise self.refuse(
-                node, f"'{name}' is from numpy, which cannot be compiled here; use 'math' for functions of one number"
+                node, f"'{name}' is from numpy, which cannot be compiled; use 'math' for functions of one number"
             )
         return self.literal(value, node, f"'{name}'")
 
@@ -378,8 +388,8 @@ class Composer(ast.NodeTransformer):
             return ast.Name(self.add(value), ast.Load())
         raise self.refuse(
             where,
-            f"cannot compile {self.function.__qualname__}: {name} is not a number, a tuple of numbers, a plain "
-            f"function, a NamedTuple or the module math",
+            f"cannot compile {self.function.__qualname__}: {name} must be a number, a tuple of numbers, a plain "
+            f"function, a NamedTuple or the module 'math'",
         )
 
 

@@ -41,8 +41,8 @@ def check_is_plain(function: Any) -> None:
         # A closure's value may change without a change of the function, and no text would show it.
         names = ", ".join(f"'{name}'" for name in function.__code__.co_freevars)
         raise ProgramError(
-            f"{place_of(function)}: '{name}' uses {names} of the function around it, which cannot be compiled; "
-            "make it a parameter"
+            f"{place_of(function)}: '{name}' uses {names} of the enclosing function, which cannot be compiled; "
+            "pass it as a parameter"
         )
 
 
@@ -67,7 +67,9 @@ def parse_definition(function: FunctionType, adapt: Adaptation | None = None) ->
     try:
         tree = parse_module("\n" * (code.co_firstlineno - 1) + text).body[0]
     except SyntaxError as error:
-        raise refusal(file, code.co_firstlineno, f"the source text of '{name}' cannot be read alone") from error
+        raise refusal(
+            file, code.co_firstlineno, f"the source text of '{name}' is not a complete function definition"
+        ) from error
     if not isinstance(tree, ast.FunctionDef) or tree.name != code.co_name:
         raise refusal(file, code.co_firstlineno, f"'{name}' must be a plain function defined with 'def'")
     if tree.decorator_list:
@@ -75,7 +77,7 @@ def parse_definition(function: FunctionType, adapt: Adaptation | None = None) ->
     adapted = tree if adapt is None else adapt(function, tree)
     check_grammar(adapted, file)
     if not _is_source_of(function, code, text):
-        changed = "is not what its source text says; the file has changed since it was loaded: start again"
+        changed = "differs from its source text: the file changed after it was loaded; restart Python"
         raise refusal(file, code.co_firstlineno, f"'{name}' {changed}")
     check_flow(adapted, file, code.co_varnames)
     return adapted

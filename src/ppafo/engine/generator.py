@@ -119,11 +119,11 @@ class StepText:
         ]
         if not sets:
             hint = nearest_name(name, self.rows)
-            problem = f"no phase before this one sets 'lane.{name}', and no component has it among its groups{hint}"
+            problem = f"'lane.{name}' is not set by an earlier phase and is not a group of any component{hint}"
         else:
             problem = (
-                f"'lane.{name}', which {sets[0]} sets, lives in that phase alone; a component that hands it on has "
-                f"'{name}': handed(CLASS) among its groups, with CLASS float or a NamedTuple"
+                f"'lane.{name}', set at {sets[0]}, is local to that phase; to pass it on, add "
+                f"'{name}': handed(CLASS) to the groups of a component (CLASS: float or a NamedTuple)"
             )
         return refusal(function.__code__.co_filename, node, problem)
 
@@ -137,8 +137,8 @@ class StepText:
         )
         function, node = next(uses, (asking.function, definition_of(asking.function).tree))
         problem = (
-            f"'lane.{name}' may have no value here: no phase before '{asking.function.__name__}' sets it; "
-            "set it before, on every path"
+            f"'lane.{name}' may be unset here: no phase before '{asking.function.__name__}' sets it; "
+            "set it earlier, on every path"
         )
         return refusal(function.__code__.co_filename, node, problem)
 
@@ -167,7 +167,9 @@ class StepText:
         if function in self.composed:
             composed = self.composed[function]
             if composed.known != known or composed.is_phase != is_phase:
-                raise ProgramError(f"{function.__name__} is composed in two different forms in one step")
+                raise ProgramError(
+                    f"phase '{function.__name__}' is called with different 'parts' in one step; use the same 'parts'"
+                )
             return composed
         reduction = Reduction(self, function, known)
         tree, effects = reduction.reduced(), reduction.effects
@@ -182,7 +184,9 @@ class StepText:
                 value = ast.Call(reduction.placeholder(self._result_row(function, tuple(effects.results))), results, [])
             tree.body = [*tree.body, ast.copy_location(ast.Return(value), tree)]
         elif effects.results:
-            raise reduction.refuse(tree, f"'{function.__name__}' gives a value and sets groups of its lane")
+            raise reduction.refuse(
+                tree, f"function '{function.__name__}' both returns a value and sets 'lane' groups; do one of them"
+            )
         parameters = [argument.arg for argument in tree.args.args]
         # The groups that it reads come before its own parameters.
         handed = tuple(name for name in parameters if name in effects.reads or name == NUMBER)

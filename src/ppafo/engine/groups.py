@@ -58,7 +58,7 @@ def merged(*parts: Groups) -> dict[str, Group]:
     for groups in parts:
         for name, group in groups.items():
             if name in found:
-                raise ProgramError(f"two components of a program have a group '{name}'; give one of them another name")
+                raise ProgramError(f"two components of a program define the group '{name}'; rename one of them")
             found[name] = group
     return found
 
@@ -83,7 +83,7 @@ def filled(
     for name, value in values.items():
         if name not in rows and leaves(value):
             raise ProgramError(
-                f"{role.value}: '{name}' is given ({_described(value)}), and no part of the program has it"
+                f"{role.value}: no component of the program has the group '{name}' ({_described(value)}); omit it"
             )
     found: list[Any] = []
     for name, row in rows.items():
@@ -91,11 +91,11 @@ def filled(
         paths = leaf_paths(row, name)
         if len(numbers) != len(paths) or (numbers and getattr(values[name], "_fields", ()) != row._fields):
             fields = ", ".join(path.partition(".")[2] or path for path in paths)
-            given = f"it is given {_described(values[name])}" if numbers else "nothing gives it"
+            given = f"got {_described(values[name])}" if numbers else "no value was given"
             is_open = role is Role.PARAMETER and not numbers
-            remedy = f"; '{name}': given({row.__name__}, FUNCTION) has it from FUNCTION(plant)" if is_open else ""
+            remedy = f"; '{name}': given({row.__name__}, FUNCTION) computes it by FUNCTION(plant)" if is_open else ""
             raise ProgramError(
-                f"{declared_at(name)}: '{name}' is a {row.__name__}({fields}) of the {role.value}, and {given}{remedy}"
+                f"{declared_at(name)}: {role.value}: '{name}' must be a {row.__name__}({fields}); {given}{remedy}"
             )
         found += numbers
     table = np.empty((len(found), runs))
@@ -113,7 +113,7 @@ def check_rows(count: int, rows: Mapping[str, Any], role: Role) -> None:
     sizes = {name: len(leaf_paths(row, name)) for name, row in rows.items()}
     if count != sum(sizes.values()):
         raise ProgramError(
-            f"{role.value}: a block has {count} rows, its program {sum(sizes.values())}: "
+            f"{role.value}: a block must have {sum(sizes.values())} rows, it has {count}; rows of the program: "
             + ", ".join(f"{name} {size}" for name, size in sizes.items() if size)
         )
 

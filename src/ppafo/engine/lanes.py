@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+import ppafo.engine.step.loop  # noqa: F401 - its numbers are in the key of a text, whether one is written or not
 from ppafo import interrupts
 from ppafo.engine.cache.texts import kept_bytes
 from ppafo.engine.compilers import Effort
@@ -203,7 +204,7 @@ def run_blocks(
         workers = 1  # threads of Python take turns
         seconds = runs * batch.clock.step_count * PYTHON_STEP
         if seconds > LONGEST_UNSAID:
-            slow = "ppafo: Python runs these models, which takes about %s; compiled it takes seconds: %s"
+            slow = "ppafo: Python runs these models in about %s; compiled models take seconds: %s"
             logger.warning(slow, time_text(seconds), HOW_TO_INSTALL)
 
     # One iterator for all threads: a range iterator hands each start to one of them.
@@ -324,7 +325,7 @@ def begin_block(batch: Batch, effort: Effort = Effort.FULL) -> LaneBlock:
     """Return a block with all runs of a batch before the first step; ValueError for more runs than a block can take."""
     runs, lanes = batch.states.shape[1], lanes_of(batch.program)
     if runs > lanes:
-        raise ValueError(f"{runs} runs do not fit a block of {lanes} lanes")
+        raise ValueError(f"a block of {lanes} lanes cannot hold {runs} runs")
     module = load_program(batch.program, effort)
     return LaneBlock(module, batch.program, batch.clock, batch.parameters, batch.states)
 

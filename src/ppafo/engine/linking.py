@@ -36,7 +36,9 @@ def link_program(program: Program, replacements: Replacements) -> None:
     used_names = {*without_effects.parameter_rows(), *without_effects.state_rows(), *without_effects.step_rows()}
     for effect in program.effects:
         if used_names & set(effect.rows):
-            raise ProgramError(f"effect '{effect.name}': other rows of a program have this name; it needs another")
+            raise ProgramError(
+                f"effect '{effect.name}': a component of the program already has this name; rename the effect"
+            )
     link_effects(program.effects, replacements)
 
 
@@ -53,8 +55,8 @@ def check_net_torque() -> None:
     at_rest = [net_torque(0.0, 0.0, 0.0, angle, 0.0) for angle in TEST_ANGLES]
     if any(at_rest):
         raise ProgramError(
-            f"{place_of(net_torque)}: net_torque takes {-max(at_rest, key=abs):.4g} N m of a joint at rest, which "
-            "friction would not hold; let load_torque of ppafo.model.ports take it"
+            f"{place_of(net_torque)}: net_torque takes {-max(at_rest, key=abs):.4g} N m from a joint at rest, where "
+            "friction cannot balance it; subtract it in load_torque of ppafo.model.ports"
         )
 
 

@@ -30,8 +30,8 @@ PYTHON = "python"
 """Value of ``PPAFO_BACKEND`` that lets Python run the models."""
 ANY_OF_C = "c"
 """Value of ``PPAFO_BACKEND`` that selects the first working C compiler."""
-HOW_TO_INSTALL = "install gcc or clang, or 'pip install ppafo[native]', which brings zig"
-WITHOUT_C = f"{BACKEND_VARIABLE}={PYTHON} needs no compiler, and takes some hundred times as long"
+HOW_TO_INSTALL = "install gcc or clang, or 'pip install ppafo[native]', which includes zig"
+WITHOUT_C = f"{BACKEND_VARIABLE}={PYTHON} needs no compiler, but is some hundred times slower"
 
 _FAILED: set[str] = set()
 """Identities of compilers that have failed in this process."""
@@ -59,14 +59,14 @@ def _compilers(name: str, folder: Path | None) -> tuple[Compiler, ...]:
     if name not in ("", ANY_OF_C):
         allowed = (ANY_OF_C, *OFFERED, PYTHON)
         hint = nearest_name(name, allowed)
-        raise SimulationError(f"{BACKEND_VARIABLE}: '{one_line(name)}' is not one of {', '.join(allowed)}{hint}")
+        raise SimulationError(f"{BACKEND_VARIABLE} = '{one_line(name)}': must be {', '.join(allowed)}{hint}")
     compilers: list[Compiler] = []
     for make in OFFERED.values():
         with contextlib.suppress(SimulationError):
             compilers.append(make())
     working = tuple(compiler for compiler in compilers if not _has_failed(compiler, folder))
     if name and not compilers:
-        raise SimulationError(f"{BACKEND_VARIABLE}={name}: there is no compiler on this computer: {HOW_TO_INSTALL}")
+        raise SimulationError(f"{BACKEND_VARIABLE}={name}: no C compiler was found: {HOW_TO_INSTALL}")
     # The last one is kept even if it failed, so that its own error is what the user reads.
     return working or (tuple(compilers[-1:]) if name else ())
 
@@ -91,7 +91,7 @@ def runs_by_python() -> bool:
     if compilers_to_try():
         return False
     if os.environ.get(BACKEND_VARIABLE) != PYTHON:
-        _say_slow(f"there is no compiler of C that works here; {HOW_TO_INSTALL}")
+        _say_slow(f"no working C compiler was found; {HOW_TO_INSTALL}")
     return True
 
 

@@ -94,7 +94,7 @@ class LoopText:
             case ast.Break():
                 return [node]
         raise self.reduction.refuse(
-            node, f"'{ast.unparse(node).splitlines()[0]}' is not a supported statement of the loop"
+            node, f"'{ast.unparse(node).splitlines()[0]}' is not supported in the loop over steps"
         )
 
     def branch(self, node: ast.If) -> list[ast.stmt]:
@@ -154,7 +154,7 @@ class LoopText:
                     made.append(node)
                 case _:
                     line = ast.unparse(node).splitlines()[0]
-                    raise self.reduction.refuse(node, f"'{line}' is not a supported statement of a lane in the loop")
+                    raise self.reduction.refuse(node, f"'{line}' is not supported in a loop over runs")
         return made
 
     def number_of_lane(self, node: ast.expr) -> ast.expr:
@@ -164,7 +164,9 @@ class LoopText:
     def phase(self, node: ast.stmt) -> Call:
         """Call of a phase in a loop over runs."""
         if not isinstance(node, ast.Expr) or not isinstance(node.value, ast.Call):
-            raise self.reduction.refuse(node, "in a loop over lanes phases are called")
+            raise self.reduction.refuse(
+                node, f"'{ast.unparse(node).splitlines()[0]}': a loop over runs may only call phases"
+            )
         called: FunctionType = self.reduction.outside_value(node.value.func)
         names = called.__code__.co_varnames[: called.__code__.co_argcount]
         arguments = list(zip(names, node.value.args, strict=True))[2:]

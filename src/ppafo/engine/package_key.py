@@ -23,6 +23,12 @@ from ppafo.model.binding import frame_of
 
 COMPOSED = ("control", "engine", "metrics", "model", "processor", "signals")
 """Subpackages with functions that become part of a program text, or that compose the text."""
+_WRITING = (
+    *("ppafo.engine.cache.", "ppafo.engine.generator", "ppafo.engine.loop_", "ppafo.engine.reduction"),
+    "ppafo.translation.",
+)
+"""Modules that write or store texts. A process loads them only for a text that is not stored yet, so that a key with
+their values would not be found again; of these modules the files alone are in the key."""
 _PACKAGE = Path(__file__).parents[1]
 _SUFFIXES = (".py", ".c", ".h")
 _PLAIN = (bool, int, float, str)
@@ -96,7 +102,7 @@ def _names_in(folders: tuple[str, ...]) -> Iterator[NameRead]:
     """Yield the numbers and functions defined in the loaded modules of some folders."""
     own = tuple(f"ppafo.{folder}." for folder in folders)
     for name, module in sorted(sys.modules.items()):
-        if not name.startswith(own):
+        if not name.startswith(own) or name.startswith(_WRITING):
             continue
         # A module that was loaded from another file is no longer that of the package.
         if not str(getattr(module, "__file__", None) or _PACKAGE).startswith(str(_PACKAGE)):

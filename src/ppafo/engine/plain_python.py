@@ -47,7 +47,7 @@ _WORDS: dict[type[ast.AST], str] = {
     ast.NamedExpr: "':='",
     ast.Match: "'match'",
 }
-_INSTEAD = "a law is made of numbers, tuples, NamedTuples, 'math' and other plain functions"
+_INSTEAD = "a law may use numbers, tuples, NamedTuples, 'math' and other plain functions"
 
 
 def refusal(file: str, where: ast.AST | int, problem: str) -> ProgramError:
@@ -76,7 +76,7 @@ def check_grammar(tree: ast.FunctionDef, file: str) -> None:
     """Raise ProgramError, with file and line, for the first construct in a file that cannot be compiled."""
     problems: list[tuple[ast.stmt | ast.expr | ast.keyword, str]] = []
     if tree.args.vararg or tree.args.kwarg or getattr(tree, "type_params", None):
-        problem = f"'{tree.name}' takes any number of arguments, which cannot be compiled; name each of them"
+        problem = f"'{tree.name}' takes a variable number of arguments, which cannot be compiled; name each argument"
         problems.append((tree, problem))
     left_away: set[ast.AST] = set()
     for node in (node for statement in tree.body for node in ast.walk(statement)):
@@ -98,13 +98,13 @@ def _problem(node: ast.AST) -> str:
         word = _WORDS.get(type(node), f"'{type(node).__name__}'")
         return f"{word} cannot be compiled; {_INSTEAD}"
     if isinstance(node, ast.Starred) and not isinstance(node.ctx, ast.Load):
-        return f"'*' on the left cannot be compiled; {_INSTEAD}"
+        return f"'*' in the target of an assignment cannot be compiled; {_INSTEAD}"
     if isinstance(node, ast.keyword) and node.arg is None:
         return f"'**' cannot be compiled; {_INSTEAD}"
     if isinstance(node, ast.Constant) and not isinstance(node.value, bool | int | float | None):
         return f"a constant of type {type(node.value).__name__} cannot be compiled; {_INSTEAD}"
     if isinstance(node, ast.Attribute | ast.Subscript) and not isinstance(node.ctx, ast.Load):
-        return f"'{ast.unparse(node)}' cannot be changed: a NamedTuple is a value; make a new one"
+        return f"'{ast.unparse(node)}' cannot be assigned: a NamedTuple is immutable; make a new one"
     return ""
 
 
@@ -146,7 +146,7 @@ class _Flow:
         if isinstance(statement, ast.For | ast.While):
             return self.after_loop(statement, bound)
         if isinstance(statement, ast.Return) and getattr(statement.value, "value", statement) is None:
-            raise refusal(self.file, statement, "'return' gives no value")
+            raise refusal(self.file, statement, "'return' has no value; return a value")
         if isinstance(statement, ast.AugAssign) and _assigned_names(statement.target) - bound:
             raise self.unbound(statement, ast.unparse(statement.target))
         value = getattr(statement, "value", None)
@@ -184,7 +184,7 @@ class _Flow:
 
     def unbound(self, where: ast.AST, name: str) -> ProgramError:
         """Return the error for an unassigned name."""
-        return refusal(self.file, where, f"'{name}' may have no value here; assign it before, on every path")
+        return refusal(self.file, where, f"'{name}' may be unassigned here; assign it earlier, on every path")
 
 
 def _assigned_names(target: ast.AST) -> set[str]:

@@ -34,7 +34,7 @@ _GROUP = "@"
 """Prefix of group names in a reduced function, until name conflicts are resolved."""
 _UNKNOWN = object()
 _STATEMENTS = (
-    "one sets names or groups of its lane, calls functions that do, decides with 'if', or goes through what parts have"
+    "a phase may assign names or 'lane' groups, call functions that do, branch with 'if', and loop over components"
 )
 
 
@@ -352,7 +352,9 @@ class Reduction:
         if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "lane":
             name = node.slice.value if isinstance(node.slice, ast.Constant) else self.value_of(node.slice)
             if not isinstance(name, str):
-                raise self.refuse(node, f"'{ast.unparse(node)}' is no group that is known while this is composed")
+                raise self.refuse(
+                    node, f"'{ast.unparse(node)}': the name of the group must be known when the program is generated"
+                )
             return name
         return ""
 
@@ -374,7 +376,9 @@ class Reduction:
         if is_step_function(called):
             arguments = self.step_arguments(called, node)
             if self.module.effects_of(called).results:
-                raise self.refuse(node, f"'{called.__name__}' sets groups of its lane, so that it gives no value")
+                raise self.refuse(
+                    node, f"function '{called.__name__}' sets 'lane' groups, so it returns no value that could be used"
+                )
             return ast.Call(self.placeholder(called), arguments, [])
         if isinstance(called, FunctionType):
             for row in self.module.collector.handed_to(self.module.add_called(self.function, called, {})):
@@ -416,7 +420,7 @@ class Reduction:
         named = {keyword.arg: keyword.value for keyword in node.keywords if keyword.arg is not None}
         given |= {name: value for name, value in named.items() if name not in given}
         if len(given) != len(node.args) + len(node.keywords) or given.keys() != set(names):
-            raise self.refuse(node, f"{called.__name__}({', '.join(names)}): each argument is given once")
+            raise self.refuse(node, f"{called.__name__}({', '.join(names)}): each argument must be given exactly once")
         return [(name, given[name]) for name in names]
 
     def arguments(self, node: ast.expr) -> Iterator[ast.expr]:
@@ -436,7 +440,7 @@ class Reduction:
     def items_of(self, node: ast.expr) -> list[Any]:
         """Return the items of an iterable, which must be known."""
         if self.definition.read_in(node) & self.run_time_names:
-            raise self.refuse(node, f"'{ast.unparse(node)}' is not known while this is composed")
+            raise self.refuse(node, f"'{ast.unparse(node)}' must be known when the program is generated")
         return list(self.definition.value(node, self.scope, self.known))
 
     # Statements.
@@ -471,7 +475,7 @@ class Reduction:
                 before = ast.copy_location(ast.Name(name, ast.Load()), target)
                 return self.assignment(target, ast.copy_location(ast.BinOp(before, op, value), node))
         line = ast.unparse(node).splitlines()[0]
-        raise self.refuse(node, f"'{line}' is not a supported statement of a phase: {_STATEMENTS}")
+        raise self.refuse(node, f"'{line}' is not supported in a phase: {_STATEMENTS}")
 
     def branch(self, node: ast.If) -> list[ast.stmt]:
         """Reduce an ``if`` to one branch if the condition is known; else groups set in one branch are also read."""
@@ -554,7 +558,7 @@ class Reduction:
             self.note_slot(name, Slot(history, places), target)
             return ast.Name(_GROUP + name, ast.Store())
         if not isinstance(target, ast.Name):
-            raise self.refuse(target, f"'{ast.unparse(target)}' cannot be set in a phase")
+            raise self.refuse(target, f"'{ast.unparse(target)}' cannot be assigned in a phase")
         return ast.Name(self.spellings.get(target.id, target.id), ast.Store())
 
     def note_set(self, name: str, fields: Fields) -> None:
@@ -566,7 +570,9 @@ class Reduction:
     def note_slot(self, name: str, slot: Slot, where: ast.AST) -> None:
         """Record a history element that is set. ProgramError for indices unknown to the loop over steps."""
         if any(name.id not in self.parameters for index in slot.places for name in names_in(index)):
-            raise self.refuse(where, "where a history is set must be a parameter, or a field of one")
+            raise self.refuse(
+                where, "the index of a history must be a parameter of the phase, or a field of a parameter"
+            )
         self.effects.slots[name] = slot
         self.groups_set.add(name)
 
@@ -607,7 +613,7 @@ class Reduction:
         """Reduce a call of a function that sets groups: its return values are assigned to these groups."""
         called = self.outside_value(node.func)
         if not is_step_function(called):
-            raise self.refuse(node, f"'{ast.unparse(node)}' discards its return value")
+            raise self.refuse(node, f"'{ast.unparse(node)}' discards its return value; assign it to a name")
         arguments = self.step_arguments(called, node)
         effects = self.module.effects_of(called)
         if not effects.results:

@@ -39,8 +39,8 @@ NEVER_FAILED = 1.0e300
 AT_REST = LaneResult(command=0.0, failure_time=NEVER_FAILED, too_many_parts=0.0)
 """Result of a device before its first step."""
 TOO_MANY_PARTS = (
-    f"a step was cut into {MAXIMUM_PARTS:,} parts and was still not done: try a smaller run.step, and check the delays "
-    "of the valve, the inertia and the volumes (ppafo sets audit)"
+    f"one step needs more than {MAXIMUM_PARTS:,} substeps: use a smaller run.step, and check the delays of the valve, "
+    "the inertia and the volumes (ppafo sets audit)"
 )
 """Remedy for a run ended by ``LaneResult.too_many_parts``."""
 WHOLE = 1.0e-9

@@ -117,8 +117,8 @@ class SourceCollector:
         elif without_origins(text) != without_origins(self.definitions.get(name, "")):
             raise ProgramError(
                 f"{place_of(item)}: '{item.__module__}.{item.__qualname__}' and "
-                f"'{owner.__module__}.{owner.__qualname__}' at {place_of(owner)} both get the name '{name}' in the "
-                f"compiled model; give one of them another name"
+                f"'{owner.__module__}.{owner.__qualname__}' at {place_of(owner)} would both be named '{name}' in the "
+                f"compiled model; rename one of them"
             )
         return name
 
@@ -182,7 +182,7 @@ class SourceCollector:
             return self._add(self.replacements.inside[function, called])
         if called in self.replacements.rows:
             raise ProgramError(
-                f"{place_of(function)}: '{called.__name__}' is the law of an effect: call its port instead"
+                f"{place_of(function)}: '{called.__name__}' is the law of an effect and cannot be called; call its port"
             )
         return self.add(called)
 
@@ -217,14 +217,12 @@ def _row_text(row: Any, name: str) -> str:
     own = vars(row)
     others = [base for base in row.__bases__[1:] if base is not Generic]
     if row.__bases__[0] is not tuple or others:
-        raise ProgramError(
-            f"{row.__module__}.{row.__qualname__} must be a NamedTuple itself, not a class made from one"
-        )
+        raise ProgramError(f"{row.__module__}.{row.__qualname__} must be a NamedTuple, not a subclass of one")
     meanings = {name for name, value in own.items() if name.startswith("__") and isinstance(value, FunctionType)}
     meanings -= set(vars(NameRead)) | {"__str__", "__format__"}
     if meanings:
         names = ", ".join(sorted(meanings))
         raise ProgramError(
-            f"{row.__module__}.{row.__qualname__} gives {names} a meaning of its own, which cannot be compiled"
+            f"{row.__module__}.{row.__qualname__} redefines {names}, which cannot be compiled; remove the method"
         )
     return f"{name} = namedtuple({name!r}, {list(row._fields)!r})"

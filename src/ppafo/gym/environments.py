@@ -31,8 +31,9 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
     a walk the wearer and the gait. ``duration`` is the length of an episode [s]. The reward of a sample is
     -(error_weight error^2 period + gas_weight gas), with the error in N m or rad, the period in s and the gas in g. An
     action applies to ``frame_skip`` samples, whose rewards are added up. ``observations`` are 'physical', or 'scaled'
-    to -1 to 1. With ``render_mode`` 'rgb_array' an episode can be rendered as a picture. ``plugins`` are modules of
-    your own, files or names, whose objects files may name. Raises ScenarioError or ParameterError for bad input.
+    to -1 to 1; ``observed`` has the names of their numbers. With ``render_mode`` 'rgb_array' an episode can be
+    rendered as a picture. ``plugins`` are modules of your own, files or names, whose objects files may name. Raises
+    ScenarioError or ParameterError for bad input.
     """
 
     metadata: dict[str, Any] = {"render_modes": [PICTURE], "render_fps": 25}  # noqa: RUF012 - Gymnasium's own declaration
@@ -42,7 +43,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
             raise ScenarioError(f"render_mode = {render_mode!r}: must be '{PICTURE}' or None")
         self.world = World(task, settings_of(settings))
         self.observation_space, self.action_space = self.world.observation_space, self.world.action_space
-        self.render_mode = render_mode
+        self.observed, self.render_mode = self.world.observed, render_mode
         self._drawn: Floats | None = None
         self._lanes = self.world.lanes(1)
         self._period = 0.0
@@ -97,8 +98,8 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         if self.render_mode is None:
             return None
         if not self._frames:
-            raise SimulationError("there is no episode yet: call reset")
-        return picture(self._frames, self.world.task.unit, self._period)
+            raise SimulationError("there is no episode; call reset() first")
+        return picture(self._frames, self.world.task.unit, self._period, self.world.episodes.base.device)
 
     def _remember(self, error: float) -> None:
         """Store the current frame for the picture."""
@@ -110,7 +111,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         Raises SimulationError before the first ``reset``.
         """
         if self._drawn is None:
-            raise SimulationError("there is no episode yet: call reset")
+            raise SimulationError("there is no episode; call reset() first")
         return self.world.episodes.shown(self._drawn)
 
     def numbers(self) -> dict[str, float]:
@@ -136,7 +137,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
         self.single_observation_space = self.world.observation_space
-        self.single_action_space = self.world.action_space
+        self.single_action_space, self.observed = self.world.action_space, self.world.observed
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._lanes = self.world.lanes(num_envs)
@@ -164,10 +165,13 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         """
         mask = (options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_))
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            raise ScenarioError(f"reset_mask must be {self.num_envs} truth values in an array")
+            raise ScenarioError(f"reset_mask: must be an array of {self.num_envs} booleans")
         seeds = [seed + number for number in range(self.num_envs)] if isinstance(seed, int) else seed
         if seeds is not None and len(seeds) != self.num_envs:
-            raise ScenarioError(f"{len(seeds)} seeds for {self.num_envs} environments; give one for each, or a number")
+            raise ScenarioError(
+                f"seed: {len(seeds)} seeds for {self.num_envs} environments; give one seed for "
+                "each environment, or a single number"
+            )
         places = np.flatnonzero(mask)
         for number in places.tolist():
             seed_of_environment = None if seeds is None else seeds[number]
@@ -188,7 +192,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         """
         before = self._ended
         if self.autoreset_mode is AutoresetMode.DISABLED and before.any():
-            raise SimulationError(f"environment {int(np.flatnonzero(before)[0])} has ended: reset it by its mask")
+            raise SimulationError(f"environment {int(np.flatnonzero(before)[0])} has ended; reset it with reset_mask")
         result = self.world.act(self._lanes, actions)
         self._ended = result.terminated | result.truncated
         infos: dict[str, Any] = {}

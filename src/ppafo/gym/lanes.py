@@ -36,14 +36,14 @@ class FromOutside:
     def update(self, time: float, reference: float, measurement: Measurement) -> float:  # noqa: ARG002 - a protocol
         """Raise an error, because an agent acts through its environment."""
         raise ScenarioError(
-            "in an environment the agent gives the commands; to simulate this scenario, give it a controller"
+            "this scenario has no controller, because the agent of an environment gives the commands; set a controller"
         )
 
 
 def episode_program(batch: Batch) -> tuple[Program, Clock]:
     """Return program and clock of a run with external commands; ScenarioError for samples within a step."""
     if batch.program.samples_inside:
-        raise ScenarioError("run.output_interval: must be a whole number of steps in an environment")
+        raise ScenarioError("run.output_interval: must be a whole number of run.step in an environment")
     return replace(batch.program, controller=None, starts_apart=True), batch.clock
 
 
@@ -116,7 +116,8 @@ class Environments:
         self.actions = np.zeros((count, task.actions))
         self._actions = np.zeros((blocks, len(Action._fields), width))
         self._chosen = np.zeros((blocks, 1, width))
-        self._observations = np.zeros((blocks, len(task.observed_paths), width))
+        self._observations = np.zeros((blocks, len(leaf_paths(task.view, "view")), width))
+        self._shown = tuple(task.observed_rows(program.has_one_chamber).values())
         self._outcomes = np.zeros((blocks, _OUTCOMES, width))
         self._signals = np.zeros((blocks, SIGNAL_ROWS, clock.signal_delay + 2, width))
         self._now = 0
@@ -140,8 +141,8 @@ class Environments:
 
     def state(self) -> dict[str, Floats | int]:
         """Return everything that changes from step to step: copies of the arrays, and the number of the step."""
-        arrays = {name: value.copy() for name, value in vars(self).items() if isinstance(value, np.ndarray)}
-        return {**arrays, "_now": self._now}
+        arrays = ((name, value) for name, value in vars(self).items() if isinstance(value, np.ndarray))
+        return {**{name: value.copy() for name, value in arrays}, "_now": self._now}
 
     def resume(self, state: Mapping[str, Floats | int]) -> None:
         """Continue from a state, copied into the existing arrays, whose addresses the compiled program uses."""
@@ -203,10 +204,8 @@ class Environments:
                 clock.signal_delay,
             )
         lowest, highest = judging.bounds
-        shown = self._by_environment(self._observations)
-        # The lowest value for nan: a converter shows nothing else.
-        shown = np.where(shown >= lowest, shown, lowest)
-        shown = np.where(shown <= highest, shown, highest)
+        # fmax gives the lowest value for nan: a converter shows nothing else.
+        shown = np.fmin(np.fmax(self._by_environment(self._observations)[:, self._shown], lowest), highest)
         outcomes = self._by_environment(self._outcomes).T
         rewards, errors, supplied = outcomes[:_FIRST_FLAG]
         failed, through = outcomes[_FIRST_FLAG:] != 0.0

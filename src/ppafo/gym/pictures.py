@@ -1,4 +1,4 @@
-"""Picture of an episode as image bytes: the vane at its angle, and angle and error over time."""
+"""Picture of an episode as image bytes: the joint at its angle, and angle and error over time."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.parameters.device import Device
 from ppafo.report.style import BLUE, GREY, VERMILION, house_style
 from ppafo.signals.recording import Floats
 
@@ -23,17 +24,18 @@ _NEUTRAL = 90.0
 
 
 class EpisodeFrame(NamedTuple):
-    """Frame of a picture: time [s], angle of the vane [rad], and error in the unit of the task."""
+    """Frame of a picture: time [s], angle of the joint [rad], and error in the unit of the task."""
 
     time: float
     angle: float
     error: float
 
 
-def picture(moments: Sequence[EpisodeFrame], unit: str, period: float) -> NDArray[np.uint8]:
+def picture(moments: Sequence[EpisodeFrame], unit: str, period: float, device: Device) -> NDArray[np.uint8]:
     """Return a picture (height, width, 3) of the frames of an episode, in order; at least one.
 
     ``unit`` is the unit of the errors, "rad" or "N m"; ``period`` [s] is the shortest time axis.
+    Only the vane is drawn on both sides of its shaft; other actuators turn a lever.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -44,17 +46,17 @@ def picture(moments: Sequence[EpisodeFrame], unit: str, period: float) -> NDArra
     with house_style():
         figure = Figure(figsize=_SIZE, dpi=_RESOLUTION, layout="constrained")
         canvas: Any = FigureCanvasAgg(figure)
-        panels: Any = figure.subplot_mosaic([["vane", "angle"], ["vane", "error"]], width_ratios=[1.0, 1.8])
-        axes = panels["vane"]
+        panels: Any = figure.subplot_mosaic([["joint", "angle"], ["joint", "error"]], width_ratios=[1.0, 1.8])
+        axes = panels["joint"]
         angle = float(angles[-1])
         turn = np.linspace(0.0, 2.0 * np.pi, 121)
-        vane: Floats = np.array([-1.0, 1.0])
+        lever: Floats = np.array([-1.0 if device.actuator.kind == "vane" else 0.0, 1.0])
         axes.plot(np.cos(turn), np.sin(turn), color=GREY)
-        axes.plot(vane * np.cos(angle), vane * np.sin(angle), color=BLUE, linewidth=6.0, solid_capstyle="butt")
+        axes.plot(lever * np.cos(angle), lever * np.sin(angle), color=BLUE, linewidth=6.0, solid_capstyle="butt")
         axes.plot(_SHAFT * np.cos(turn), _SHAFT * np.sin(turn), color=GREY)
         axes.set_aspect("equal")
         axes.set_axis_off()
-        axes.set_title(f"Vane at {np.degrees(angle):.0f} deg")
+        axes.set_title(f"{device.joint.name.capitalize()} at {np.degrees(angle):.0f} deg")
         panels["angle"].plot(times, np.degrees(angles), color=BLUE)
         _finish(panels["angle"], end, "Angle (deg)", _NEUTRAL)
         panels["angle"].tick_params(labelbottom=False)
@@ -71,3 +73,4 @@ def _finish(axes: "Axes", end: float, label: str, level: float) -> None:
     axes.axhline(level, color=GREY, linewidth=0.8, linestyle="--")
     axes.set_ylabel(label)
     axes.set_xlim(0.0, end)
+    axes.locator_params(axis="x", nbins=5)

@@ -11,6 +11,7 @@ from ppafo.control.walking.assistance import TorqueProfile, profile_torque
 from ppafo.engine.rows import leaf_paths
 from ppafo.model.sensors import GaitMeasurement, Measurement
 from ppafo.model.valves.kind import VENT
+from ppafo.signals.recording import OF_SECOND_CHAMBER
 
 BAR = 1.0e5
 """Pascals per bar; observed pressures are in bar."""
@@ -205,10 +206,11 @@ class Task:
     command: Callable[[float, float], float] = valve_command
     actions: int = 1
 
-    @property
-    def observed_paths(self) -> list[str]:
-        """Paths of the observed numbers, in order, such as ``view.sensed.angle``."""
-        return leaf_paths(self.view, "view")
+    def observed_rows(self, has_one_chamber: bool) -> dict[str, int]:
+        """Row of each observed number in ``view``, by name such as ``angle``; with one chamber none of a second."""
+        names = [path.rpartition(".")[2] for path in leaf_paths(self.view, "view")]
+        absent = OF_SECOND_CHAMBER if has_one_chamber else frozenset()
+        return {name: row for row, name in enumerate(names) if name not in absent}
 
 
 TASKS = {

@@ -65,14 +65,13 @@ def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> _
     """
     for name in ("task_sequence", "bottle"):
         if getattr(walk_of(configuration), name) is not None:
-            raise ScenarioError(
-                f"{configuration.origin.file}: {name}: an environment does not support it; leave it out"
-            )
+            raise ScenarioError(f"{configuration.origin.file}: {name}: is not supported in an environment; omit it")
     settings = configuration.controller.settings
     if not set(TorqueProfile._fields) <= set(settings):
         kind = configuration.controller.kind
         raise ScenarioError(
-            f"{configuration.origin.file}: controller.kind = '{kind}' has no torque profile; event_pid has one"
+            f"{configuration.origin.file}: controller.kind = '{kind}' has no torque profile; use event_pid with a "
+            "proportional valve"
         )
     goal = Goal(angle=0.0, profile=TorqueProfile(**{name: settings[name] for name in TorqueProfile._fields}))
     commanded = with_duration(configuration, seconds).controlled_by(FromOutside())
@@ -123,7 +122,7 @@ COMMANDS = 3
 LARGEST_RATE, LARGEST_FORCE = 1.0e3, 5.0e3
 """Bounds of the observed rate of the requested torque [N m/s] and of the observed forces [N]."""
 HEADROOM = 2.0
-"""Largest observed pressure divided by the highest supply pressure: a moving vane compresses its gas."""
+"""Largest observed pressure divided by the highest of supply and atmosphere: a moving joint compresses its gas."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,9 +152,9 @@ class EnvironmentSettings:
                 hint = nearest_name(word, allowed)
                 raise ScenarioError(f"{name} = {word!r}: must be '{allowed[0]}' or '{allowed[1]}'{hint}")
         if self.vary and not self.randomise:
-            raise ScenarioError("vary: with randomise = False nothing is drawn; omit one of them")
+            raise ScenarioError("vary: has no effect with randomise = False; omit one of them")
         if not (isinstance(self.frame_skip, int) and self.frame_skip >= 1):
-            raise ScenarioError(f"frame_skip = {self.frame_skip!r}: must be a whole number of samples, at least 1")
+            raise ScenarioError(f"frame_skip = {self.frame_skip!r}: must be a whole number of at least 1")
 
 
 def settings_of(arguments: Mapping[str, Any]) -> EnvironmentSettings:
@@ -164,7 +163,7 @@ def settings_of(arguments: Mapping[str, Any]) -> EnvironmentSettings:
     for name in arguments:
         if name not in names:
             hint = nearest_name(name, names)
-            raise ScenarioError(f"an environment has no argument '{name}'{hint}; it has {', '.join(names)}")
+            raise ScenarioError(f"an environment has no argument '{name}'{hint}; available: {', '.join(names)}")
     return EnvironmentSettings(**arguments)
 
 
@@ -175,7 +174,9 @@ def episodes_of(
     duration = settings.duration
     if task == "walk":
         if varied:
-            raise ScenarioError(f"vary: {', '.join(varied)}: a walk varies its wearer and gait only; omit vary")
+            raise ScenarioError(
+                f"vary: {', '.join(varied)}: cannot be varied, because a walk varies only wearer and gait; omit vary"
+            )
         walk = load_walk(file, overrides)
         seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).run.duration
         return walk_episodes(walk, settings.randomise, seconds)
@@ -183,8 +184,8 @@ def episodes_of(
     scenario = load_scenario(file, over(overrides, length, ScenarioError))
     if task == "torque" and scenario.controlled != TORQUE:
         raise ScenarioError(
-            f"{scenario.name}: reference.of = '{scenario.controlled}': the task 'torque' follows a torque; take "
-            "another scenario, or the task 'angle'"
+            f"{scenario.name}: reference.of = '{scenario.controlled}', but the task 'torque' needs a torque "
+            "reference; choose another scenario, or the task 'angle'"
         )
     return scenario_episodes(scenario, settings.randomise, varied, settings.targets)
 
@@ -201,7 +202,8 @@ class World:
         overrides = over(flaws if is_default else (), settings.overrides, ScenarioError)
         varied = VARIED.get(task, {}) if settings.vary is None and is_default else settings.vary or {}
         self.episodes = episodes_of(task, file, overrides, varied, settings)
-        bounds = observed_bounds(self.task, self.episodes.base.device)
+        self.observed = tuple(self.task.observed_rows(self.episodes.program.has_one_chamber))
+        bounds = observed_bounds(self.task, self.observed, self.episodes.base.device)
         self.judging = RewardWeights(
             error_weight=self.task.error_weight if settings.error_weight is None else settings.error_weight,
             gas_weight=self.task.gas_weight if settings.gas_weight is None else settings.gas_weight,
@@ -252,10 +254,9 @@ class World:
             # Vent valve first: where there is none, the last column is the command, which the next line sets.
             numbers_of_actions[:, -1] = 0.0
             numbers_of_actions[:, 0] = np.subtract(actions, 1)
-        is_finite = np.isfinite(numbers_of_actions).all(axis=1)
-        if not is_finite.all():
-            bad = int(np.flatnonzero(~is_finite)[0])
-            raise SimulationError(f"the action of environment {bad} is {numbers_of_actions[bad]}; it must be finite")
+        bad = np.flatnonzero(~np.isfinite(numbers_of_actions).all(axis=1))
+        if bad.size:
+            raise SimulationError(f"action of environment {bad[0]} is {numbers_of_actions[bad[0]]}: must be finite")
         result = lanes.step()
         for _ in range(self.settings.frame_skip - 1):
             result = result.then(lanes.step())
@@ -268,9 +269,11 @@ class World:
         return result
 
 
-def observed_bounds(task: Task, device: Device) -> Floats:
+def observed_bounds(task: Task, names: Sequence[str], device: Device) -> Floats:
     """Lowest and highest value (2, observed) of each observed number, in the units of the task's view."""
-    pressure = HEADROOM * max(device.supply.pressure, device.supply.dorsiflexion_pressure)
+    pressure = HEADROOM * max(
+        device.supply.pressure, device.supply.dorsiflexion_pressure, device.supply.atmospheric_pressure
+    )
     torque = device.actuator.torque_constant * pressure
     known = {
         "angle": (-np.pi, np.pi),
@@ -284,6 +287,5 @@ def observed_bounds(task: Task, device: Device) -> Floats:
         "since_strike": (0.0, LONGEST_SINCE),
         "command": (-1.0, 2.0),
     }
-    names = [path.rpartition(".")[2] for path in task.observed_paths]
     # Rounded as the space has them, so that what is cut off at a bound lies within it.
     return np.array([known[name] for name in names], dtype=np.float32).T.astype(np.float64, order="C")

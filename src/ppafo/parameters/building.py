@@ -2,7 +2,7 @@
 
 import math
 import operator
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -66,27 +66,43 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
     name = chosen_valve(parameter_set, valve)
     links = links_of_set(parameter_set) if links is None else links
     parameter_set = with_followers(parameter_set)
+    device = read_device(parameter_set, name, links)
+    for _, line in contradictions(parameter_set, device):
+        raise ParameterError(f"{parameter_set.file}: {line}")
+    if device.actuator.kind == VANE:
+        return device
+    # An actuator of another kind has what a vane of its mean size would have, for whatever is made for a vane.
+    growth = shape_and_growth(device)[1]
+    return replace(device, actuator=replace(device.actuator, torque_constant=growth, displacement_per_radian=growth))
+
+
+def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
+    """Return the device in SI units with a valve of the set, whose values may still contradict each other."""
     missing = missing_values(parameter_set, name)
     if missing:
         completed = parameter_set.completed_by
         remedy = f"use '{completed}', which completes it" if completed else "add them to the file or as overrides"
         raise ParameterError(f"{parameter_set.file}: the device lacks {', '.join(missing)}; {remedy}")
-    read, kind = _reader(parameter_set), parameter_set.valve_kinds[name]
+    read, kind, numbers = _reader(parameter_set), parameter_set.valve_kinds[name], parameter_set.numbers
     species = parameter_set.texts[declaration.SPECIES_PATH].value
     if species not in SPECIES:
         raise ParameterError(
             f"{parameter_set.file}: gas.species = '{one_line(species)}' is unknown{nearest_name(species, SPECIES)}; "
             f"available: {', '.join(SPECIES)}"
         )
-    named_effects = {path.split(".")[1] for path in parameter_set.numbers if path.startswith(f"{SECTION}.")}
-
-    device = Device(
+    named_effects = {path.split(".")[1] for path in numbers if path.startswith(f"{SECTION}.")}
+    supply = read("supply", _present(parameter_set, "supply"))
+    if parameter_set.has_one_chamber:
+        # The port of the second chamber is at the atmosphere and passes nothing.
+        supply["dorsiflexion_pressure"] = supply["atmospheric_pressure"]
+    relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
+    return Device(
         name=parameter_set.name,
         gas=Gas(species, **read("gas", declaration.GAS)),
         actuator=_actuator(parameter_set, read),
         friction=Friction(**read("friction", declaration.FRICTION)),
         foot_plate=FootPlate(**read("foot_plate", declaration.FOOT_PLATE)),
-        supply=_supply(parameter_set, read),
+        supply=Supply(**supply, relieving=relieving is not None and relieving.value),
         valve=Valve(
             kind=kind,
             settings=read(f"valves.{name}", VALVES[kind].quantities),
@@ -102,13 +118,26 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
         links=links,
         units=parameter_set.shown,
     )
-    if device.actuator.has_one_chamber and VALVES[kind].choose(first_settings(device.valve)).joint is not None:
-        raise ParameterError(
-            f"{parameter_set.file}: valve '{name}', a '{kind}', joins two chambers: {declaration.WHY_ONE_CHAMBER}"
+
+
+def contradictions(parameter_set: ParameterSet, device: Device) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Yield the contradictions for which a run refuses a device of a set: paths of the values, and the message."""
+    actuator, valve = device.actuator, device.valve
+    stops = ("actuator.angle_min", "actuator.angle_max")
+    is_ordered = actuator.angle_min < actuator.angle_max
+    problem = actuator_problem(actuator) if is_ordered else ""
+    if problem:
+        settings = (f"actuator.{quantity.name}" for quantity in ACTUATORS[actuator.kind].quantities)
+        yield ("actuator", *settings, *stops), f"actuator: {problem}"
+    if actuator.has_one_chamber and VALVES[valve.kind].choose(first_settings(valve)).joint is not None:
+        name = device.valve_name
+        yield (
+            (f"valves.{name}",),
+            f"valve '{name}', a '{valve.kind}', joins two chambers: {declaration.WHY_ONE_CHAMBER}",
         )
     is_beyond, line = beyond_pressures(device)
     if is_beyond:
-        raise ParameterError(f"{parameter_set.file}: actuator: {line(0)}")
+        yield SUPPLIES, f"actuator: {line(0)}"
     for path, relation, other, holds in consistency(device):
         if not holds:
             entry, limit = parameter_set.numbers[path], operator.attrgetter(other)(device)
@@ -117,20 +146,18 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
             unit = entry.unit if declaration.fits(entry.unit, si_unit) else ""
             allowed = f"{relation} {other} = {shown_text(limit, si_unit, atmosphere=room, unit=unit)}"
             why = _BESIDE_ANOTHER if path in SUPPLIES else ""
-            raise ParameterError(f"{parameter_set.file}: {path} = {number_text(entry)} must be {allowed}{why}")
+            yield (path, other), f"{path} = {number_text(entry)} must be {allowed}{why}"
     relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
     if device.supply.is_vacuum and relieving is not None and not relieving.value:
-        raise ParameterError(
-            f"{parameter_set.file}: {declaration.RELIEVING_PATH} = false: gas goes from the chambers into a supply "
-            "below the atmosphere; set it to true or leave it out"
+        yield (
+            (declaration.RELIEVING_PATH, *SUPPLIES),
+            f"{declaration.RELIEVING_PATH} = false: gas goes from the chambers into a supply below the atmosphere; set "
+            "it to true or leave it out",
         )
-    if device.actuator.kind == VANE:
-        return device
-    # An actuator of another kind has what a vane of its mean size would have, for whatever is made for a vane.
-    growth, (is_bad, line) = growth_and_problem(device)
-    if is_bad:
-        raise ParameterError(f"{device.name}: {line(0)}")
-    return replace(device, actuator=replace(device.actuator, torque_constant=growth, displacement_per_radian=growth))
+    if actuator.kind != VANE and is_ordered and not problem:
+        is_bad, line = growth_and_problem(device)[1]
+        if is_bad:
+            yield ("actuator", *stops), f"actuator: {line(0)}"
 
 
 def growth_and_problem(device: Device) -> tuple[Any, Problem]:
@@ -142,15 +169,6 @@ def growth_and_problem(device: Device) -> tuple[Any, Problem]:
         return f"chamber 1 must grow with the angle, and grows by {at(growth, run):.4g} m^3/rad at supply pressure"
 
     return growth, (np.logical_not(growth > 0.0), line)
-
-
-def _supply(parameter_set: ParameterSet, read: Reader) -> Supply:
-    """Return the supply; with one chamber, the port of the second one is at the atmosphere and passes nothing."""
-    numbers = read("supply", _present(parameter_set, "supply"))
-    if parameter_set.has_one_chamber:
-        numbers["dorsiflexion_pressure"] = numbers["atmospheric_pressure"]
-    relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
-    return Supply(**numbers, relieving=relieving is not None and relieving.value)
 
 
 def _present(parameter_set: ParameterSet, section: str) -> tuple[Quantity, ...]:
@@ -165,7 +183,7 @@ def _actuator(parameter_set: ParameterSet, read: Reader) -> Actuator:
     kind = ACTUATORS[parameter_set.actuator_kind]
     numbers = read("actuator", _present(parameter_set, "actuator"))
     has_one_chamber = parameter_set.has_one_chamber
-    actuator = Actuator(
+    return Actuator(
         torque_constant=numbers.get("torque_constant", 0.0),
         displacement_per_radian=numbers.get("displacement_per_radian", 0.0),
         angle_min=numbers["angle_min"],
@@ -178,10 +196,6 @@ def _actuator(parameter_set: ParameterSet, read: Reader) -> Actuator:
         settings={} if kind.name == VANE else {quantity.name: numbers[quantity.name] for quantity in kind.quantities},
         table=parameter_set.actuator_table,
     )
-    # Stops in the wrong order are refused by name later, with the other rules between two numbers.
-    if actuator.angle_min < actuator.angle_max and (problem := actuator_problem(actuator)):
-        raise ParameterError(f"{parameter_set.file}: actuator: {problem}")
-    return actuator
 
 
 def actuator_problem(actuator: Actuator) -> str:
@@ -202,7 +216,7 @@ def actuator_problem(actuator: Actuator) -> str:
         f"{math.degrees(low):.4g} to {math.degrees(high):.4g} deg"
         for low, high in ((table.first_angle, table.last_angle), (stops.angle_min, stops.angle_max))
     )
-    return f"its file was measured from {measured}, and the stops are at {wanted}"
+    return f"its file was measured from {measured}, and the stops are at {wanted}; measure further, or move the stops"
 
 
 def beyond_pressures(device: Device) -> Problem:
@@ -254,9 +268,9 @@ def _reader(parameter_set: ParameterSet) -> Reader:
 
 
 def _orifice(parameter_set: ParameterSet, read: Reader, section: str) -> Orifice | SonicOrifice:
-    if _uses_sonic_form(parameter_set, section):
-        return SonicOrifice(**read(section, declaration.SONIC_FORM))
-    return Orifice(**read(section, declaration.AREA_FORM))
+    form = _orifice_form(parameter_set, section)
+    numbers = read(section, form)
+    return SonicOrifice(**numbers) if form is declaration.SONIC_FORM else Orifice(**numbers)
 
 
 def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:
@@ -266,13 +280,14 @@ def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:
     return tuple(path.rpartition(".")[2] for path in stated) if in_two_forms(stated) else ()
 
 
-def _uses_sonic_form(parameter_set: ParameterSet, section: str) -> bool:
-    """Return True for an orifice in the form of ISO 6358; ParameterError for an orifice in both forms."""
+def _orifice_form(parameter_set: ParameterSet, section: str) -> tuple[Quantity, ...]:
+    """Return the quantities of the form in which an orifice is given; ParameterError for an orifice in both forms."""
     both = both_forms(parameter_set, section)
     if both:
         wanted = either(f"{section}.{both[0]}")
         raise ParameterError(f"{parameter_set.file}: {section} has {', '.join(both)}; {wanted}")
-    return any(f"{section}.{quantity.name}" in parameter_set.numbers for quantity in declaration.SONIC_FORM)
+    is_sonic = any(f"{section}.{quantity.name}" in parameter_set.numbers for quantity in declaration.SONIC_FORM)
+    return declaration.SONIC_FORM if is_sonic else declaration.AREA_FORM
 
 
 def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:
@@ -285,9 +300,7 @@ def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:
     ]
     leaks = () if parameter_set.has_one_chamber else ("actuator.leak",)
     for section in (*leaks, f"valves.{valve}"):
-        sonic = _uses_sonic_form(parameter_set, section)
-        form = declaration.SONIC_FORM if sonic else declaration.AREA_FORM
-        needed += [f"{section}.{member.name}" for member in form]
+        needed += [f"{section}.{member.name}" for member in _orifice_form(parameter_set, section)]
     kind = parameter_set.valve_kinds[valve]
     needed += [f"valves.{valve}.{member.name}" for member in VALVES[kind].quantities if member.default is None]
     # Without numbers of their own, chamber 2 has the pressure of chamber 1, and a vane displaces its torque constant.

@@ -149,6 +149,12 @@ def _units(header: Sequence[str], file: str) -> dict[str, str]:
     for cell in header:
         name, bracket, unit = (part.strip() for part in cell.strip().removesuffix("]").partition("["))
         if name not in COLUMNS:
+            if "torque" in name.lower():
+                raise ParameterError(
+                    f"{file}: column '{one_line(name)[:_LONGEST]}': the table holds volumes, not torques; "
+                    "integrate dV/dangle = dT/dpressure (T/p of a rigid chamber) over the angle, from the volumes at "
+                    "the first angle: lines to paste are under 'From torques' of docs/how-to/extend.md"
+                )
             shown, hint = one_line(name)[:_LONGEST], nearest_name(name, COLUMNS)
             raise ParameterError(f"{file}: unknown column '{shown}'{hint}; allowed: {', '.join(COLUMNS)}")
         if name in units:

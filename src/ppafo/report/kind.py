@@ -116,6 +116,8 @@ class Kind:
 PLAIN = Kind()
 """Kind of dimensionless numbers, and of texts."""
 TIME = Kind("Time", "s", "time")
+_LONG = 120.0
+"""Duration [s] above which durations and time axes are in minutes."""
 
 
 def of_metric(name: str, form: str = ".4g") -> Kind:
@@ -137,3 +139,8 @@ def of_path(path: str, unit: str, form: str = ".6g", given: str = "") -> Kind:
 def of_channel(name: str, unit: str) -> Kind:
     """Return the kind of a channel of a recording, from its SI unit."""
     return Kind(name.replace("_", " ").capitalize(), unit, quantity_of_unit(unit))
+
+
+def duration_kind(longest: float) -> Kind:
+    """Return the kind of durations up to the longest [s]: in seconds, or in minutes above two minutes."""
+    return Kind("Time", "s", "duration") if longest > _LONG else TIME

@@ -70,7 +70,7 @@ def asked(
                     return subprocess.CompletedProcess(line, process.returncode, said, complained)
                 interrupts.check()
                 if time.monotonic() > end:
-                    raise CompilerError(f"{Path(line[0]).name} did not end within {seconds:g} s and was stopped")
+                    raise CompilerError(f"{Path(line[0]).name} did not finish within {seconds:g} s and was stopped")
         finally:
             # Ended by an interrupt or its time, the driver's children would go on.
             if process.poll() is None or process.returncode < 0:
@@ -84,7 +84,7 @@ def asked(
 def complaint(done: "subprocess.CompletedProcess[str]") -> str:
     """Return the line of the compiler output that states the error, or the exit status if there is no output."""
     # gcc and clang say it on stderr, some wrappers on stdout.
-    lines = [*done.stderr.splitlines(), *done.stdout.splitlines(), f"it ended with {done.returncode}"]
+    lines = [*done.stderr.splitlines(), *done.stdout.splitlines(), f"it returned {done.returncode}"]
     return one_line(next((text for text in lines if "error" in text), next(filter(str.strip, lines))))
 
 
@@ -119,4 +119,4 @@ def compile_library(source: str, library: Path, command: Sequence[str], flags: S
         passing = done.returncode < 0 or any(sign in done.stderr.casefold() for sign in _PASSING)
         raise CompilerError(f"{name} does not compile a model: {complaint(done)}", passing=passing)
     if not library.is_file():
-        raise CompilerError(f"{name} ended without an error, but made no library")
+        raise CompilerError(f"{name} returned 0 but produced no library")

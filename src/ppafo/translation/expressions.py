@@ -42,10 +42,10 @@ EXACT = 2**53
 """Largest magnitude up to which a float represents every integer."""
 INTEGER_OPERATORS = frozenset({"&", "|", "^", ">>"})
 _REMEDIES = {
-    "exp": ", whose last bits differ between computers: decay_factors(rate, step) of ppafo.model.sensors gives "
-    "exp(-rate * step) with the same bits everywhere, exponential(exponent) of ppafo.model.elementary any other",
-    "log": ", whose last bits differ between computers: take logarithm(number) of ppafo.model.elementary",
-    "pow": ", whose last bits differ between computers: take power(base, exponent) of ppafo.model.elementary",
+    "exp": ", because its last bits differ between computers; for exp(-rate * step) use decay_factors(rate, step) of "
+    "ppafo.model.sensors, otherwise exponential(exponent) of ppafo.model.elementary",
+    "log": ", because its last bits differ between computers; use logarithm(number) of ppafo.model.elementary",
+    "pow": ", because its last bits differ between computers; use power(base, exponent) of ppafo.model.elementary",
 }
 """Replacement for a function of a library, if the package has one."""
 
@@ -73,14 +73,14 @@ class Expressions:
         """Return the typed term of an expression."""
         handler: Callable[[Any], Term] | None = getattr(self, f"_of_{type(node).__name__.lower()}", None)
         if handler is None:
-            raise self.refused(node, f"'{ast.unparse(node)}' is not supported in compiled functions")
+            raise self.refused(node, f"the expression '{ast.unparse(node)}' is not supported")
         return handler(node)
 
     def scalar(self, node: ast.expr, least: Scalar = BOOL) -> Term:
         """Return the term of an expression that must be a single number, converted to ``least`` or a wider type."""
         term = self.term(node)
         if not isinstance(term.type, Scalar):
-            raise self.refused(node, f"'{ast.unparse(node)}' is not one number")
+            raise self.refused(node, f"'{ast.unparse(node)}' must be a single number")
         kind = joined(term.type, least)
         assert kind is not None
         return converted(term, kind)
@@ -89,7 +89,7 @@ class Expressions:
         """Return the term of an expression that must be an integer."""
         term = self.scalar(node, INT)
         if term.type != INT:
-            raise self.refused(node, f"'{ast.unparse(node)}' is not an integer")
+            raise self.refused(node, f"'{ast.unparse(node)}' must be an integer")
         return term
 
     def condition(self, node: ast.expr) -> Term:
@@ -102,14 +102,14 @@ class Expressions:
     def literal_slice(self, node: ast.expr) -> slice:
         """Return the slice of a tuple, whose bounds must be literals."""
         if not isinstance(node, ast.Slice) or node.step is not None:
-            raise self.refused(node, f"'{ast.unparse(node)}' is not a part of a tuple")
+            raise self.refused(node, f"the index '{ast.unparse(node)}' must be a slice without a step, such as 1:3")
         return slice(*(None if bound is None else self.literal(bound) for bound in (node.lower, node.upper)))
 
     def literal(self, node: ast.expr) -> int:
         """Return the value of an integer literal."""
         number = _literal(self.integer(node))
         if number is None:
-            raise self.refused(node, f"'{ast.unparse(node)}' must be a literal number")
+            raise self.refused(node, f"'{ast.unparse(node)}' must be an integer literal")
         return number
 
     def _of_constant(self, node: ast.Constant) -> Term:
@@ -117,7 +117,9 @@ class Expressions:
         is_too_large = type(node.value) is int and node.value >= 2**63
         # Beyond 63 bits C has no signed number.
         if type(node.value) not in kinds or is_too_large:
-            raise self.refused(node, f"the constant {node.value!r}")
+            raise self.refused(
+                node, f"the constant {node.value!r} must be a float, a boolean or an integer of at most 63 bits"
+            )
         return Term("number", kinds[type(node.value)], (), node.value)
 
     def _of_name(self, node: ast.Name) -> Term:
@@ -125,7 +127,7 @@ class Expressions:
             return Term("name", self.types[node.id], (), node.id)
         if node.id in self.definitions:
             return Term("name", FunctionArgument(node.id), (), node.id)
-        raise self.refused(node, f"'{node.id}' has no value")
+        raise self.refused(node, f"the name '{node.id}' is not defined")
 
     def _of_attribute(self, node: ast.Attribute) -> Term:
         if isinstance(node.value, ast.Name) and node.value.id == "math" and node.attr in CONSTANTS:
@@ -144,7 +146,7 @@ class Expressions:
             array, dimension = self.term(node.value.value), self.literal(node.slice)
             kind = array.type
             if array.kind != "name" or not isinstance(kind, Array) or dimension not in range(kind.dimensions):
-                raise self.refused(node, f"'{ast.unparse(node)}' is not an extent of an array")
+                raise self.refused(node, f"'{ast.unparse(node)}' must be the size of an existing dimension of an array")
             return (
                 Term("number", INT, (), kind.shape[dimension])
                 if kind.shape
@@ -154,7 +156,7 @@ class Expressions:
         if isinstance(owner.type, Array):
             return self.element(owner, owner.type, node)
         if not isinstance(owner.type, Items | Row):
-            raise self.refused(node, f"'{ast.unparse(node.value)}' has no items")
+            raise self.refused(node, f"'{ast.unparse(node.value)}' cannot be indexed, because it is not a tuple")
         count = len(types_in(owner.type))
         if isinstance(node.slice, ast.Slice):
             parts = tuple(typed.item_of(owner, number) for number in range(count)[self.literal_slice(node.slice)])
@@ -163,20 +165,24 @@ class Expressions:
         number = _literal(index)
         if number is not None:
             if not -count <= number < count:
-                raise self.refused(node, f"'{ast.unparse(node)}' is beyond the {count} items")
+                raise self.refused(
+                    node, f"the index of '{ast.unparse(node)}' is out of range; the tuple has {count} items"
+                )
             return typed.item_of(owner, range(count)[number])
         if not isinstance(owner.type, Items) or not owner.type.is_uniform:
-            raise self.refused(node, f"'{ast.unparse(node)}' indexes a tuple of several types by a variable")
+            raise self.refused(
+                node, f"'{ast.unparse(node)}' indexes a tuple of several types; the index must be an integer literal"
+            )
         return Term("item", owner.type.types[0], (owner, self.from_start(index, Term("number", INT, (), count))))
 
     def element(self, owner: Term, kind: Array, node: ast.Subscript) -> Term:
         """Return the term of an array element with all its indices, or of a slice along the first index."""
         if owner.kind != "name":
-            raise self.refused(node, f"'{ast.unparse(node)}' indexes an array that has no name")
+            raise self.refused(node, f"'{ast.unparse(node)}' indexes an expression; assign the array to a name first")
         if isinstance(node.slice, ast.Slice):
             begin, end = node.slice.lower, node.slice.upper
             if begin is None or end is None or node.slice.step is not None or kind.shape:
-                problem = f"'{ast.unparse(node.slice)}' is not a slice with start and stop"
+                problem = f"the slice '{ast.unparse(node.slice)}' must have a start, a stop and no step"
                 raise self.refused(node.slice, problem)
             # Both bounds lie in it: what is beyond is not looked for.
             count = Term("extent", INT, (owner,), 0)
@@ -185,7 +191,7 @@ class Expressions:
         indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         extents = kind.shape or (None,) * kind.dimensions
         if len(indices) != len(extents):
-            raise self.refused(node, f"'{ast.unparse(node)}' does not have {len(extents)} places")
+            raise self.refused(node, f"'{ast.unparse(node)}' must have {len(extents)} indices, it has {len(indices)}")
         terms = []
         for dimension, (index, extent) in enumerate(zip(indices, extents, strict=True)):
             count = Term("extent", INT, (owner,), dimension) if extent is None else Term("number", INT, (), extent)
@@ -221,7 +227,7 @@ class Expressions:
                 continue
             unpacked = self.term(element.value)
             if not isinstance(unpacked.type, Items | Row):
-                raise self.refused(element, f"'{ast.unparse(element)}' is no tuple")
+                raise self.refused(element, f"'{ast.unparse(element)}' must be a tuple")
             parts += [typed.item_of(unpacked, index) for index in range(len(types_in(unpacked.type)))]
         return Term("build", Items(tuple(part.type for part in parts)), tuple(parts))
 
@@ -229,7 +235,7 @@ class Expressions:
         if isinstance(node.op, ast.Not):
             return Term("not", BOOL, (self.condition(node.operand),))
         if not isinstance(node.op, ast.USub):
-            raise self.refused(node, f"'{ast.unparse(node)}'")
+            raise self.refused(node, f"the operator in '{ast.unparse(node)}' is not supported")
         value = self.scalar(node.operand, INT)
         return Term("negative", value.type, (value,))
 
@@ -238,18 +244,18 @@ class Expressions:
             parts = tuple(self.scalar(side, FLOAT) for side in (node.left, node.right))
             # Compilers replace powers of literals by products or roots, whose last bits differ from the library's.
             if any((part.parts[0] if part.kind == "negative" else part).kind == "number" for part in parts):
-                problem = "a power with a literal base or exponent"
-                raise self.refused(node, f"'{ast.unparse(node)}', {problem}")
+                problem = "must not have a literal base or exponent; write a product, or use parameters"
+                raise self.refused(node, f"the power '{ast.unparse(node)}' {problem}")
             return Term("pow", FLOAT, parts)
         sign = SIGN_OF.get(type(node.op), "")
         self.check_sides(node, sign, self.term(node.left), self.term(node.right))
         left, right = self.scalar(node.left, INT), self.scalar(node.right, INT)
         is_whole = left.type == right.type == INT
         if not sign or (not is_whole and sign in INTEGER_OPERATORS | {"//", "%"}):
-            raise self.refused(node, f"'{ast.unparse(node)}' needs a library function")
+            raise self.refused(node, f"the operator in '{ast.unparse(node)}' has no equivalent in C for these types")
         # A shift by 64 or more, or by less than 0, is undefined in C.
         if sign == ">>" and _literal(right) not in range(64):
-            raise self.refused(node, f"'{ast.unparse(node)}' shifts by other than a literal from 0 to 63")
+            raise self.refused(node, f"'{ast.unparse(node)}' must shift by an integer literal from 0 to 63")
         kind = INT if is_whole and sign != "/" else FLOAT
         return Term(sign, kind, (converted(left, kind), converted(right, kind)))
 
@@ -257,12 +263,12 @@ class Expressions:
         """Raise ProgramError for an operator between a number and a value of another kind."""
         if isinstance(left.type, Scalar) != isinstance(right.type, Scalar):
             sides = f"{kind_of(left.type)} and {kind_of(right.type)}"
-            raise self.mistaken(node, f"'{sign}' cannot be compiled for {sides}, in '{{written}}'")
+            raise self.mistaken(node, f"'{{written}}' applies '{sign}' to {sides}, which cannot be compiled")
 
     def _of_boolop(self, node: ast.BoolOp) -> Term:
         parts = [self.term(value) for value in node.values]
         if any(part.type != BOOL for part in parts):
-            raise self.refused(node, f"the value of '{ast.unparse(node)}', which is no truth value in Python")
+            raise self.refused(node, f"the operands of '{ast.unparse(node)}' must be booleans")
         return _linked(node, parts)
 
     def _of_compare(self, node: ast.Compare) -> Term:
@@ -275,10 +281,12 @@ class Expressions:
         for sign, left, right in zip(node.ops, values, values[1:], strict=False):
             kind = joined(left.type, right.type)
             if type(sign) not in SIGN_OF or kind is None:
-                raise self.refused(node, f"'{ast.unparse(node)}'")
+                raise self.refused(node, f"the comparison '{ast.unparse(node)}' is not supported")
             # A large integer that becomes a float may round, and Python compares the exact numbers.
             if kind == FLOAT and not all(map(self.is_exact, (left, right))):
-                raise self.refused(node, f"'{ast.unparse(node)}' compares a whole number with a float")
+                raise self.refused(
+                    node, f"'{ast.unparse(node)}' compares an integer with a float; convert the integer with float()"
+                )
             comparison = Term(SIGN_OF[type(sign)], BOOL, (converted(left, kind), converted(right, kind)))
             made = comparison if made is None else Term("and", BOOL, (made, comparison))
         assert made is not None
@@ -297,17 +305,19 @@ class Expressions:
         test, yes, no = self.condition(node.test), self.term(node.body), self.term(node.orelse)
         kind = joined(yes.type, no.type)
         if kind is None:
-            raise self.refused(node, "a choice between values of different types")
+            raise self.refused(node, f"both branches of '{ast.unparse(node)}' must have the same type")
         # In C both sides get one type: an int that becomes a float loses digits, and -0 differs from 0.
         if mixes(yes.type, no.type):
-            raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
+            raise self.refused(
+                node, f"'{ast.unparse(node)}' mixes an integer and a float; convert the integer with float()"
+            )
         return Term("choice", kind, (test, converted(yes, kind), converted(no, kind)))
 
     def name_called(self, node: ast.Call) -> str:
         """Return the name of the called function, with functions passed as arguments resolved."""
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
         if any(isinstance(argument, ast.Starred) for argument in node.args):
-            raise self.refused(node, f"'{ast.unparse(node)}' passes a tuple as arguments")
+            raise self.refused(node, f"'{ast.unparse(node)}' expands a tuple into arguments; pass each argument")
         argument_type = self.types.get(name)
         return argument_type.name if isinstance(argument_type, FunctionArgument) else name
 
@@ -318,13 +328,13 @@ class Expressions:
             values = dict(zip(fields, map(self.term, node.args), strict=False))
             values |= {str(keyword.arg): self.term(keyword.value) for keyword in node.keywords}
             if set(values) != set(fields):
-                raise self.refused(node, f"'{ast.unparse(node)}' does not give every field")
+                raise self.refused(node, f"'{ast.unparse(node)}' must give each of the fields {', '.join(fields)}")
             parts = tuple(values[name] for name in fields)
             return Term("build", Row(name, tuple(zip(fields, (part.type for part in parts), strict=True))), parts)
         if name in self.definitions:
             function, arguments = self.called(name, node)
             if function.returns is None:
-                raise self.refused(node, f"'{name}' returns nothing")
+                raise self.refused(node, f"function '{name}' returns no value that could be used")
             return Term("call", function.returns, arguments, function.name)
         return self.built_in(name, node)
 
@@ -352,7 +362,7 @@ class Expressions:
         types = tuple(values[name].type for name in names)
         # An array of known shape is a local one, which C hands over as a pointer of another type.
         if any(isinstance(kind, Array) and kind.shape for kind in types):
-            raise self.refused(node, f"'{ast.unparse(node)}' passes an array expression")
+            raise self.refused(node, f"'{ast.unparse(node)}' must not pass a local array")
         return self.made(name, types), tuple(values[name] for name in names if not is_empty(values[name].type))
 
     def built_in(self, name: str, node: ast.Call) -> Term:
@@ -361,14 +371,14 @@ class Expressions:
         least = FLOAT if function in LIBRARY | {"sqrt", "float"} else INT
         known = FUNCTIONS | {"float", "int", "bool", "len"} | (self.library - {"pow"})
         if function not in known or node.keywords:
-            raise self.refused(node, f"'{name}' is a function of a library{_REMEDIES.get(function, '')}")
+            raise self.refused(node, f"the function '{name}' is not supported{_REMEDIES.get(function, '')}")
         if len(node.args) < 1 or (function in ("min", "max")) != (len(node.args) > 1):
-            raise self.refused(node, f"'{ast.unparse(node)}' with {len(node.args)} arguments")
+            raise self.refused(node, f"'{ast.unparse(node)}' has the wrong number of arguments, {len(node.args)}")
         # Lengths of tuples are known: they become numbers.
         if function == "len":
             kind = self.term(node.args[0]).type
             if not isinstance(kind, Items | Row):
-                raise self.refused(node, f"'{ast.unparse(node.args[0])}' has no items")
+                raise self.refused(node, f"'{ast.unparse(node.args[0])}' has no length, because it is not a tuple")
             return Term("number", INT, (), len(types_in(kind)))
         if function == "bool":
             return self.condition(node.args[0])
@@ -378,7 +388,9 @@ class Expressions:
             return made if function == "float" or kind == INT else Term("convert", INT, (made,))
         # Python's min returns the number as it is, an int or a float: C has one type for both.
         if any(other.type != kind for other in others):
-            raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
+            raise self.refused(
+                node, f"'{ast.unparse(node)}' mixes an integer and a float; convert the integer with float()"
+            )
         if not others:
             return Term(function, kind, (made,))
         for other in others:

@@ -76,7 +76,9 @@ class NativeEntry:
         for array, dimensions in zip(arrays, self.dimensions, strict=True):
             if array.dtype != _FLOATS or array.ndim != dimensions:
                 problem = f"not one of {array.dtype} {array.shape}"
-                raise TypeError(f"an array of floats in {dimensions} dimensions is needed, {problem}")
+                raise TypeError(
+                    f"a compiled model needs a contiguous float64 array of {dimensions} dimensions, {problem}"
+                )
             # Refuses what is read-only, or does not lie row after row.
             numbers.append(ctypes.addressof(_NO_FLOATS.from_buffer(array)))
             numbers += array.shape
@@ -101,10 +103,10 @@ def fill_module(module: ModuleType, library: Path, parameters: Mapping[str, Para
         # One product tells whether the compiler fuses or reorders, whatever its flags were.
         rounds_as_written = loaded[ROUNDS_AS_WRITTEN](*numbers)
     except AttributeError:
-        raise CompilerError("the library of a compiled model lacks its functions") from None
+        raise CompilerError("the library of a compiled model does not export its functions") from None
     if not rounds_as_written:
         raise CompilerError(
-            "the compiler joins or reorders sums and products, so that results would differ from other compilers' "
+            "the compiler fuses or reorders sums and products, so results would differ from those of other compilers "
             "(look for -ffp-contract or -ffast-math in its wrapper or in the environment)"
         )
     for name, (dimensions, types) in parameters.items():

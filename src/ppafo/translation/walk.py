@@ -100,9 +100,9 @@ class _ModuleWalk:
         """Return the error for untranslatable code at a node, with file and line of the original source."""
         number = getattr(where, "lineno", 0)
         place = place_in(self.lines, number)
-        problem = f"{problem}, which cannot be translated"
+        problem = f"cannot be translated to C: {problem}"
         if place is None:
-            return UntranslatableError(f"the lane loop, line {number} of the composed module: {problem}")
+            return UntranslatableError(f"generated loop over runs, line {number}: {problem}")
         return UntranslatableError(str(refusal(place.file, place.line, problem)))
 
     def mistaken(self, where: ast.AST, problem: str, sought: str = "") -> ProgramError:
@@ -172,10 +172,13 @@ class _FunctionWalk:
             body = self.block(self.definition.body)
         for parameter, kind in zip(names, types, strict=True):
             if self.types[parameter] != kind:
-                problem = f"'{parameter}' is given as one type and becomes another; give the second a name of its own"
+                problem = f"parameter '{parameter}' is assigned a value of another type; use a new name for that value"
                 raise self.refused(self.definition, problem)
         if self.writes is not None and self.returns is not None:
-            raise self.refused(self.writes, f"'{self.definition.name}' returns a value and writes into an array")
+            raise self.refused(
+                self.writes,
+                f"function '{self.definition.name}' both returns a value and writes into an array; do one of them",
+            )
         passed = tuple(Parameter(name, self.types[name]) for name in names if not is_empty(self.types[name]))
         bound = tuple(
             f"{name} is {kind.name}"
@@ -207,7 +210,7 @@ class _FunctionWalk:
                 return self.loop(node, lambda: typed.While(test, self.block(node.body)))
         handler: Callable[[Any], list[Statement]] | None = getattr(self, f"do_{type(node).__name__.lower()}", None)
         if handler is None:
-            raise self.refused(node, f"'{ast.unparse(node).splitlines()[0]}' is not supported in compiled functions")
+            raise self.refused(node, f"the statement '{ast.unparse(node).splitlines()[0]}' is not supported")
         return handler(node)
 
     def do_expr(self, node: ast.Expr) -> list[Statement]:
@@ -215,41 +218,43 @@ class _FunctionWalk:
             return [typed.Note(node.value.value)] if isinstance(node.value.value, str) else []
         name = self.values.name_called(node.value) if isinstance(node.value, ast.Call) else ""
         if not isinstance(node.value, ast.Call) or name not in self.module.definitions:
-            raise self.refused(node, f"'{ast.unparse(node)}' is not supported in compiled functions")
+            raise self.refused(node, f"the statement '{ast.unparse(node)}' is not supported")
         function, arguments = self.values.called(name, node.value)
         if function.returns is not None:
-            raise self.refused(node, f"'{ast.unparse(node)}' discards its return value")
+            raise self.refused(node, f"'{ast.unparse(node)}' discards its return value; assign it to a name")
         self.writes = node
         return [typed.ProcedureCall(function.name, arguments)]
 
     def do_return(self, node: ast.Return) -> list[Statement]:
         if node.value is None:
-            raise self.refused(node, "'return' without a value")
+            raise self.refused(node, "'return' needs a value")
         value = self.values.term(node.value)
         kind = value.type if self.returns is None else joined(self.returns, value.type)
         if kind is None:
             kinds = sorted({kind_of(kind) for kind in (self.returns, value.type) if kind is not None})
-            problem = f"the paths through the function return different types: {' or '.join(kinds)}"
+            problem = f"the function must return one type, but it returns {' or '.join(kinds)}"
             raise self.module.mistaken(self.first_return or node, problem)
         if self.returns is not None and mixes(self.returns, value.type):
-            raise self.refused(node, "a function that returns a whole number in one place and a float in another")
+            raise self.refused(
+                node, "the function returns both an integer and a float; convert the integer with float()"
+            )
         self.has_widened |= self.returns is not None and kind != self.returns
         self.returns, self.first_return = kind, self.first_return or node
         return [typed.Return(converted(value, kind))]
 
     def do_for(self, node: ast.For) -> list[Statement]:
         if not isinstance(node.target, ast.Name):
-            raise self.refused(node, f"'for {ast.unparse(node.target)}'")
+            raise self.refused(node, f"the loop variable '{ast.unparse(node.target)}' must be a single name")
         call, name = node.iter, node.target.id
         if not (isinstance(call, ast.Call) and ast.unparse(call.func) == "range"):
             return self.loop_over_items(name, node)
         bounds = [self.values.integer(bound) for bound in call.args]
         if not 1 <= len(bounds) <= 3 or call.keywords:
-            raise self.refused(node, f"'{ast.unparse(call)}'")
+            raise self.refused(node, f"'{ast.unparse(call)}' must have 1 to 3 positional arguments")
         start, stop = (Term("number", INT, (), 0), bounds[0]) if len(bounds) == 1 else bounds[:2]
         step = self.values.literal(call.args[2]) if len(bounds) == 3 else 1
         if step == 0:
-            raise self.refused(node, f"'{ast.unparse(call)}' discards its result")
+            raise self.refused(node, f"'{ast.unparse(call)}' has a step of 0")
         self.note_type(name, INT, node)
         before: list[Statement] = []
         if stop.reads & {name, *changed(node.body)}:
@@ -262,9 +267,9 @@ class _FunctionWalk:
         """Translate a loop over a tuple or a slice of a tuple into a counted loop."""
         owner = self.values.term(node.iter.value if isinstance(node.iter, ast.Subscript) else node.iter)
         if not isinstance(owner.type, Items) or not owner.type.is_uniform:
-            raise self.refused(node, f"'{ast.unparse(node.iter)}' is no tuple of one type")
+            raise self.refused(node, f"'{ast.unparse(node.iter)}' must be a tuple with items of one type")
         if owner.reads & {name, *changed(node.body)}:
-            raise self.refused(node, f"a loop over '{ast.unparse(node.iter)}' that changes it")
+            raise self.refused(node, f"the loop assigns '{ast.unparse(node.iter)}' while it iterates over it")
         indices = range(len(owner.type.types))
         if isinstance(node.iter, ast.Subscript):
             indices = indices[self.values.literal_slice(node.iter.slice)]
@@ -300,7 +305,7 @@ class _FunctionWalk:
 
     def do_assign(self, node: ast.Assign) -> list[Statement]:
         if len(node.targets) != 1:
-            raise self.refused(node, "one value assigned to several names")
+            raise self.refused(node, "an assignment must have one target; write one assignment for each name")
         target, right = node.targets[0], node.value
         called = right.func if isinstance(right, ast.Call) else None
         if isinstance(target, ast.Name) and isinstance(called, ast.Name) and called.id == "empty_rows":
@@ -322,7 +327,7 @@ class _FunctionWalk:
             return [self.set_field(target, value)]
         element = self.values.term(target) if isinstance(target, ast.Subscript) else value
         if not isinstance(target, ast.Subscript) or element.kind != "element" or not isinstance(value.type, Scalar):
-            raise self.refused(node, f"'{ast.unparse(target)}' on the left")
+            raise self.refused(node, f"'{ast.unparse(target)}' cannot be assigned")
         owner = element.parts[0].type
         if isinstance(owner, Array) and not owner.shape:
             self.writes = node
@@ -336,9 +341,9 @@ class _FunctionWalk:
             owner = owner.parts[0]
         is_shared = isinstance(owner.type, RowReference)
         if owner.kind != "name" or element is owner or (owner.detail in self.parameters and not is_shared):
-            raise self.refused(target, f"'{ast.unparse(target)}' on the left")
+            raise self.refused(target, f"'{ast.unparse(target)}' cannot be assigned")
         if joined(element.type, value.type) != element.type:
-            raise self.refused(target, f"'{ast.unparse(target)}' gets a value of another type")
+            raise self.refused(target, f"'{ast.unparse(target)}' is assigned a value of another type")
         if is_shared:
             self.writes = target
         return typed.Store(element, converted(value, element.type))
@@ -360,9 +365,11 @@ class _FunctionWalk:
         before = self.types.get(name, kind)
         joint = joined(before, kind)
         if joint is None:
-            raise self.refused(node, f"'{name}' holds values of different types")
+            raise self.refused(node, f"'{name}' is assigned values of different types; use one name for each type")
         if mixes(before, kind):
-            raise self.refused(node, f"'{name}' holds a whole number in one place and a float in another")
+            raise self.refused(
+                node, f"'{name}' is assigned both an integer and a float; convert the integer with float()"
+            )
         self.has_widened |= joint != before
         self.types[name] = joint
 
@@ -372,8 +379,8 @@ class _FunctionWalk:
         is_stored = len(names) < len(target.elts)
         kind = value.type
         if not isinstance(kind, Items | Row) or len(types_in(kind)) != len(target.elts):
-            other = "" if isinstance(kind, Items | Row) else f", not {kind_of(kind)}"
-            raise self.module.mistaken(node, f"'{{written}}' needs as many values as there are names{other}")
+            other = "" if isinstance(kind, Items | Row) else f", but the value is {kind_of(kind)}"
+            raise self.module.mistaken(node, f"'{{written}}' must have as many values as names{other}")
         before: list[Statement] = []
         if value.kind != "build" or value.reads & set(names) or (is_stored and value.reads):
             name = self.fresh("_and_".join(name for name in names if name != "_") or "items", kind)

@@ -129,7 +129,7 @@ class _Ranges:
             elif isinstance(statement, typed.CountedLoop) and statement.step == 1:
                 self.count(function, statement, names, results)
             else:
-                raise _refused(function, f"'{type(statement).__name__.lower()}'")
+                raise _refused(function, f"the statement '{type(statement).__name__.lower()}' is not supported")
 
     def count(self, function: Function, loop: typed.CountedLoop, names: Names, results: list[Range]) -> None:
         """Evaluate a loop by iterations; afterwards, names have their ranges over all possible iteration counts."""
@@ -137,7 +137,7 @@ class _Ranges:
         assert isinstance(start, IntegerRange)
         assert isinstance(stop, IntegerRange)
         if start.low != start.high or stop.high - start.low > MOST_TURNS:
-            raise _refused(function, f"a loop of more than {MOST_TURNS} turns, or without a literal start")
+            raise _refused(function, f"a loop must have a literal start and at most {MOST_TURNS} iterations")
         # A loop without a turn leaves the counter as it was; it has a width all the same.
         self.keep(function, dict(names), loop.name, INT, IntegerRange(start.low, max(start.low, stop.high)))
         after = dict(names) if stop.low <= start.low else None
@@ -176,7 +176,7 @@ class _Ranges:
             known = self.terms.get(id(term), value)
             self.terms[id(term)] = every = IntegerRange(min(known.low, value.low), max(known.high, value.high))
             if term.type == INT and _width(every) is None:
-                raise _refused(function, f"a value from {every.low} to {every.high}, beyond 32 bits")
+                raise _refused(function, f"a value from {every.low} to {every.high} exceeds 32 bits")
         return value
 
 
@@ -194,9 +194,9 @@ def _calculated(function: Function, term: Term, parts: list[IntegerRange]) -> In
     if term.kind == "&" and parts[1].low == parts[1].high and parts[1].low >= 0:
         return IntegerRange(0, parts[1].high)
     if term.kind == "*" and not any(part.low == part.high and part.low.bit_count() == 1 for part in parts):
-        raise _refused(function, "a product by a number that is not a power of two, which needs a multiplier")
+        raise _refused(function, "a product must have a power of two as one factor, so that a shift computes it")
     if term.kind not in _SIGNS:
-        raise _refused(function, f"'{term.kind}'")
+        raise _refused(function, f"the operation '{term.kind}' is not supported")
     # Sums, products, shifts, min and max have their extremes at the ends of both ranges.
     left, other = parts
     ends = [_SIGNS[term.kind](left, right) for left in left for right in other]
@@ -209,8 +209,8 @@ def _join(names: Names, other: Names) -> None:
         names[name] = hull(names.get(name, value), value)
 
 
-def _refused(function: Function, what: str) -> ProgramError:
-    return ProgramError(f"{function.source}: {what}, which cannot be taken to whole numbers of 16 and 32 bits")
+def _refused(function: Function, problem: str) -> ProgramError:
+    return ProgramError(f"{function.source}: cannot be converted to integers of 16 and 32 bits: {problem}")
 
 
 def _width(interval: IntegerRange) -> Scalar | None:
@@ -244,7 +244,7 @@ class _Narrowing:
         assert isinstance(value, IntegerRange)
         width = _width(value)
         if kind == INT and width is None:
-            raise _refused(self.item, f"a value from {value.low} to {value.high}, beyond 32 bits")
+            raise _refused(self.item, f"a value from {value.low} to {value.high} exceeds 32 bits")
         return width if kind == INT and width is not None else kind
 
     def of_name(self, name: str, kind: Type) -> Type:

@@ -206,6 +206,10 @@ def compare_walks(
     # Without the device for the same time, which a bottle may have shortened.
     duration = minutes if ending is None else float(worn.recording.time[-1]) / 60.0
     bare = walk(without_device(configuration), minutes=duration, progress=progress)
+    # The leg alone is computed with two chambers of no device: a chamber that the device has not is none of the leg's.
+    shared = {name: channel for name, channel in bare.recording.channels.items() if name in worn.recording}
+    averages = {name: curves for name, curves in bare.averages.items() if name in shared}
+    bare = replace(bare, recording=replace(bare.recording, channels=shared), averages=averages)
     return WalkComparison(worn, bare, healthy_metrics(configuration))
 
 

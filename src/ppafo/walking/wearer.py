@@ -292,8 +292,13 @@ def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
         low, high = STATURES
         line += f"; {wearer.stature:.4g} m tall, and the segments follow mass and stature"
         if not low <= wearer.stature <= high:
-            line += f", outside the {low:g} to {high:g} m of adults of whom that is known: give the segments themselves"
+            line += (
+                f" in the proportions of adults of {low:g} to {high:g} m, extrapolated here: set measured segments, "
+                "wearer.shank_length and the others of [wearer]"
+            )
         line += "; the curves of the gait are not scaled by stature"
+    elif wearer.shank_mass == _PAPER.shank_mass and abs(wearer.body_mass / _PAPER.body_mass - 1.0) > _SAME:
+        line += f", with the leg of the paper's subject, {_PAPER.body_mass:g} kg; wearer.stature scales the leg"
     if is_subject:
         return line if gait.stature is None or wearer.stature != gait.stature else f"{line}, {gait.stature:.4g} m"
     if abs(wearer.body_mass - gait.body_mass) <= _SAME * gait.body_mass:
@@ -305,7 +310,7 @@ def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
     low, high = (fraction * gait.body_mass for fraction in SCALED_MASS)
     if not low <= wearer.body_mass <= high:
         line += (
-            f", which is not known to hold for a body so different (outside {low:.0f} to {high:.0f} kg): "
-            "take a gait of such a person"
+            f", extrapolated outside {low:.0f} to {high:.0f} kg; a gait recorded of such a person, imported by "
+            "'ppafo gait import', replaces it"
         )
     return line

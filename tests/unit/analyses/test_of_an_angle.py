@@ -69,7 +69,8 @@ def test_a_study_has_the_error_of_an_angle_in_its_rows(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("scenario", [SERVO, "pressure-loop"])
 def test_a_plant_is_linear_near_a_moment_of_a_run_of_an_angle_or_a_pressure(scenario: str) -> None:
-    with pytest.raises(ppafo.ScenarioError, match="give --at a time"):
-        ppafo.linearise(scenario)
+    if scenario == SERVO:
+        with pytest.raises(ppafo.ScenarioError, match="give a time of the run, such as at='1 s'"):
+            ppafo.linearise(scenario)
     model = ppafo.linearise(scenario, at="0.2 s").found
     assert model.a.shape[0] == len(model.states)

@@ -40,7 +40,7 @@ def test_what_takes_longer_is_said_while_it_runs_and_at_its_end(caplog: pytest.L
         assert caplog.messages == ["ppafo: compiling a model for this computer ..."]
     assert len(caplog.messages) == 2
     assert caplog.messages[1].startswith("ppafo: compiled in 0.")
-    assert caplog.messages[1].endswith(" s and kept in a folder")
+    assert caplog.messages[1].endswith(" s, kept in a folder")
 
 
 def test_what_fails_is_no_longer_announced(caplog: pytest.LogCaptureFixture) -> None:

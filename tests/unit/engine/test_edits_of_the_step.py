@@ -69,7 +69,7 @@ def with_gas_of_mine(of_plant: PlainFunction | None = None) -> Run:
 
 
 def test_a_parameter_of_a_gas_that_nothing_gives_is_refused_with_the_line_that_declares_it() -> None:
-    said = r"test_edits_of_the_step\.py:\d+: 'mine' is a Mine\(share\) of the parameters, and nothing gives it"
+    said = r"test_edits_of_the_step\.py:\d+: parameters: 'mine' must be a Mine\(share\); no value was given"
     with pytest.raises(ProgramError, match=said):
         batch_of(with_gas_of_mine())
 
@@ -133,6 +133,6 @@ def test_a_group_that_nothing_has_is_refused_with_the_nearest_name(
 ) -> None:
     monkeypatch.setenv("PPAFO_BACKEND", backend)
     monkeypatch.setattr(phases, "begin_step", unmade)
-    said = r"test_edits_of_the_step\.py:\d+: no phase before this one sets 'lane.befor', .*did you mean 'before'"
+    said = r"test_edits_of_the_step\.py:\d+: 'lane.befor' is not set by an earlier phase .*did you mean 'before'"
     with pytest.raises(ProgramError, match=said):
         run_batch(batch_of(plan_run(load_scenario("step-response", ("run.duration=2 ms",)))))

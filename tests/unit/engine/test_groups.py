@@ -43,9 +43,12 @@ def test_a_group_is_declared_by_one_component_and_is_known_to_a_lane() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({}, r"'mine' is a Mine\(exponent\) of the parameters, and nothing gives it; 'mine': given\(Mine, F"),
-        ({"mine": Other(1.0)}, r"'mine' is a Mine\(exponent\) of the parameters, and it is given a Other\(factor\)$"),
-        ({"mine": Mine(1.0), "yours": Other(1.0)}, r"'yours' is given \(a Other\(factor\)\), and no part"),
+        ({}, r"parameters: 'mine' must be a Mine\(exponent\); no value was given; 'mine': given\(Mine, F"),
+        ({"mine": Other(1.0)}, r"'mine' must be a Mine\(exponent\); got a Other\(factor\)$"),
+        (
+            {"mine": Mine(1.0), "yours": Other(1.0)},
+            r"no component of the program has the group 'yours' \(a Other\(factor\)\)",
+        ),
     ],
 )
 def test_a_number_that_is_forgotten_is_one_line(values: dict[str, object], message: str) -> None:
@@ -60,11 +63,13 @@ def test_numbers_of_all_runs_and_of_each_stand_in_rows_by_name() -> None:
 
 def test_a_block_with_a_row_too_few_is_refused_before_it_is_run() -> None:
     batch = plain_batch("torque-task-proportional")
-    with pytest.raises(ProgramError, match=r"parameters: a block has \d+ rows, its program \d+: timing 5, plant "):
+    with pytest.raises(
+        ProgramError, match=r"parameters: a block must have \d+ rows, it has \d+; rows of the program: timing 5, plant "
+    ):
         run_batch(replace(batch, parameters=batch.parameters[:-1]))
     check_rows(1, {"mine": Mine}, Role.STATE)
 
 
 def test_two_components_with_a_group_of_one_name_are_refused() -> None:
-    with pytest.raises(ProgramError, match="two components of a program have a group 'mine'"):
+    with pytest.raises(ProgramError, match="two components of a program define the group 'mine'"):
         merged({"mine": given(Mine)}, {"mine": handed(Other)})

@@ -66,6 +66,6 @@ def test_each_lane_decides_for_itself_and_keeps_its_numbers(backend: str, monkey
 
 def test_what_is_no_statement_of_a_lane_is_refused_with_its_line() -> None:
     with pytest.raises(
-        ProgramError, match=r"test_lane_entry\.py:\d+: .*'while lane.*is not a supported statement of a lane"
+        ProgramError, match=r"test_lane_entry\.py:\d+: .*'while lane.*is not supported in a loop over runs"
     ):
         source(waits)

@@ -150,7 +150,7 @@ def test_batch_is_plain_data_of_rows_and_runs() -> None:
 def test_a_block_takes_no_more_runs_than_its_program_has_lanes() -> None:
     batch = batch_of(different_runs("torque-task-solenoid", 1)[0])
     wide = [np.repeat(values, lanes_of(batch.program) + 1, axis=1) for values in (batch.parameters, batch.states)]
-    with pytest.raises(ValueError, match=r"runs do not fit a block of"):
+    with pytest.raises(ValueError, match=r"a block of .* lanes cannot hold"):
         begin_block(dataclasses.replace(batch, parameters=wide[0], states=wide[1]))
 
 
@@ -170,8 +170,8 @@ class BegunError(Exception):
 
 
 SAID = (
-    "ppafo: Python runs these models, which takes about 3 min 0 s; compiled it takes seconds: install gcc or clang, "
-    "or 'pip install ppafo[native]', which brings zig"
+    "ppafo: Python runs these models in about 3 min 0 s; compiled models take seconds: install gcc or clang, "
+    "or 'pip install ppafo[native]', which includes zig"
 )
 
 

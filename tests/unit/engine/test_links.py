@@ -154,9 +154,9 @@ def test_a_law_that_would_undo_another_is_refused() -> None:
 @pytest.mark.parametrize(
     ("function", "said"),
     [
-        (hands_it_over, "an effect acts inside 'between', so that it can only be called"),
+        (hands_it_over, "'between' contains an active effect, so it cannot be passed as a value"),
         (hides_it, "the local name 'first' hides the parameters of the effect 'first'; rename it"),
-        (calls_a_law, "'first_law' is the law of an effect: call its port instead"),
+        (calls_a_law, "'first_law' is the law of an effect and cannot be called; call its port"),
     ],
 )
 def test_what_would_lose_a_row_is_refused(function: Any, said: str) -> None:
@@ -185,7 +185,7 @@ def test_an_effect_that_cannot_act_says_why(change: dict[str, Any], said: str) -
 
 def test_a_name_that_other_rows_have_is_refused() -> None:
     program = plan_run(load_scenario("step-response")).program
-    with pytest.raises(ProgramError, match="other rows of a program have this name"):
+    with pytest.raises(ProgramError, match="a component of the program already has this name"):
         link_program(replace(program, effects=(replace(FIRST, name="valve", laws={}),)), Replacements())
 
 
@@ -200,7 +200,7 @@ def test_a_spring_in_equation_1_is_refused_with_the_place_where_friction_knows_i
     program = plan_run(load_scenario("step-response")).program
     monkeypatch.setattr(linking, "net_torque", sprung)
     with pytest.raises(
-        ProgramError, match=r"test_links\.py:\d+: net_torque takes 1 N m of a joint at rest.*load_torque"
+        ProgramError, match=r"test_links\.py:\d+: net_torque takes 1 N m from a joint at rest.*load_torque"
     ):
         link_program(program, Replacements())
 
@@ -219,6 +219,6 @@ def test_a_group_that_nobody_hands_on_is_refused_whatever_the_loop_is() -> None:
     step = StepText(plan_run(load_scenario("step-response")).program, SourceCollector("@inline"))
     step.phase(sets_more)
     with pytest.raises(
-        ProgramError, match=r"test_links\.py:\d+: 'lane\.more', which .*test_links\.py:\d+ sets, lives in"
+        ProgramError, match=r"test_links\.py:\d+: 'lane\.more', set at .*test_links\.py:\d+, is local to that phase"
     ):
         step.phase(asks_for_more)

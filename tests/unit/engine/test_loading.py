@@ -93,8 +93,8 @@ def test_a_computer_without_a_compiler_of_c_lets_python_run_the_models_and_says_
     assert compilers_to_try() == ()
     assert [result_of(text(f"x[0, 0] + {added}")) for added in (1.5, 2.5)] == [3.5, 4.5]
     assert caplog.messages == [
-        "ppafo: there is no compiler of C that works here; install gcc or clang, or 'pip install ppafo[native]', which "
-        "brings zig: Python runs the model, some hundred times slower than compiled"
+        "ppafo: no working C compiler was found; install gcc or clang, or 'pip install ppafo[native]', which "
+        "includes zig: Python runs the model, some hundred times slower than compiled"
     ]
 
 
@@ -203,7 +203,7 @@ def test_a_compiler_that_never_ends_is_stopped_with_what_it_started_and_the_next
     monkeypatch.setattr(compiling, "LONGEST_COMPILING", 0.5)
     assert result_of(text("x[0, 0] + 0.75")) == 2.75
     assert caplog.messages[0] == (
-        "ppafo: gcc did not end within 0.5 s and was stopped; "
+        "ppafo: gcc did not finish within 0.5 s and was stopped; "
         "models are run by Python, some hundred times slower, instead for a day, or until 'ppafo doctor --clear'"
     )
     # Whoever takes over what has lost its parent may not ask how it ended: then it is dead and still there.
@@ -234,7 +234,7 @@ def test_a_compiler_that_is_set_to_join_or_reorder_operations_is_left_out(
     wrapper = compiler_that_fails("gcc", tmp_path / "bin", monkeypatch)
     wrapper.write_text(f'#!/bin/sh\nexec {real} "$@" {flag}\n', encoding="utf-8")
     assert result_of(text("x[0, 0] + 0.125")) == 2.125
-    assert "the compiler joins or reorders sums and products" in caplog.messages[0]
+    assert "the compiler fuses or reorders sums and products" in caplog.messages[0]
     assert list(list_left_out(fresh_cache)) == ["gcc"]
     smallest = np.nextafter(0.0, 1.0)
     assert smallest / 2.0 == 0.0 < smallest  # its start-up code would have flushed small numbers to zero
@@ -246,7 +246,7 @@ def test_a_law_that_has_no_c_is_run_by_python_with_one_line(caplog: pytest.LogCa
     source = text("math.sin(x[0, 0])")
     assert [result_of(source), result_of(source)] == [np.sin(2.0)] * 2
     (said,) = caplog.messages
-    assert said.endswith("cannot be translated: Python runs the model, some hundred times slower than compiled")
+    assert said.endswith("'math.sin' is not supported: Python runs the model, some hundred times slower than compiled")
 
 
 @needs_gcc
@@ -254,7 +254,7 @@ def test_what_a_named_compiler_cannot_compile_is_an_error_that_names_the_other(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv(BACKEND_VARIABLE, "gcc")
-    with pytest.raises(ProgramError, match="cannot be translated; PPAFO_BACKEND=python runs it"):
+    with pytest.raises(ProgramError, match=r"cannot be translated to C: .*; PPAFO_BACKEND=python runs it"):
         load_source(text("math.sin(x[0, 0])"))
 
 

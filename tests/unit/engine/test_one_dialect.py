@@ -75,12 +75,12 @@ def misspells(parts: Program, lane: Lane) -> None:
         ({"begin_step": prints}, r"test_one_dialect\.py:\d+: 'print\(lane.before\)' discards its return"),
         (
             {"begin_step": sets_on_one_side},
-            r"test_one_dialect\.py:\d+: 'lane.before' may have no value here: .*; set it before, on every path",
+            r"test_one_dialect\.py:\d+: 'lane.before' may be unset here: .*; set it earlier, on every path",
         ),
         ({"begin_step": misspells}, r"test_one_dialect\.py:\d+: timing has no 'stepp', did you mean 'step'\?"),
         (
             {"begin_step": keeps_unkept, "open_valve": asks_unkept},
-            r"test_one_dialect\.py:\d+: 'lane.extra', which \S+test_one_dialect\.py:\d+ sets, .*'extra': handed",
+            r"test_one_dialect\.py:\d+: 'lane.extra', set at \S+test_one_dialect\.py:\d+, .*'extra': handed",
         ),
     ],
 )

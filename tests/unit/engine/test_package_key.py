@@ -1,5 +1,7 @@
 """Keys of texts that need not be composed again: what follows from the files of the package has one."""
 
+import subprocess
+import sys
 from typing import Any
 
 import pytest
@@ -38,3 +40,18 @@ def test_a_law_with_a_part_from_elsewhere_has_no_key() -> None:
 
     made = made_of(assistance.timed_phase, "timed", TimingParts(elsewhere, threshold_time))  # type: ignore[arg-type]
     assert package_key(made, FOLDERS) is None
+
+
+def test_a_process_that_has_written_one_text_finds_the_next_under_the_key_of_a_process_that_has_written_none() -> None:
+    lines = (
+        "import importlib",
+        "from ppafo.engine.lanes import write_source",
+        "from ppafo.engine.package_key import package_key",
+        "from ppafo.golden_bits import plain_batch",
+        "program = plain_batch('proportional').program",
+        "words = package_key(program).words",
+        "write_source(program)",
+        "[importlib.import_module(f'ppafo.{name}') for name in ('engine.cache.making', 'translation.native_source')]",
+        "assert package_key(program).words == words",
+    )
+    subprocess.run([sys.executable, "-c", "\n".join(lines)], check=True)

@@ -93,5 +93,5 @@ def test_a_function_with_parts_sees_the_names_of_its_module_as_they_are_now(monk
 
 
 def test_parts_that_are_known_only_while_the_function_runs_are_refused_by_their_line() -> None:
-    with pytest.raises(ProgramError, match=r"test_parts\.py:\d+: 'parts=given' must be parts of this function"):
+    with pytest.raises(ProgramError, match=r"test_parts\.py:\d+: 'parts=given' must be 'parts'"):
         compiled(of_unknown_parts)

@@ -280,7 +280,7 @@ def test_a_folder_above_may_be_written_by_a_group_of_this_user_alone(
     monkeypatch.setattr(private, "_is_own_group", lambda _number: True)
     assert refusal(fresh_cache) == ""
     monkeypatch.setattr(private, "_is_own_group", lambda _number: False)
-    assert "others can put another folder in the place" in refusal(fresh_cache)
+    assert "other users can replace" in refusal(fresh_cache)
 
 
 def test_entry_that_is_a_link_to_itself_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

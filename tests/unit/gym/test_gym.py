@@ -1,6 +1,7 @@
 """Environments of Gymnasium: spaces, seeds, the bits of a simulation, and many beside one."""
 
 import math
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -108,7 +109,7 @@ def test_replayed_commands_have_the_bits_of_simulate(name: str, settings: dict[s
 
 
 def test_numbers_to_vary_are_refused_where_nothing_is_drawn() -> None:
-    with pytest.raises(ppafo.ScenarioError, match="vary: with randomise = False nothing is drawn"):
+    with pytest.raises(ppafo.ScenarioError, match="vary: has no effect with randomise = False"):
         one(TORQUE, randomise=False, vary={"valve.area": ("10 mm^2", "12 mm^2")})
 
 
@@ -274,13 +275,13 @@ def test_what_is_no_number_is_cut_off_at_the_lowest() -> None:
     [
         (TORQUE, {"actions": "onoff"}, "'continuous' or 'on_off', did you mean 'on_off'?"),
         (TORQUE, {"vary": {"valve.aera": ("1 mm^2", "2 mm^2")}}, "did you mean 'valve.area'?"),
-        (TORQUE, {"vary": {"valve.area": ("2 mm^2", "1 mm^2")}}, "the lowest value before the highest"),
+        (TORQUE, {"vary": {"valve.area": ("2 mm^2", "1 mm^2")}}, "the first value must be below the second"),
         (TORQUE, {"vary": {"valve.area": (1.0, 2.0)}}, "without a unit"),
-        (TORQUE, {"overrides": ["run.output_interval=1.5 ms"]}, "a whole number of steps"),
-        (WALK, {"vary": {"valve.area": ("1 mm^2", "2 mm^2")}}, "varies its wearer and gait only"),
+        (TORQUE, {"overrides": ["run.output_interval=1.5 ms"]}, "must be a whole number of run.step"),
+        (WALK, {"vary": {"valve.area": ("1 mm^2", "2 mm^2")}}, "a walk varies only wearer and gait"),
         (WALK, {"scenario": "off"}, "has no torque profile"),
         (TORQUE, {"observations": "scale"}, "'physical' or 'scaled', did you mean 'scaled'?"),
-        (TORQUE, {"frame_skip": 0}, "frame_skip = 0: must be a whole number of samples, at least 1"),
+        (TORQUE, {"frame_skip": 0}, "frame_skip = 0: must be a whole number of at least 1"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(name: str, settings: dict[str, Any], line: str) -> None:
@@ -342,7 +343,7 @@ def test_seeds_and_masks_of_another_length_are_refused() -> None:
     many = vector(TORQUE, AutoresetMode.DISABLED, 2, duration=0.02)
     with pytest.raises(ScenarioError, match="3 seeds for 2"):
         many.reset(seed=[1, 2, 3])
-    with pytest.raises(ScenarioError, match="reset_mask must be 2"):
+    with pytest.raises(ScenarioError, match="reset_mask: must be an array of 2"):
         many.reset(options={"reset_mask": [True, False]})
 
 
@@ -359,3 +360,48 @@ def test_an_environment_of_another_actuator_shows_the_torque_of_its_kind() -> No
     torque = kind.torque(plant, angle, *pressures)
     assert abs(torque) > 0.5
     assert observation[3] == pytest.approx(torque, rel=1e-5)
+
+
+def test_one_chamber_is_observed_without_a_second_pressure() -> None:
+    file = Path(__file__).parents[2] / "actuators" / "torque-task-measured-bladder.toml"
+    settings = {"scenario": str(file), "duration": 0.02}
+    env, scaled = one(TORQUE, **settings), one(TORQUE, observations="scaled", **settings)
+    assert env.observed == ("angle", "pressure_1", "torque", "requested", "requested_rate", "command")
+    check_env(env)
+    observation, _ = env.reset(seed=1)
+    assert observation.shape == env.observation_space.shape == (6,)
+    assert observation[env.observed.index("pressure_1")] == pytest.approx(1.01325)
+    assert observation[env.observed.index("torque")] == pytest.approx(-1.178097, rel=1e-6)
+    many = vector(TORQUE, AutoresetMode.DISABLED, 2, **settings)
+    assert many.observed == env.observed
+    assert np.array_equal(many.reset(seed=1)[0][0], observation)
+    assert scaled.reset(seed=1)[0].shape == (6,)
+
+
+def test_the_atmosphere_lies_within_the_observed_pressures_of_a_vacuum() -> None:
+    vacuum = ["supply.pressure=0.3 bar_a", "supply.dorsiflexion_pressure=0.3 bar_a", "initial.pressure_1=atmosphere"]
+    env = one(TORQUE, overrides=[*vacuum, "initial.pressure_2=atmosphere"], randomise=False, duration=0.02)
+    assert env.reset(seed=1)[0][1] == pytest.approx(1.01325, abs=0.02)
+
+
+def test_the_page_lists_what_is_observed_with_its_bounds() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "how-to" / "export.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`[^|]*`) \| (-?[\d.]+) to ([\d.]+)( [^|]*|) \|$", page, re.MULTILINE)
+    listed = {name: (float(low), float(high)) for names, low, high, _ in rows for name in re.findall(r"`(\w+)`", names)}
+    seen = set()
+    for name in TASK_NAMES:
+        env = one(name)
+        bounds = zip(env.observation_space.low.tolist(), env.observation_space.high.tolist(), strict=True)
+        found = dict(zip(env.observed, bounds, strict=True))
+        device = env.world.episodes.base.device
+        twice = 2.0 * max(device.supply.pressure, device.supply.dorsiflexion_pressure)
+        of_device = {
+            "pressure_1": (0.0, twice / BAR),
+            "torque": np.array([-1.0, 1.0]) * device.actuator.torque_constant * twice,
+        }
+        of_device["pressure_2"], of_device["requested"] = of_device["pressure_1"], of_device["torque"]
+        of_device |= {"requested": listed["angle"]} if name == ANGLE else {}
+        for entry, ends in found.items():
+            assert ends == pytest.approx(of_device.get(entry, listed.get(entry)), rel=1e-4), entry
+        seen |= set(found)
+    assert seen == set(listed) | set(of_device)

@@ -46,6 +46,12 @@ def test_a_set_without_a_kind_has_a_vane_and_one_that_names_it_is_the_same() -> 
     assert load_device("ppafo2011").actuator.kind == "vane"
 
 
+def test_a_table_of_torques_is_told_how_volumes_follow(tmp_path: Path) -> None:
+    path = measured(tmp_path, "angle [deg],pressure [kPa_g],Torque [N m]", "20,0,0")
+    with pytest.raises(ParameterError, match=r"'Torque': the table holds volumes.*dV/dangle = dT/dpressure.*extend.md"):
+        read_measured_volumes(path)
+
+
 def test_the_torque_constant_of_another_kind_is_its_mean_growth() -> None:
     actuator = load_device("cylinder-lever").actuator
     stroke = 2.0 * 0.025 * np.sin(np.radians(55.0))

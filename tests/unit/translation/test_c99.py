@@ -371,7 +371,7 @@ def without_end(value: float) -> float:
     return without_end(value)
 
 
-TYPES = "a whole number in one place and a float in another"
+TYPES = "both an integer and a float"
 
 
 @pytest.mark.parametrize(
@@ -380,26 +380,26 @@ TYPES = "a whole number in one place and a float in another"
         (
             exponential,
             2,
-            r"'math.exp' is a function of a library, .*: decay_factors\(rate, step\) of ppafo.model.sensors",
+            r"the function 'math.exp' is not supported, .* decay_factors\(rate, step\) of ppafo.model.sensors",
         ),
-        (bare_call, 2, r"'abs\(value\)' is not supported in compiled functions"),
-        (bare_comparison, 2, "'value == 1.0' is not supported in compiled functions"),
+        (bare_call, 2, r"the statement 'abs\(value\)' is not supported"),
+        (bare_comparison, 2, "the statement 'value == 1.0' is not supported"),
         (thrown_away, 2, "discards its return value"),
-        (remainder, 2, "needs a library function"),
-        (two_forms, 3, "'held' holds values of different types"),
-        (value_of_or, 2, "the value of 'value or 3.0'"),
-        (value_of_and, 2, "the value of 'value and 3.0'"),
-        (counted_and_float, 3, f"'i' holds {TYPES}"),
-        (whole_and_float, 3, f"'number' holds {TYPES}"),
-        (choice_of_types, 2, "a choice between a whole number and a float"),
-        (larger_of_types, 2, "a choice between a whole number and a float"),
+        (remainder, 2, "has no equivalent in C"),
+        (two_forms, 3, "'held' is assigned values of different types"),
+        (value_of_or, 2, "the operands of 'value or 3.0' must be booleans"),
+        (value_of_and, 2, "the operands of 'value and 3.0' must be booleans"),
+        (counted_and_float, 3, f"'i' is assigned {TYPES}"),
+        (whole_and_float, 3, f"'number' is assigned {TYPES}"),
+        (choice_of_types, 2, "mixes an integer and a float"),
+        (larger_of_types, 2, "mixes an integer and a float"),
         (returns_of_types, 4, f"returns {TYPES}"),
-        (shift_by_name, 2, "shifts by other than a literal"),
-        (compared_types, 2, "compares a whole number with a float"),
-        (large_compared, 2, "compares a whole number with a float"),
-        (step_by_name, 3, "'step' must be a literal number"),
-        (beyond, 2, "is beyond the 2 items"),
-        (no_length, 2, "'value' has no items"),
+        (shift_by_name, 2, "must shift by an integer literal"),
+        (compared_types, 2, "compares an integer with a float"),
+        (large_compared, 2, "compares an integer with a float"),
+        (step_by_name, 3, "'step' must be an integer literal"),
+        (beyond, 2, "is out of range; the tuple has 2 items"),
+        (no_length, 2, "'value' has no length"),
         (without_end, 0, "calls itself"),
     ],
 )

@@ -81,7 +81,7 @@ def test_a_program_of_gcc_is_kept_found_again_and_made_anew_where_it_is_damaged(
     forget_programs(monkeypatch)
     assert by("gcc", batch, monkeypatch) == expected
     assert len(compiled) == 2
-    assert "is damaged; it is made anew" in caplog.text
+    assert "is damaged and is compiled again" in caplog.text
 
 
 @needs_gcc
@@ -102,12 +102,12 @@ def test_a_name_that_is_no_compiler_is_refused_in_one_line(
     monkeypatch.setenv("PPAFO_BACKEND", "gc")
     assert main(["simulate", "torque-task-proportional", "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
-    assert said == "ppafo: PPAFO_BACKEND: 'gc' is not one of c, gcc, clang, zig, python, did you mean 'gcc'?\n"
+    assert said == "ppafo: PPAFO_BACKEND = 'gc': must be c, gcc, clang, zig, python, did you mean 'gcc'?\n"
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
-    ("name", "missing"), [("c", "there is no compiler on this computer"), ("clang", "'clang' is not on this computer")]
+    ("name", "missing"), [("c", "no C compiler was found"), ("clang", "'clang' is not on this computer")]
 )
 def test_a_computer_without_a_compiler_says_what_to_install(
     name: str, missing: str, fresh_cache: Path, monkeypatch: pytest.MonkeyPatch
@@ -122,7 +122,7 @@ OBEYS = '#!/bin/sh\n[ "$1" = --version ] && echo "fake 1" && exit 0\n'
 BROKEN = {
     "no interpreter": ("#!/no/such/interpreter\n", "cannot be run: no such file or directory"),
     "no program": ("\0\1\2", "cannot be run: exec format error"),
-    "no library": (f"{OBEYS}exit 0\n", "ended without an error, but made no library"),
+    "no library": (f"{OBEYS}exit 0\n", "returned 0 but produced no library"),
     "half a library": (
         f'{OBEYS}for word; do [ "$last" = -o ] && printf half > "$word"; last="$word"; done\n',
         "the library of a compiled model cannot be loaded: .*file too short",
@@ -130,9 +130,9 @@ BROKEN = {
     "another library": (
         f'{OBEYS}for word; do last="$own"; [ "$flag" = -o ] && own="$word"; flag="$word"; done\n'
         'echo "int x;" | exec REAL -shared -fPIC -xc - -o "$own"\n',
-        "lacks its functions",
+        "does not export its functions",
     ),
-    "killed": (f"{OBEYS}kill -9 $$\n", "does not compile a model: it ended with -9"),
+    "killed": (f"{OBEYS}kill -9 $$\n", "does not compile a model: it returned -9"),
     "no utf-8": ("#!/bin/sh\nprintf '\\377\\n' >&2\nexit 1\n", "does not compile a model: \ufffd"),
     "a warning first": (
         f"{OBEYS}echo warning: w >&2; echo p.c:3: error: e >&2; exit 1\n",

@@ -65,7 +65,7 @@ def given(low: int, high: int, most: int) -> dict[str, Any]:
 
 def test_what_may_leave_32_bits_is_refused_and_what_just_does_not_is_not() -> None:
     assert narrowed(module_of(doubled_up), given(0, 2**15 - 1, 16)).returned == IntegerRange(0, (2**15 - 1) * 2**16)
-    with pytest.raises(ProgramError, match=r"doubled_up: a value from 0 to 2147483648, beyond 32 bits"):
+    with pytest.raises(ProgramError, match=r"doubled_up: .*a value from 0 to 2147483648 exceeds 32 bits"):
         narrowed(module_of(doubled_up), given(0, 2**15, 16))
 
 
@@ -80,12 +80,12 @@ def test_a_name_is_as_wide_as_what_it_holds() -> None:
 
 
 def test_a_product_that_is_no_power_of_two_is_refused() -> None:
-    with pytest.raises(ProgramError, match="a product by a number that is not a power of two"):
+    with pytest.raises(ProgramError, match="a product must have a power of two as one factor"):
         narrowed(module_of(product), given(0, 3, 3))
 
 
 def test_a_loop_that_is_too_long_is_refused() -> None:
-    with pytest.raises(ProgramError, match="a loop of more than 64 turns"):
+    with pytest.raises(ProgramError, match="at most 64 iterations"):
         narrowed(module_of(doubled_up), given(0, 0, 65))
 
 

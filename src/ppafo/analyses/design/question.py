@@ -33,6 +33,7 @@ def design(
     toes: Length | None = None,
     catalogue: FileOrName | None = None,
     bottle: FileOrName | None = None,
+    gait: FileOrName | None = None,
     plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Sizing] | Finding[WearerSizing]:
@@ -45,7 +46,8 @@ def design(
         problem: name of a design file, or a .toml file
         threads: number of threads; default: all cores
         mass: body mass of the wearer, '72.5 kg'
-        stature: height of the wearer, '1.75 m'; default: of a body mass index of 22 kg/m^2, for 46.3 to 88 kg
+        stature: height of the wearer, '1.75 m'; default: of a body mass index of 22 kg/m^2, for 46.3 to 88 kg;
+            children need it
         torque: peak torque of push-off, '2.5 N m'
         pressure: supply pressure, '50 psi_g'
         minutes: minutes of walking on one bottle
@@ -53,6 +55,7 @@ def design(
         catalogue: a .toml file with parts of your own; default: the catalogue of the package
         bottle: name or file of the bottle, as of 'walk', whose gas feeds the device; default: the lightest of the
             catalogue
+        gait: name or file of the wearer's gait, as of 'walk'; default: the built-in gait of an adult
         plugins: modules of your own, files or names, whose objects files may name
         progress: called with every count of a long computation
 
@@ -85,17 +88,23 @@ def design(
         # Stature, toes and catalogue may be left out, so they are not among them.
         missing = [f"--{name}" for name, value in wished.items() if value is None]
         if len(missing) == len(wished) and stature is None:
-            raise StudyError(f"no design was given: name one, give a .toml file, or for a wearer {FOR_A_WEARER}")
+            raise StudyError(
+                f"no design was given; name a design, give a .toml file, or describe the wearer: {FOR_A_WEARER}"
+            )
         if mass is None or torque is None or pressure is None or minutes is None:
-            raise StudyError(f"for a wearer give {', '.join(missing)} too, for example {FOR_A_WEARER}")
-        requirements = DesignRequirements(mass, stature, float(torque), float(pressure), 60.0 * minutes, toes)
+            raise StudyError(f"a design for a wearer also needs {', '.join(missing)}, for example {FOR_A_WEARER}")
+        seconds = 60.0 * minutes
+        requirements = DesignRequirements(mass, stature, float(torque), float(pressure), seconds, toes, gait=gait)
         with shown_in(units_given({"Pa_a": pressure, "N m": torque})):
             parts = DEFAULT if catalogue is None else catalogue
             return wearer.finding_of(size_for_wearer(requirements, report, parts, bottle))
-    of_a_wearer = {**wished, "stature": stature, "toes": toes, "catalogue": catalogue, "bottle": bottle}
+    of_a_wearer = {**wished, "stature": stature, "toes": toes, "catalogue": catalogue}
+    of_a_wearer |= {"bottle": bottle, "gait": gait}
     named = [f"--{name}" for name, value in of_a_wearer.items() if value is not None]
     if named:
-        raise StudyError(f"{', '.join(named)}: the design file states what is wanted; give one or the other")
+        raise StudyError(
+            f"{', '.join(named)} cannot be combined with a design file, which states the requirements; omit one of them"
+        )
     chosen = load_design(problem) if isinstance(problem, str | Path) else problem
     warn_of_coarse_pairs([chosen.scenario])
     return profile.finding_of(size_for_profile(chosen, threads, report))

@@ -13,7 +13,7 @@ from ppafo.model.cold_gas import heat_to_warm
 from ppafo.model.source import bottle_content
 from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.report.finding import Finding, Section, columns_of, facts
-from ppafo.report.kind import TIME, Kind
+from ppafo.report.kind import TIME, Kind, duration_kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -21,12 +21,12 @@ from ppafo.units import format_quantity
 from ppafo.units.shown import in_units, pressure_units
 from ppafo.version import __version__
 from ppafo.walking.bottle.coupling import Schedule
-from ppafo.walking.bottle.course import minutes_text, strides_text
+from ppafo.walking.bottle.course import duration_text, strides_text
 
 FORMAT = "ppafo bottle"
 _TITLE = "How long the bottle lasts"
 _MASS, _FLOW = Kind("Left in the bottle", "kg", "gas mass", ".3g"), Kind("", "kg/s", "mass flow", ".3g")
-_DURATION, _PRESSURE = Kind("Time", "s", "duration"), Kind("Pressure in the bottle", "Pa_a", "pressure", ".3g")
+_PRESSURE = Kind("Pressure in the bottle", "Pa_a", "pressure", ".3g")
 _WARMTH = Kind("Temperature of the bottle", "K", "temperature", ".1f")
 
 
@@ -153,7 +153,8 @@ def finding_of_several(several: Endurances) -> Finding[Endurances]:
     """Return the report of a bottle's durations for several gas demands, compared in one table."""
     are_strides = all(_counted(use) == "stride" for use in several.uses.values())
     counted, time = ("stride", "walking") if are_strides else ("repetition", "run time")
-    titles = ("gas use", (f"gas per {counted}", _MASS), (time, _DURATION), f"{counted}s", "ended")
+    longest = max(use.discharge.walking_time for use in several.uses.values())
+    titles = ("gas use", (f"gas per {counted}", _MASS), (time, duration_kind(longest)), f"{counted}s", "ended")
     rows = [
         (
             name,
@@ -201,9 +202,10 @@ def endurance_panels(endurance: Endurance) -> list[Panel]:
     for kind, name, label, colour in channels:
         if name in recording:
             marks[kind].append(Mark("line", time, recording[name], (), label, colour))
-    end = float(_DURATION.values(time[-1]))
+    axis = duration_kind(float(time[-1]))
+    end = float(axis.values(time[-1]))
     return [
-        Panel(_DURATION, kind, lines, then=lambda axes: axes.set_xlim(0.0, end), shares_x=True)
+        Panel(axis, kind, lines, then=lambda axes: axes.set_xlim(0.0, end), shares_x=True)
         for kind, lines in marks.items()
     ]
 
@@ -218,7 +220,7 @@ def _facts(endurance: Endurance) -> list[tuple[str, str]]:
     counted, repeated = _counted(endurance), "recording" if endurance.is_of_recording else "task sequence"
     use = "of use" if endurance.is_of_recording else "of walking"
     rows = [
-        ("run time", f"{minutes_text(result.walking_time)} {use}, {minutes_text(result.total_time)} in total"),
+        ("run time", f"{duration_text(result.walking_time)} {use}, {duration_text(result.total_time)} in total"),
         (
             "strides" if counted == "stride" else f"repetitions of the {repeated}",
             strides_text(result.strides),
@@ -240,6 +242,6 @@ def _facts(endurance: Endurance) -> list[tuple[str, str]]:
     if "liquid_mass" in recording:
         dry = np.flatnonzero(recording["liquid_mass"] <= 0.0)
         remaining = f"no, {_MASS.text(float(recording['liquid_mass'][-1]))} left"
-        used_up = f"after {minutes_text(float(recording.time[dry[0]]))}" if dry.size else remaining
+        used_up = f"after {duration_text(float(recording.time[dry[0]]))}" if dry.size else remaining
         rows.append(("liquid used up", used_up))
     return rows

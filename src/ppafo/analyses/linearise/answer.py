@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ppafo.analyses.linearise.loop import PID_LAWS
 from ppafo.analyses.linearise.model import LinearModel
 from ppafo.engine.lanes import Floats
 from ppafo.engine.replay import StepInputs, replay
@@ -19,6 +20,7 @@ from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, with_control
 from ppafo.units.shown import in_units, quantity_of_unit
+from ppafo.wording import count_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -144,7 +146,8 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         across=2,
         size=(3.0, 2.8),
     )
-    size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
+    counts = (("state", model.states), ("input", model.inputs), ("output", model.outputs))
+    size = ", ".join(count_of(len(signals), noun) for noun, signals in counts)
     sentences = [f"the plant without controller and sensors: {size}; differences from the point, SI units"]
     if not model.is_steady:
         sentences.append(
@@ -166,19 +169,18 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
             f"{_value_at_point(model, edge.name):.5g} only; its slope differs {other} it"
         )
     matrices = []
-    # The output matrices appear only on the page.
-    for name, values, rows, columns, is_detail in (
-        ("A", model.a, model.states, model.states, False),
-        ("B", model.b, model.states, model.inputs, False),
-        ("C", model.c, model.outputs, model.states, True),
-        ("D", model.d, model.outputs, model.inputs, True),
+    for name, values, rows, columns in (
+        ("A", model.a, model.states, model.states),
+        ("B", model.b, model.states, model.inputs),
+        ("C", model.c, model.outputs, model.states),
+        ("D", model.d, model.outputs, model.inputs),
     ):
         numbers = [
             Column(variable.name, column, Kind(form=".5g"))
             for variable, column in zip(columns, values.T.tolist(), strict=True)
         ]
         table = [Column("", [variable.name for variable in rows]), *numbers]
-        matrices.append(Section(f"Matrix {name} (SI)", table, is_detail=is_detail))
+        matrices.append(Section(f"Matrix {name} (SI)", table))
     return Finding(
         name="linearise",
         kicker="Linear model",
@@ -188,6 +190,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
             _point(model),
             Section("Which side was taken", facts(model.sides.items()), remarks=remarks),
             _poles(model),
+            _loop(model),
             *matrices,
             *([validity] if can_step(model) else []),
         ],
@@ -234,6 +237,29 @@ def _poles(model: LinearModel) -> Section:
         caption=_FREQUENCY_CAPTION,
         size=(5.4, 2.2),
     )
+
+
+def _loop(model: LinearModel) -> Section:
+    """Return the table of the margins of the loop with the scenario's PID, or the reason why there is none."""
+    margins, controller = model.margins, model.scenario.controller
+    if margins is None:
+        is_pid = controller.kind in PID_LAWS
+        reason = "its command is clipped, or has no effect" if is_pid else f"controller '{controller.kind}' is no PID"
+        return Section(remarks=[f"no margins of the loop: {reason}"])
+    frequency, angle = Kind(quantity="frequency", form=".3g"), Kind(quantity="angle", form=".3g")
+
+    def at(text: str, crossover: float | None) -> str:
+        return "none below half the sample rate" if crossover is None else f"{text} at {frequency.text(crossover)}"
+
+    gain = margins.gain_margin or 1.0
+    rows = [
+        ("closed loop", "stable" if margins.is_stable else "unstable"),
+        ("gain margin", at(f"{gain:.3g} ({20.0 * np.log10(gain):.3g} dB)", margins.phase_crossover)),
+        ("phase margin", at(angle.text(margins.phase_margin or 0.0), margins.gain_crossover)),
+        ("bandwidth (-3 dB)", at("", margins.bandwidth).removeprefix(" at ")),
+        ("peak sensitivity", f"{margins.peak_sensitivity:.3g}"),
+    ]
+    return Section("Loop with the PID of the scenario, sampled and with its delays", facts(rows))
 
 
 def frequency_panels(model: LinearModel) -> list[Panel]:

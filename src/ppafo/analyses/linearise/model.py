@@ -54,6 +54,28 @@ class OmittedDelays:
     period: float
 
 
+@dataclass(frozen=True, slots=True)
+class LoopMargins:
+    """Margins of the control loop, closed by the scenario's PID; None where a crossover does not exist.
+
+    ``is_stable``: True if the closed loop of the linear model is stable (Nyquist criterion)
+    ``gain_margin``: factor on all gains at which the loop becomes unstable [-]
+    ``phase_crossover``: frequency of the gain margin [Hz]
+    ``phase_margin``: phase margin [rad]
+    ``gain_crossover``: frequency of the phase margin, at which the loop gain is 1 [Hz]
+    ``bandwidth``: lowest frequency at which the closed loop follows with 0.707 of its lowest-frequency response [Hz]
+    ``peak_sensitivity``: largest sensitivity abs(1 / (1 + L)) [-]
+    """
+
+    is_stable: bool
+    gain_margin: float | None
+    phase_crossover: float | None
+    phase_margin: float | None
+    gain_crossover: float | None
+    bandwidth: float | None
+    peak_sensitivity: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearModel:
     """Linear plant model of a scenario, x' = A x + B u, y = C x + D u, for deviations from the operating point in SI.
@@ -64,6 +86,7 @@ class LinearModel:
     ``sides``: side of each limit of the plant, in words
     ``edges``: kinks on which the operating point lies
     ``delays``: delays that the model omits
+    ``margins``: margins of the loop with the scenario's controller and these delays; None unless it is a PID
     """
 
     scenario: Scenario
@@ -79,6 +102,7 @@ class LinearModel:
     sides: Mapping[str, str]
     edges: tuple[SlopeKink, ...]
     delays: OmittedDelays
+    margins: LoopMargins | None = None
 
     @property
     def is_steady(self) -> bool:
@@ -137,6 +161,7 @@ class LinearModel:
                 "signal_delay": self.delays.signals,
                 "sample_period": self.delays.period,
             },
+            "margins": None if self.margins is None else asdict(self.margins),
         }
 
     def to_control(self) -> Any:
@@ -160,5 +185,5 @@ def _index_of(name: str, variables: Sequence[LinearSignal], kind: str) -> int:
     names = [variable.name for variable in variables]
     if name not in names:
         hint = nearest_name(name, names)
-        raise ScenarioError(f"the linear model has no {kind} '{one_line(name)}'{hint}; there are: {', '.join(names)}")
+        raise ScenarioError(f"the linear model has no {kind} '{one_line(name)}'{hint}; available: {', '.join(names)}")
     return names.index(name)

@@ -126,12 +126,13 @@ def plant_of(run: Run, direction: float | None, values: Mapping[str, float], tim
 def functions_in(run: Run) -> PythonFunctions:
     """Return the functions of the model as used in a run.
 
-    Raises SimulationError for an effect that has a state.
+    Raises SimulationError for an effect of the device that has a state; sensors are no part of the plant.
     """
     for effect in run.program.effects:
-        if effect.state is not None:
+        if effect.state is not None and effect.is_of_device:
             raise SimulationError(
-                f"effect '{effect.name}' has state variables, which the linear model leaves out: switch the effect off"
+                f"effect '{effect.name}' has state variables, which the linear model does not include; switch the "
+                "effect off"
             )
     effects = zip(run.program.effects, run.effects, strict=True)
     return functions_of(run.program, {effect.name: row for effect, row in effects})

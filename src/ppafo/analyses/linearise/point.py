@@ -17,6 +17,7 @@ from ppafo.analyses.linearise.plant import (
     valve_states,
     without_slew_limit,
 )
+from ppafo.arguments.door import argument_text
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.continuous_time import mode_at_rest, torque_at_rest
 from ppafo.engine.in_python import in_program
@@ -25,9 +26,10 @@ from ppafo.engine.rows import numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.errors import ScenarioError, SimulationError
-from ppafo.model.controlled import TORQUE
+from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, ControlledQuantity
 from ppafo.model.plant import ThermalParameters
 from ppafo.model.ports import friction_at_rest
+from ppafo.report.kind import of_path
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.python_controller import run_sampled
@@ -62,7 +64,8 @@ def point_at(scenario: Scenario, time: float) -> Point:
     # Allowance for rounding: the end of the run itself is a valid time.
     if not 0.0 <= time <= scenario.run.duration * (1.0 + 1.0e-12):
         raise ScenarioError(
-            f"{scenario.name}: --at {time:g} s is outside the run, which lasts {scenario.run.duration:g} s"
+            f"{scenario.name}: {argument_text('at', f'{time:g} s')} is outside the run, which lasts "
+            f"{scenario.run.duration:g} s"
         )
     run = plan_run(scenario)
     steps = min(round(time / run.step), run.step_count)
@@ -76,7 +79,10 @@ def _after(scenario: Scenario, run: Run, steps: int) -> tuple[dict[str, float], 
     outcome = run_batch(batch) if custom is None else run_sampled(batch, custom)
     rows = {name: float(outcome.states[row, 0]) for name, row in state_row_numbers(run).items()}
     if rows["result.failure_time"] < NEVER_FAILED or not all(map(np.isfinite, rows.values())):
-        raise SimulationError(f"{scenario.name}: the run diverges before {steps * run.step:g} s (ppafo simulate)")
+        raise SimulationError(
+            f"{scenario.name}: the run diverges before {steps * run.step:g} s; give an earlier "
+            "--at, and see 'ppafo simulate'"
+        )
     angle, rate = rows["state.angle"], rows["state.angular_velocity"]
     if run.program.angle is not None:
         angle, rate, _ = run.program.angle.value(run.path, steps * run.step)
@@ -110,40 +116,48 @@ def equilibrium(scenario: Scenario) -> Point:
     """Return the steady state of a scenario; ScenarioError if there is none.
 
     The ankle rests at its angle at the end of the run, and all states of chambers and valve are constant. The actuator
-    torque is the last value of the reference, or, for a constant command, the command is given instead.
+    torque, or the pressure that is controlled, is the last value of the reference; for a constant command, the command
+    is given instead.
     """
-    planned = plan_run(scenario)
+    planned, give_a_time = plan_run(scenario), f"give a time of the run, such as {argument_text('at', '1 s')}"
     if planned.leg is not None and planned.program.shank is not CONSTANT:
-        raise ScenarioError(f"{scenario.name}: no equilibrium while the shank of the leg moves; give --at a time")
+        raise ScenarioError(f"{scenario.name}: there is no equilibrium while the shank moves; {give_a_time}")
     values, _ = _after(scenario, planned, planned.step_count)
     values["angular_velocity"] = 0.0
-    is_open_loop = scenario.controller.is_open_loop
-    if scenario.controlled != TORQUE and not is_open_loop:
-        line = f"reference.of = '{scenario.controlled}': an equilibrium is found for a torque; give --at a time"
-        raise ScenarioError(f"{scenario.name}: {line}")
+    is_open_loop, quantity = scenario.controller.is_open_loop, CONTROLLED[scenario.controlled]
+    if quantity.name == ANGLE and not is_open_loop:
+        raise ScenarioError(
+            f"{scenario.name}: reference.of = '{ANGLE}': an equilibrium needs a reference of torque or pressure; "
+            f"{give_a_time}"
+        )
     end = np.array([scenario.run.duration])
-    torque = None if is_open_loop else float(profile_values(scenario.reference, end)[0][0])
+    level = None if is_open_loop else float(profile_values(scenario.reference, end)[0][0])
     run = without_slew_limit(planned)
     rest = None if run.program.angle is not None else 0.0
-    steady = _steady(run, rest, values, torque)
+    steady = _steady(run, rest, values, quantity, level)
     if steady is None:
-        if torque is None:
-            line = f"no equilibrium found for the command {values['command']:g}"
-            raise ScenarioError(f"{scenario.name}: {line}; give --at a time")
-        line = f"no equilibrium at {torque:.4g} N m, the last value of the reference"
-        full = 1.0 if (torque > 0.0) != scenario.device.supply.is_vacuum else -1.0
+        if level is None:
+            raise ScenarioError(
+                f"{scenario.name}: no equilibrium was found for the command {values['command']:g}; {give_a_time}"
+            )
+        kind = of_path("reference.level", quantity.level.unit, ".4g")
+        reached = ""
+        full = 1.0 if (level > 0.0) != scenario.device.supply.is_vacuum else -1.0
         fully_open = values | dict.fromkeys(("command", *opening_names(values)), full)
-        most = _steady(run, rest, fully_open, None)
-        if most is not None:
+        most = _steady(run, rest, fully_open, quantity, None)
+        if most is not None and quantity.name == TORQUE:
             most_torque = run.program.actuator.torque(run.plant, most["angle"], most["pressure_1"], most["pressure_2"])
-            line += f": with the valve fully open the actuator comes to {most_torque:.4g} N m"
+            reached = f": with the valve fully open the actuator reaches {most_torque:.4g} N m"
         remedy = " or hold the ankle" if rest is not None else ""
-        raise ScenarioError(f"{scenario.name}: {line}; set another reference{remedy}, or give --at a time")
+        raise ScenarioError(
+            f"{scenario.name}: there is no equilibrium at {kind.text(level)}, the last value of the "
+            f"reference{reached}; set another reference{remedy}, or {give_a_time}"
+        )
     direction = _direction(run, steady, scenario.run.duration)
     if direction:
         raise ScenarioError(
-            f"{scenario.name}: no equilibrium: at {np.degrees(values['angle']):.4g} deg the torque accelerates the "
-            f"vane; give --at a time, or another reference torque"
+            f"{scenario.name}: there is no equilibrium, because the torque accelerates the vane at "
+            f"{np.degrees(values['angle']):.4g} deg; {give_a_time}, or another reference"
         )
     # A valve that is closed but for rounding is closed.
     steady |= {name: 0.0 for name in ("command", *opening_names(steady)) if abs(steady[name]) < STEADY}
@@ -153,28 +167,36 @@ def equilibrium(scenario: Scenario) -> Point:
 
 
 def _steady(
-    run: Run, direction: float | None, values: Mapping[str, float], torque: float | None
+    run: Run,
+    direction: float | None,
+    values: Mapping[str, float],
+    quantity: ControlledQuantity,
+    level: float | None,
 ) -> dict[str, float] | None:
-    """Return a steady state with a torque [N m], or with the present command; None if none is found."""
-    # Where the search begins: at the end of the run, then about the pressures that have the torque.
+    """Return a steady state with a level of a quantity [SI], or with the present command; None if none is found."""
+    # Where the search begins: at the end of the run, then about the pressures that have the level.
     starts = [dict(values)]
-    lowest, target = run.plant.atmospheric_pressure, torque or 0.0
-    surplus = abs(target) / run.plant.torque_constant
+    lowest = run.plant.atmospheric_pressure
+    target = (level or 0.0) - (lowest if quantity.level.unit == "Pa_a" and level is not None else 0.0)
+    surplus = abs(target) / (run.plant.torque_constant if quantity.name == TORQUE else 1.0)
     for size in _FIRST_COMMANDS:
-        command = values["command"] if torque is None else size if target >= 0.0 else -size
+        command = values["command"] if level is None else size if target * quantity.sign >= 0.0 else -size
         pressures = [1.001 * lowest + (surplus if is_fed else 0.0) for is_fed in (command > 0.0, command < 0.0)]
         start = {"pressure_1": pressures[0], "pressure_2": pressures[1], "command": command}
         starts.append({**values, **start, **dict.fromkeys(opening_names(values), command)})
     plant = plant_of(run, direction, values)
-    # The unknowns are all states, and the command if a torque is given.
-    names = [*plant.at(values).rates, *([] if torque is None else ["command"])]
+    # The unknowns are all states, and the command if a level is given.
+    names = [*plant.at(values).rates, *([] if level is None else ["command"])]
 
     def imbalance(values: Mapping[str, float]) -> Floats:
-        """Time derivatives divided by the size of their states [1/s], and the torque error [N m]."""
+        """Time derivatives divided by the size of their states [1/s], and the error of the level by its size [-]."""
         state = plant.at(values)
         # So that pascals and openings count alike.
         rates = [rate / size_of(name) for name, rate in state.rates.items()]
-        return np.array([*rates, *([] if torque is None else [state.outputs["torque"] - torque])])
+        if level is None:
+            return np.array(rates)
+        reached = quantity.value(values["angle"], values["pressure_1"], values["pressure_2"], state.outputs["torque"])
+        return np.array([*rates, (reached - level) / quantity.size])
 
     roots = (_newton(imbalance, names, start) for start in starts)
     return next((root for root in roots if root is not None), None)

@@ -1,10 +1,12 @@
 """Linear model of a scenario's plant, at an instant of its run or at its steady state."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from numbers import Real
 
 import numpy as np
 
+from ppafo.analyses.linearise.loop import loop_margins
 from ppafo.analyses.linearise.model import LinearModel, LinearSignal, OmittedDelays, SlopeKink
 from ppafo.analyses.linearise.plant import (
     UNITS,
@@ -19,6 +21,7 @@ from ppafo.analyses.linearise.plant import (
     valve_at,
 )
 from ppafo.analyses.linearise.point import Point, equilibrium, point_at
+from ppafo.arguments.door import argument_text
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError, UnitError, refused_as
@@ -34,6 +37,8 @@ ON_THE_EDGE = 1.0e-6
 
 Without a kink, the finite differences agree to about 1e-9.
 """
+ZERO = 1.0e-9
+"""Slope divided by the largest slope of its row, below which it is 0: rounding of the differences and of the point."""
 
 
 def sides_of(run: Run, point: Point, joint: JointNames) -> dict[str, str]:
@@ -94,17 +99,17 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
     """
     run = plan_run(scenario)
     if scenario.supply_lines is not None:
-        raise ScenarioError(f"{scenario.name}: a linear model assumes a constant supply pressure; omit [supply_line]")
+        raise ScenarioError(f"{scenario.name}: the linear model assumes a constant supply pressure; omit [supply_line]")
     if not opens_in_proportion(run):
         raise ScenarioError(
-            f"{scenario.name}: valve '{scenario.device.valve_name}' opens fully or at a constant speed: its flow "
-            f"has no derivative with respect to the command; set device.valve to a proportional valve"
+            f"{scenario.name}: valve '{scenario.device.valve_name}' switches on and off, so its flow has no "
+            "derivative with respect to the command; set device.valve to a proportional valve"
         )
     if at == EQUILIBRIUM:
         return model_at(scenario, run, equilibrium(scenario))
     if isinstance(at, Real):
         return model_at(scenario, run, point_at(scenario, float(at)))
-    problem = f"{scenario.name}: --at '{at}' is neither a time nor '{EQUILIBRIUM}'"
+    problem = f"{scenario.name}: {argument_text('at', str(at))} is neither a time nor '{EQUILIBRIUM}'"
     with refused_as(ScenarioError, problem, UnitError):
         time = parse_quantity(str(at), "s")
     return model_at(scenario, run, point_at(scenario, time))
@@ -127,6 +132,10 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     columns = [*states, *plant.inputs]
     is_row = [name not in idle for name in (*here.rates, *here.outputs)]
     near, far, errors = (np.array([slopes[name][index] for name in columns]).T[is_row] for index in (0, 1, 2))
+    sizes = np.array([size_of(name) for name in columns])
+    largest = np.max(np.maximum(np.abs(near), np.abs(far)) * sizes, axis=1, keepdims=True)
+    is_kink = np.any(np.abs(near - far) * sizes > ON_THE_EDGE * largest + 10.0 * errors * sizes, axis=0)
+    near = np.where(np.abs(near) * sizes > ZERO * largest, near, 0.0)
     count = len(states)
     a, b, c, d = near[:count, :count], near[:count, count:], near[count:, :count], near[count:, count:]
     sides = sides_of(run, point, scenario.device.joint)
@@ -134,11 +143,8 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
         sides[scenario.device.joint.name] = "locked"
     if not np.any(b[:, 0]) and not np.any(d[:, 0]):
         sides["valve"] += f"; {DEAF}"
-    sizes = np.array([size_of(name) for name in columns])
-    largest = np.max(np.maximum(np.abs(near), np.abs(far)) * sizes, axis=1, keepdims=True)
-    is_kink = np.any(np.abs(near - far) * sizes > ON_THE_EDGE * largest + 10.0 * errors * sizes, axis=0)
     kinks = [name for name, differs in zip(columns, is_kink.tolist(), strict=True) if differs]
-    return LinearModel(
+    model = LinearModel(
         scenario=scenario,
         time=point.time,
         states=tuple(LinearSignal(name, UNITS[name], values[name]) for name in states),
@@ -153,6 +159,7 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
         edges=tuple(SlopeKink(name, side_of(name, values, point.direction) > 0.0) for name in kinks),
         delays=OmittedDelays(run.command_delay, run.signal_delay, run.period),
     )
+    return replace(model, margins=loop_margins(model))
 
 
 def _both_slopes(plant: LinearisedPlant, values: Mapping[str, float], name: str) -> tuple[Floats, Floats, Floats]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ppafo.report.finding import Section, facts
 from ppafo.report.kind import Kind
-from ppafo.walking.bottle.course import SupplyCourse, strides_text
+from ppafo.walking.bottle.course import SupplyCourse, duration_text, strides_text
 from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
@@ -24,7 +24,7 @@ _EXPLAINED = (
     "A walk ends where the line behind the regulator no longer comes within the given share of the set pressure in two "
     "strides, or where the fluid in the bottle freezes.",
 )
-_DURATION, _TORQUE, _GAS = (Kind(quantity=name, form=".3g") for name in ("duration", "torque", "gas mass"))
+_TORQUE, _GAS = (Kind(quantity=name, form=".3g") for name in ("torque", "gas mass"))
 _SHARE, _WARMTH, _PRESSURE = (Kind(quantity=name, form=".0f") for name in ("fraction", "temperature", "pressure"))
 
 
@@ -57,7 +57,7 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
     rows = [
         ("bottle", f"{supply.supply.bottle.title}, with {filled}"),
         ("what ended it", supply.ending.message),
-        ("when", f"{_DURATION.text(supply.ending.time)}, {walked}"),
+        ("when", f"{duration_text(supply.ending.time)}, {walked}"),
         ("gas used", f"{_GAS.text(supply.balance.left_bottle)}, left {remaining}"),
         ("bottle at the end", f"{_WARMTH.text(end['bottle_temperature'])}, {_PRESSURE.text(end['bottle_pressure'])}"),
         ("coldest gas behind the regulator", _WARMTH.text(float(values["outlet_temperature"].min()))),

@@ -57,9 +57,9 @@ def refusal(folder: Path | None) -> str:
     elif has_users and status.st_uid != os.geteuid():
         why_not = f"{folder} belongs to another user"
     elif has_users and status.st_mode & _WRITTEN_BY_OTHERS:
-        why_not = f"others can write into {folder}; 'ppafo doctor --clear' and 'chmod 700' make it safe"
+        why_not = f"other users can write into {folder}; run 'ppafo doctor --clear' and 'chmod 700'"
     elif has_users and any(_can_be_exchanged(status_above) for status_above in above):
-        why_not = f"others can put another folder in the place of {folder}"
+        why_not = f"other users can replace {folder}"
     else:
         why_not = "" if os.access(folder, os.W_OK | os.X_OK) else f"{folder} cannot be written"
     return why_not

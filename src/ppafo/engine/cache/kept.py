@@ -50,7 +50,7 @@ def load_kept_module(folder: Path, program: RequestedProgram) -> ModuleType | No
     if not os.path.lexists(folder):
         return None
     if not is_whole(folder):
-        logger.warning("ppafo: the compiled model %s is damaged; it is made anew", folder.name)
+        logger.warning("ppafo: the compiled model %s is damaged and is compiled again", folder.name)
         remove(folder)
         return None
     try:

@@ -101,7 +101,7 @@ def announce(where: str, models: int = 1) -> Iterator[None]:
         timer.join()
     seconds = time.perf_counter() - start
     if seconds >= QUIET:
-        logger.warning("ppafo: compiled in %.1f s and %s", seconds, where)
+        logger.warning("ppafo: compiled in %.1f s, %s", seconds, where)
 
 
 def make(program: RequestedProgram, folder: Path | None) -> ModuleType:

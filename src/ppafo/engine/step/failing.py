@@ -20,7 +20,11 @@ def groups(parts: Program) -> Groups:
     if port not in plant_faults.FAILED_PORTS:
         known = " or ".join(row.__name__ for row in plant_faults.FAILED_PORTS)
         code = parts.valve.connect.__code__
-        raise refusal(code.co_filename, code.co_firstlineno, f"faults of the plant need {known}, not {port.__name__}")
+        raise refusal(
+            code.co_filename,
+            code.co_firstlineno,
+            f"plant faults need a valve whose port is {known}, not {port.__name__}",
+        )
     return {"plant_faults": given(PlantFaults), "shut_off": given(ShutOff), "unpowered": kept(Unpowered)}
 
 

@@ -87,7 +87,7 @@ def static_torque(
     where a scale that only pulls shows nothing until friction is overcome. Raises IdentificationError, with file,
     sample and remedy, for recordings that cannot separate the unknowns.
     """
-    readings = torque_readings(sources)
+    readings = torque_readings(sources, tolerances.zero_of_pressure)
     unknowns, channel = _unknowns_of(readings), readings.channel
     files = [source.name for source in sources]
     slope, zero, friction, friction_scale = _straight_line(readings, ", ".join(files))

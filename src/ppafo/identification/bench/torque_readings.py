@@ -59,8 +59,11 @@ class TorqueReadings:
     slides: bool
 
 
-def torque_readings(sources: tuple[RecordingSource, ...]) -> TorqueReadings:
-    """Return the readings of all recordings. Raises IdentificationError if they cannot separate slope from friction."""
+def torque_readings(sources: tuple[RecordingSource, ...], zero_of_pressure: float) -> TorqueReadings:
+    """Return the readings of all recordings; ``zero_of_pressure`` [Pa] is the limit of the zero of the pressure sensor.
+
+    Raises IdentificationError if they cannot separate slope from friction.
+    """
     is_force = bool(sources) and all(FORCE in item.recording and TORQUE not in item.recording for item in sources)
     channel = FORCE if is_force else TORQUE
     check_sources(sources, PROCEDURE, (channel, "pressure_difference", "direction"), 1, moving=(channel,))
@@ -85,7 +88,7 @@ def torque_readings(sources: tuple[RecordingSource, ...]) -> TorqueReadings:
     if is_flat or lowest == 0.0:
         is_used &= ~resting
     pressure, load, direction = pressure[is_used], load[is_used], direction[is_used]
-    _check_separable(sources, pressure, direction)
+    _check_separable(sources, pressure, direction, zero_of_pressure)
     for source in sources:
         loads = source.recording[channel]
         check_not_clipped(source, PROCEDURE, "pressure_difference", channel, loads, _MORE_THAN_FRICTION)
@@ -118,7 +121,9 @@ def torque_readings(sources: tuple[RecordingSource, ...]) -> TorqueReadings:
     )
 
 
-def _check_separable(sources: tuple[RecordingSource, ...], pressure: Floats, direction: Floats) -> None:
+def _check_separable(
+    sources: tuple[RecordingSource, ...], pressure: Floats, direction: Floats, zero_of_pressure: float
+) -> None:
     """Raise IdentificationError for too few readings, a missing branch, or too few different pressures."""
     if pressure.size < _MINIMUM_SAMPLES:
         raise IdentificationError(
@@ -135,16 +140,20 @@ def _check_separable(sources: tuple[RecordingSource, ...], pressure: Floats, dir
         check_moves(sources[0], PROCEDURE, "pressure_difference")
     # Two levels fix a line, but do not show whether it is one. Slope, zero and growth of the friction are extrapolated
     # from the spread of the pressures to zero, which the jitter about one commanded pressure does not carry.
-    highest = float(np.abs(pressure).max())
-    width = max(float(np.ptp(pressure)) / _BINS, _SAME_LEVEL * highest)
-    bins = np.floor((pressure - pressure.min()) / width)
-    levels = np.unique(np.minimum(bins, _BINS - 1)).size
+    highest = _SAME_LEVEL * float(np.abs(pressure).max())
+    width = max(float(np.ptp(pressure)) / _BINS, highest, zero_of_pressure)
+    ordered = np.sort(pressure)
+    # From the lowest reading of each level, or one that lies across the end of an interval would count twice.
+    levels = first = 0
+    while first < ordered.size:
+        levels, first = levels + 1, int(np.searchsorted(ordered, ordered[first] + width, "right"))
     if levels < _MINIMUM_LEVELS:
         shown, unit = in_shown_unit(width, "Pa_d")
+        why = f"{percentage(_SAME_LEVEL, 2)} of the highest" if width > zero_of_pressure else "[bench] zero_of_pressure"
         raise IdentificationError(
             f"{', '.join(source.name for source in sources)}: {PROCEDURE} needs readings at {_MINIMUM_LEVELS} "
-            f"different pressures or more, there are {levels}: pressures closer than {shown:.3g} {unit}, "
-            f"{percentage(_SAME_LEVEL, 2)} of the highest, are one; add recordings at other pressures"
+            f"different pressures or more, there {'is' if levels == 1 else 'are'} {levels}: pressures closer than "
+            f"{shown:.3g} {unit}, {why}, are one; add recordings at other pressures"
         )
 
 

@@ -91,8 +91,6 @@ WRITTEN_BY = (*COMPOSED, *_WRITERS)
 SHIPPED_KEYS = "shipped.json"
 """File with the program digest of each bundled scenario and walk, by its description and by the outline of its text,
 and the package files for which these are valid."""
-_OF_THE_COMPUTER = "ppafo.translation.native"
-"""Module whose values depend on the compilers and processor of this computer and enter no C text."""
 
 
 def program_of(library: Library, scenario: Scenario) -> bytes:
@@ -104,8 +102,7 @@ def program_of(library: Library, scenario: Scenario) -> bytes:
     # Stored digests of C texts, by scenario description and by outline, which are void after any change of code.
     keys, shipped = _shipped_keys(), dict[str, str]()
     if key is not None and key.files == keys["files"]:
-        values = {module: value for module, value in key.values.items() if module != _OF_THE_COMPUTER}
-        shipped = keys["digests"] if all(keys["values"].get(module) == values[module] for module in values) else {}
+        shipped = keys["digests"] if key.values.items() <= keys["values"].items() else {}
     if key is None:
         digest = _known_digest(library, shipped)
     elif not (digest := shipped.get(short_digest(key.described), "")):

@@ -11,6 +11,7 @@ from ppafo.parameters.audit.chambers import (
     check_filling,
     check_rotation,
     check_rounded_table,
+    check_stroke,
     check_virtual_work,
     check_volumes,
 )
@@ -22,6 +23,7 @@ from ppafo.parameters.audit.inertia import check_inertia
 from ppafo.parameters.audit.orifices import check_bores, check_orifices
 from ppafo.parameters.audit.torque import check_published_torque, check_torque_ceiling, check_vacuum
 from ppafo.parameters.audit.values import (
+    check_contradictions,
     check_dimensions,
     check_gas_data,
     check_ideal_gas,
@@ -36,6 +38,7 @@ __all__ = ["AuditFinding", "ComparedNumber", "NamedValue", "Severity", "changed_
 
 CHECKS: dict[str, Callable[[Evidence], Iterator[AuditFinding]]] = {
     "missing": check_missing,
+    "contradictions": check_contradictions,
     "statements": check_statements,
     "dimensions": check_dimensions,
     "ranges": check_ranges,
@@ -50,6 +53,7 @@ CHECKS: dict[str, Callable[[Evidence], Iterator[AuditFinding]]] = {
     "volumes": check_volumes,
     "rounded table": check_rounded_table,
     "rotation": check_rotation,
+    "stroke": check_stroke,
     "filling": check_filling,
     "vacuum": check_vacuum,
     "torque ceiling": check_torque_ceiling,

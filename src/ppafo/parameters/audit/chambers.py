@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+from ppafo.model.actuators.cylinder import pins_at
 from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, density_change
 
 # Does the torque constant equal the displacement per radian, as virtual work demands: T dtheta = (P1 - P2) dV?
@@ -143,21 +144,8 @@ _SAME_TURN = 1.01
 
 
 def check_rotation(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for stops in the wrong order, a warning for a range larger than the actuator's designation."""
+    """Yield a warning for a range of angles larger than the actuator's designation."""
     rated, angles = evidence.number(_RATED), evidence.angle_range()
-    stops = evidence.numbers("actuator.angle_min", "actuator.angle_max")
-    if stops is not None and not stops[0] < stops[1]:
-        yield AuditFinding(
-            id="stops",
-            severity="error",
-            title="the lower stop is not below the upper one",
-            values=evidence.values_of("actuator.angle_min", "actuator.angle_max"),
-            sides=(
-                ComparedNumber("actuator.angle_min", stops[0], "rad"),
-                ComparedNumber("actuator.angle_max", stops[1], "rad"),
-            ),
-            paragraph="No run can be made with these stops. Exchange them, or correct the wrong one.",
-        )
     if rated is None or angles is None or angles[3] - angles[1] <= _SAME_TURN * rated:
         return
     turn = angles[3] - angles[1]
@@ -174,6 +162,35 @@ def check_rotation(evidence: Evidence) -> Iterator[AuditFinding]:
             f"The range of angles is {math.degrees(turn):.3g} deg, the actuator turns by {math.degrees(rated):.3g} "
             "deg. Either another actuator or a gear was used, or the angle is not the vane's; volumes and torque "
             "constant then belong to another shaft. The designation of the part on the bench would settle it."
+        ),
+    )
+
+
+# Which stroke of a cylinder and which lever arms do the stops need?
+
+_LEVER = ("actuator.lever_length", "actuator.base_distance", "actuator.lever_offset")
+
+
+def check_stroke(evidence: Evidence) -> Iterator[AuditFinding]:
+    """Yield a note on the stroke of a cylinder between the stops and on its lever arm, to compare with a data sheet."""
+    lever, base, offset, *stops = (evidence.number(path) for path in (*_LEVER, *_STOPS))
+    low, high = ((stop or 0.0) + (offset or 0.0) for stop in stops)
+    if lever is None or base is None or None in stops or not 0.0 < low < high < math.pi:
+        return
+    (shortest, first_arm), (longest, last_arm) = pins_at(lever, base, low), pins_at(lever, base, high)
+    yield AuditFinding(
+        id="stroke",
+        severity="note",
+        title=f"the cylinder runs {1e3 * (longest - shortest):.4g} mm between the stops",
+        values=evidence.values_of(*_LEVER, *_STOPS),
+        sides=(
+            ComparedNumber("distance of the pins at the lower stop", shortest, "m"),
+            ComparedNumber("distance of the pins at the upper stop", longest, "m"),
+        ),
+        paragraph=(
+            f"Its pins are {1e3 * shortest:.4g} mm apart at the lower stop and {1e3 * longest:.4g} mm at the upper: "
+            "retracted it must be no longer than the first, and extended no shorter than the second. The lever arm is "
+            f"{1e3 * first_arm:.3g} mm at the lower stop and {1e3 * last_arm:.3g} mm at the upper one."
         ),
     )
 

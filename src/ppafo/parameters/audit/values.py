@@ -9,7 +9,7 @@ from ppafo.errors import ParameterError, UnitError
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence
-from ppafo.parameters.building import missing_values
+from ppafo.parameters.building import contradictions, missing_values, read_device
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.parameter_set import entry_in_si, number_in_si, number_text
 from ppafo.parameters.publications.publication import FILE, read_publication
@@ -84,6 +84,28 @@ def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
                 f"A device needs more: {', '.join(paths)}. Add {them} to the file or as overrides. "
                 "What rests on missing values is not audited."
             ),
+        )
+
+
+# Does a run refuse the device for values that are each in order, and contradict each other?
+
+
+def check_contradictions(evidence: Evidence) -> Iterator[AuditFinding]:
+    """Yield an error for each contradiction between values for which a run refuses the device."""
+    parameter_set, found = evidence.parameter_set, dict[str, tuple[str, ...]]()
+    for valve in parameter_set.valve_kinds:
+        # A value that is missing or wrong by itself has a finding of its own.
+        with contextlib.suppress(ParameterError):
+            device = read_device(parameter_set, valve, {})
+            found |= {line: paths for paths, line in contradictions(parameter_set, device)}
+    for line, paths in found.items():
+        yield AuditFinding(
+            id=paths[0].replace(".", "-").replace("_", "-"),
+            severity="error",
+            title="values that contradict each other, so that no run can be made",
+            values=evidence.values_of(*paths),
+            sides=(),
+            paragraph=f"A run refuses the device: {line}.",
         )
 
 

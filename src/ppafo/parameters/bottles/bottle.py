@@ -28,7 +28,7 @@ from ppafo.model.source import (
     pressure_reserve,
 )
 from ppafo.parameters.bottles.declaration import FILLS, PATHS, REQUIRED, SECTIONS, WARMING, bottle_file
-from ppafo.parameters.bottles.fluid import Fluid, check_temperature, filled_mass, load_fluid
+from ppafo.parameters.bottles.fluid import Fluid, check_temperature, filled_mass, filling_text, load_fluid
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
 from ppafo.parameters.parameter_set import Entry, allowed_number
 from ppafo.parameters.parts import Part, load_catalogue
@@ -179,15 +179,20 @@ def _entries_of(parsed: Any) -> dict[str, Entry]:
 
 def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
     """Return the bottle with the given values; ParameterError for missing or impossible ones."""
-    missing = [path for path in REQUIRED if path not in entries]
-    if missing:
-        raise ParameterError(f"{file}: {said_missing(missing)}")
+    with refused_as(ParameterError, f"{file}: gas = '{parsed.gas.value}'", ParameterError):
+        fluid = load_fluid(parsed.gas.value)
     values = {}
     for path, entry in entries.items():
         assignment = f"{file}: {path} = {format_quantity(entry.value, entry.unit)}"
         values[path] = allowed_number(assignment, entry, PATHS[path])
-    with refused_as(ParameterError, f"{file}: gas = '{parsed.gas.value}'", ParameterError):
-        fluid = load_fluid(parsed.gas.value)
+    missing = [path for path in REQUIRED if path not in entries]
+    if missing:
+        has_mass_alone = "bottle.volume" in missing and "bottle.gas_mass" in values
+        filling = filling_text(fluid, values["bottle.gas_mass"]) if has_mass_alone else ""
+        source = " --from co2-16g" if fluid.name == "CO2" else ""
+        raise ParameterError(
+            f"{file}: {said_missing(missing)}{filling}; 'ppafo new bottle NAME{source}' writes a file with all of them"
+        )
     bottle = Bottle(
         name=parsed.name,
         title=parsed.title,

@@ -19,6 +19,8 @@ from ppafo.wording import nearest_name, said_missing
 
 _TABLES = resources.files("ppafo.parameters.bottles") / "fluid_tables"
 _SUFFIX = ".json"
+_LARGEST_FILLING = {"CO2": 680.0}
+"""Largest filling [kg/m^3] of a bottle of liquid that transport rules allow (49 CFR 173.304a, 68 % of its water)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +69,17 @@ def check_temperature(path: str, temperature: float, fluid: Fluid, file: str) ->
         )
 
 
+def filling_text(fluid: Fluid, mass: float | None = None, volume: float = 0.0) -> str:
+    """Return the gas mass for a volume [m^3], or the volume for a mass [kg], at the largest filling, for a message."""
+    density = _LARGEST_FILLING.get(fluid.name)
+    if density is None:
+        return ""
+    found = "bottle.gas_mass", f"{1.0e3 * density * volume:.3g} g"
+    if mass is not None:
+        found = "bottle.volume", f"{1.0e6 * mass / density:.3g} cm^3"
+    return f"; at the largest filling with {fluid.name}, {density:g} g/L (49 CFR 173.304a), {found[0]} is {found[1]}"
+
+
 def filled_mass(values: Mapping[str, float], entries: Mapping[str, Entry], fluid: Fluid, file: str) -> float:
     """Return the mass of gas [kg] in a full bottle, given directly or by pressure and temperature.
 
@@ -77,7 +90,8 @@ def filled_mass(values: Mapping[str, float], entries: Mapping[str, Entry], fluid
     given = [path for path in by_pressure if path in values]
     # Exactly one form: by mass, or by pressure and temperature.
     if ("bottle.gas_mass" in values) == bool(given):
-        raise ParameterError(f"{file}: give either bottle.gas_mass or {' and '.join(by_pressure)}")
+        filling = "" if given else filling_text(fluid, volume=values["bottle.volume"])
+        raise ParameterError(f"{file}: give either bottle.gas_mass or {' and '.join(by_pressure)}{filling}")
     if not given:
         return values["bottle.gas_mass"]
     missing = [path for path in by_pressure if path not in values]

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 from ppafo.engine.lanes import Floats
 from ppafo.model.cold_gas import DRY_ICE, SupplyState
-from ppafo.report.display_units import display_value, quantity_text
+from ppafo.report.kind import duration_kind
 from ppafo.signals import Channel, Recording
 from ppafo.walking.bottle.supply import BottleSupply
 
@@ -107,9 +107,10 @@ def lasted(course: SupplyCourse) -> float | None:
     return None if course.ending.kind in (WALKED, DIVERGED) else course.ending.time
 
 
-def minutes_text(seconds: float) -> str:
-    """Return a duration as text with three significant digits, or in whole minutes from 1000 min."""
-    return quantity_text(seconds, "duration", ".0f" if display_value(seconds, "duration") >= 999.5 else ".3g")
+def duration_text(seconds: float) -> str:
+    """Return a duration as text with three significant digits, in seconds to 2 min, in whole minutes from 1000 min."""
+    kind = duration_kind(seconds)
+    return kind.text(seconds, ".0f" if kind.values(seconds) >= 999.5 else ".3g")
 
 
 def strides_text(strides: float) -> str:

@@ -105,7 +105,7 @@ def animation(comparison: WalkComparison) -> bytes:
             images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
     # A GIF counts hundredths of a second.
     milliseconds = 10 * round(100.0 * _SLOWED * stride_time / _PER_STRIDE)
-    palette = _palette(images[:: _PER_STRIDE // 5])
+    palette = _palette(images[:: _PER_STRIDE // 2])
     frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     buffer = io.BytesIO()
     frames[0].save(

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.report.display_units import display_value
-from ppafo.report.kind import Kind
+from ppafo.report.kind import Kind, duration_kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
-from ppafo.walking.figures.axes import time_axis
 from ppafo.walking.result import WalkResult
 
 if TYPE_CHECKING:
@@ -93,7 +92,7 @@ def _panel(end: float, ended: Mark, kind: Kind, marks: Sequence[Mark], largest: 
 
     With ``largest`` [SI], the value axis starts at 0 and includes this value.
     """
-    axis = time_axis(end)
+    axis = duration_kind(end)
 
     def set_limits(axes: "Axes") -> None:
         axes.set_xlim(0.0, 1.005 * float(axis.values(end)))

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.model.helping import HELPS, LIFTS, PAUSED, STOPPED
-from ppafo.report.kind import Kind
+from ppafo.report.kind import Kind, duration_kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import BLACK, GREY, VERMILION, font_size
 from ppafo.signals.recording import Recording
-from ppafo.walking.figures.axes import GAS, GROUND, THIN, TOES, time_axis
+from ppafo.walking.figures.axes import GAS, GROUND, THIN, TOES
 from ppafo.walking.result import WalkResult
 from ppafo.walking.safety_events import acting_phase, failure_times
 
@@ -45,7 +45,7 @@ def whole_walk_figure(result: WalkResult) -> "Figure":
     """Return gas, toe height, phase and assistance level over time, with faults, pauses and the stop marked."""
     recording, time = result.recording, result.recording.time
     end = float(time[-1])
-    axis = time_axis(end)
+    axis = duration_kind(end)
     failed = {name: failure for name, failure in failure_times(result.scenario).items() if failure < end}
     losses = [event.time for event in result.events if event.fault_flag is not None]
     lines = [Mark("at", loss, colour=VERMILION, style={"linewidth": 0.9}) for loss in losses]

@@ -1,14 +1,18 @@
 """Files of bottles: those of the package, overrides, and mistakes in one line."""
 
 import re
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
 import pytest
 
+import ppafo
+from ppafo.cli.new import new
 from ppafo.errors import ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, list_bottles, load_bottle
 from ppafo.parameters.bottles.declaration import json_schema
+from ppafo.report.finding import text_of
 
 TEXT = (resources.files("ppafo.parameters.bottles") / "files" / f"{PAPER_BOTTLE}.toml").read_text(encoding="utf-8")
 
@@ -129,3 +133,46 @@ def filled_by_pressure(tmp_path: Path, pressure: float) -> Path:
 
 def test_the_schema_of_a_file_names_every_value() -> None:
     assert {"bottle", "regulator", "room", "gas"} <= set(json_schema()["properties"])
+
+
+@pytest.mark.parametrize(
+    ("name", "mass", "volume"), [("co2-12g", 12.0, 17.6), ("co2-16g", 16.0, 23.5), ("co2-88g", 88.0, 129.0)]
+)
+def test_a_cartridge_is_filled_as_transport_rules_allow_and_lasts_seconds(
+    name: str, mass: float, volume: float
+) -> None:
+    bottle = load_bottle(name)
+    assert (1.0e3 * bottle.mass, 1.0e6 * bottle.volume) == pytest.approx((mass, volume))
+    assert bottle.mass / bottle.volume == pytest.approx(680.0, rel=0.01)
+    said = text_of(ppafo.bottle(gas_per_stride="0.4 g", stride_time="1.1 s", bottle=name))
+    assert ("min of walking" in said) == (name == "co2-88g")
+
+
+@pytest.mark.parametrize(
+    ("left_out", "words"),
+    [
+        ("volume", "'bottle.volume' is missing; at the largest filling with CO2, 680 g/L (49 CFR 173.304a), "
+         "bottle.volume is 23.5 cm^3; 'ppafo new bottle NAME --from co2-16g' writes a file with all of them"),
+        ("gas_mass", "give either bottle.gas_mass or bottle.fill_pressure and bottle.fill_temperature; at the largest "
+         "filling with CO2, 680 g/L (49 CFR 173.304a), bottle.gas_mass is 16 g"),
+    ],
+)  # fmt: skip
+def test_a_file_with_the_mass_or_the_volume_alone_is_told_the_other(tmp_path: Path, left_out: str, words: str) -> None:
+    sections = (Path(ppafo.__file__).parent / "parameters/bottles/files/co2-16g.toml").read_text().split("\n\n")
+    file = tmp_path / "mine.toml"
+    file.write_text("\n\n".join(text for text in sections if not text.startswith(f"[bottle.{left_out}]")))
+    with pytest.raises(ParameterError) as caught:
+        load_bottle(file)
+    assert str(caught.value) == f"{file}: {words}"
+
+
+def test_a_bottle_of_the_catalogue_of_parts_is_copied_into_a_file_with_the_same_numbers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    new("bottle", "mine", source="co2-3_5oz")
+    part, copy = load_bottle("co2-3_5oz"), load_bottle("mine.toml")
+    assert replace(part, name="mine", entries={}) == replace(copy, entries={})
+    assert {path: entry.source for path, entry in part.entries.items()} == {
+        path: entry.source for path, entry in copy.entries.items()
+    }

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -10,6 +11,7 @@ from ppafo.parameters import apply_overrides, build_device, list_sets, load_para
 from ppafo.parameters.audit import AuditFinding, findings_of
 
 BASE = load_parameter_set("ppafo2011")
+BLADDER = Path(__file__).parents[3] / "actuators" / "measured-bladder.toml"
 REPORTED_FLOW = "reported.valves.proportional.mass_flow"
 
 
@@ -275,3 +277,51 @@ def test_a_key_of_another_number_or_of_none_is_an_error(key: str) -> None:
     (found,) = with_key("reported.walking_torque", key)
     assert (found.severity, found.id) == ("error", "reported-walking-torque-against-statement")
     assert f"'{key}'" in found.title
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("ppafo2011", ("actuator.angle_min=140 deg",)),
+        ("ppafo2011", ("friction.static_torque=0.001 N m",)),
+        ("ppafo2011", ("supply.dorsiflexion_pressure=-0.5 bar_g", "supply.pressure=3 bar_g")),
+        ("ppafo2011", ("supply.pressure=-0.5 bar_g", "supply.relieving=false")),
+        ("cylinder-lever", ("actuator.rod_diameter=26 mm",)),
+        ("cylinder-lever", ("actuator.lever_offset=60 deg",)),
+        (str(BLADDER), ("actuator.angle_max=150 deg",)),
+        (str(BLADDER), ("supply.pressure=9 bar_g",)),
+        (str(BLADDER), ("supply.pressure=9 bar_g", "actuator.angle_max=150 deg")),
+    ],
+)
+def test_the_audit_says_as_an_error_what_a_run_refuses(name: str, overrides: tuple[str, ...]) -> None:
+    changed = apply_overrides(load_parameter_set(name), overrides)
+    with pytest.raises(ParameterError) as refused:
+        build_device(changed)
+    said = [finding.paragraph for finding in findings_of(changed) if finding.severity == "error"]
+    assert len(said) == len(overrides) - any("=-0.5" in override for override in overrides)
+    assert str(refused.value).removeprefix(f"{changed.file}: ") in said[0]
+
+
+def test_the_audit_names_a_valve_that_joins_two_chambers_of_which_the_actuator_has_one(tmp_path: Path) -> None:
+    (tmp_path / "measured-bladder.csv").write_bytes(BLADDER.with_suffix(".csv").read_bytes())
+    valve = """
+[valves.recycling]
+kind = "solenoid_recycling"
+area = { value = 12.0, unit = "mm^2", origin = "assumed", source = "-" }
+discharge_coefficient = { value = 0.6, unit = "", origin = "assumed", source = "-" }
+"""
+    path = tmp_path / "one.toml"
+    path.write_text(BLADDER.read_text(encoding="utf-8") + valve, encoding="utf-8")
+    errors = [finding for finding in findings_of(load_parameter_set(path)) if finding.severity == "error"]
+    assert [error.id for error in errors] == ["valves-recycling"]
+
+
+def test_the_stroke_of_a_cylinder_between_its_stops_is_compared_with_a_data_sheet() -> None:
+    found = _of_set("cylinder-lever")["stroke"]
+    ends = [side(found, f"distance of the pins at the {stop} stop") for stop in ("lower", "upper")]
+    # What is measured between the pins gives the offset, as the page on sets says: 25 and 200 mm from the joint.
+    for apart, degrees in zip(ends, (20.0, 130.0), strict=True):
+        between = math.acos((0.025**2 + 0.2**2 - apart**2) / (2.0 * 0.025 * 0.2))
+        assert math.degrees(between) - degrees == pytest.approx(15.0)
+    assert f"runs {1e3 * (ends[1] - ends[0]):.4g} mm" in found.title
+    assert "stroke" not in findings()

@@ -19,11 +19,11 @@ from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.simulation.gains import gains_of
-from ppafo.walking.bottle.course import minutes_text
+from ppafo.walking.bottle.course import duration_text
 from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
-from ppafo.walking.wearer import SCALED_MASS, who_walks
+from ppafo.walking.wearer import who_walks
 
 _HEAD = (
     "valve",
@@ -88,8 +88,7 @@ def _sections(requirements: DesignRequirements, device: SizedDevice) -> tuple[fi
     share = device.torque / requirements.torque
     # A walk on a bottle may end at nine tenths of the request, so how far it fell short is said.
     short = f" ({100.0 * share:.0f} % of the request: pressure falls with the bottle)" if share < 1.0 else ""
-    low, high = (share * walk_of(walked.scenario).gait.body_mass for share in SCALED_MASS)
-    duration, lasts = f"{requirements.seconds / 60.0:.4g} min", minutes_text(device.life.discharge.walking_time)
+    duration, lasts = duration_text(requirements.seconds), duration_text(device.life.discharge.walking_time)
     last = TORQUE.text(float(walked.peak_torques[-1]))
     rows = (
         ("controller", f"{walked.scenario.controller.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
@@ -106,10 +105,6 @@ def _sections(requirements: DesignRequirements, device: SizedDevice) -> tuple[fi
         *electrical_sentences(device.electrical),
         who_walks(walk_of(walked.scenario).wearer, walk_of(walked.scenario).gait, "as requested"),
     ]
-    if not low <= requirements.mass <= high:
-        remarks.append(
-            f"the gait is known for {low:.0f} to {high:.0f} kg: outside this range, torque and gas are extrapolated"
-        )
     caption, draw = _CAPTION.format(wished=duration, lasts=lasts), partial(bottle_figure, walked)
     masses = ((name, MASS.text(mass, ".0f")) for name, mass in device.masses.items())
     return (

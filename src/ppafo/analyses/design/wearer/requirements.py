@@ -4,6 +4,7 @@ import math
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from ppafo.analyses.design.wearer.electrical import Electrical
@@ -30,6 +31,9 @@ REACHED = 0.95
 """Least ratio [-] of the peak torque of the mean stride to the required torque that counts as reached."""
 SHORTEST = 6.0
 """Shortest time [s] of a walk on a bottle."""
+_SHORTEST_WEARER = 1.0
+"""Least stature [m] of a wearer: about four years, the youngest whose leg segments were measured (R. K. Jensen, Body
+segment mass, radius and radius of gyration proportions of children, J. Biomech. 19(5), 1986: boys of 4 to 15 years)."""
 _STRONGEST, _HIGHEST_TOES = 100.0, 0.2
 """Torque [N m] and clearance [m] above which a requirement is refused as a typing error."""
 TORQUE, MASS, CLEARANCE = Kind("", "N m", "torque", ".3g"), Kind("", "kg", "part mass"), Kind("", "m", "length", ".1f")
@@ -46,6 +50,7 @@ class DesignRequirements:
     ``seconds``: walking time on one bottle [s]
     ``toes``: toe clearance in mid-swing [m]; None for ``usual_toes``
     ``gas``: gas species of the supply; empty for the species of the walk
+    ``gait``: name or file of the gait; None for the gait of the walk
     """
 
     mass: float
@@ -56,6 +61,7 @@ class DesignRequirements:
     toes: float | None = None
     usual_toes: float = TOES
     gas: str = ""
+    gait: str | Path | None = None
 
     @property
     def height(self) -> float:
@@ -90,15 +96,15 @@ class DesignRequirements:
 def check_requirements(requirements: DesignRequirements) -> None:
     """Raise StudyError, naming the argument, for requirements outside the ranges for which devices are sized."""
     low, high = STATURES
-    mass = next(quantity for quantity in WEARER if quantity.name == "body_mass")
+    mass, tallest = (next(each for each in WEARER if each.name == name) for name in ("body_mass", "stature"))
     weight, height, toes = requirements.mass, requirements.height, requirements.toes
-    known = f"body segment lengths are known for adults of {low:g} to {high:g} m"
     if not mass.minimum <= weight <= mass.maximum:
         raise StudyError(f"--mass: {weight:g} kg: must be at least {mass.minimum:g} kg and at most {mass.maximum:g} kg")
     if requirements.stature is None and not low <= height <= high:
+        lightest, heaviest = (BODY_MASS_INDEX * tall * tall for tall in STATURES)
         raise StudyError(
-            f"--mass: {weight:g} kg: with a body mass index of {BODY_MASS_INDEX:g} kg/m^2 the wearer would be "
-            f"{height:.3g} m tall, but {known}; give --stature"
+            f"--mass: {weight:g} kg: give --stature too; it is derived from body mass only for {lightest:.1f} to "
+            f"{heaviest:.0f} kg"
         )
     if not requirements.pressure > STANDARD_ATMOSPHERE:
         raise StudyError("--pressure: must be above the atmosphere, for example '50 psi_g'")
@@ -111,8 +117,10 @@ def check_requirements(requirements: DesignRequirements) -> None:
     if toes is not None and not 0.0 <= toes <= _HIGHEST_TOES:
         highest = 1000.0 * _HIGHEST_TOES
         raise StudyError(f"--toes: {1000.0 * toes:g} mm: must be at least 0 mm and at most {highest:g} mm")
-    if requirements.stature is not None and not low <= height <= high:
-        raise StudyError(f"--stature: {height:g} m: {known}; give a gait and a wearer of your own in a walk file")
+    if not _SHORTEST_WEARER <= height <= tallest.maximum:
+        raise StudyError(
+            f"--stature: {height:g} m: must be at least {_SHORTEST_WEARER:g} m and at most {tallest.maximum:g} m"
+        )
 
 
 def shown_clearance(toes: float) -> float:

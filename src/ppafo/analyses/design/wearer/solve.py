@@ -13,7 +13,10 @@ from ppafo.analyses.design.wearer.available_parts import AvailableParts, shelf_o
 from ppafo.analyses.design.wearer.bottle import lightest_on_bottle
 from ppafo.analyses.design.wearer.electrical import electrical_of
 from ppafo.analyses.design.wearer.requirements import (
+    CLEARANCE,
+    REACHED,
     TOES,
+    TORQUE,
     WALKS,
     DesignRequirements,
     SizedDevice,
@@ -81,6 +84,14 @@ def size_for_wearer(
     )
     if not tried:
         instead = ("no pair of valve and actuator is rated for this pressure, or none assists: give another pressure",)
+    elif not instead:
+        torque = requirements.torque
+        nearest = max(tried, key=lambda pair: (min(pair.torque, REACHED * torque), pair.toes))
+        instead = (
+            f"none: of the pairs tried {nearest.valve.name} with {nearest.actuator.name} comes nearest, with "
+            f"{TORQUE.text(nearest.torque)} and toes {CLEARANCE.text(nearest.toes)} over the ground; give --catalogue "
+            "with an actuator of more torque per pressure, from 'ppafo new parts my-parts --from parts'",
+        )
     return WearerSizing(requirements, healthy, tuple(tried), None, instead)
 
 

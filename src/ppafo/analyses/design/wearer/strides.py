@@ -34,8 +34,9 @@ SHUT_OFF_PARTS = {quantity.name: quantity.default or 0.0 for quantity in SHUT_OF
 
 
 def of_wearer(requirements: DesignRequirements) -> tuple[str, ...]:
-    """Return the overrides that give a walk the wearer of the requirements."""
-    return f"wearer.body_mass={requirements.mass:.6g} kg", f"wearer.stature={requirements.height:.6g} m"
+    """Return the overrides that give a walk the wearer of the requirements, and the wearer's gait if it is given."""
+    wearer = (f"wearer.body_mass={requirements.mass:.6g} kg", f"wearer.stature={requirements.height:.6g} m")
+    return wearer if requirements.gait is None else (*wearer, f"gait={requirements.gait}")
 
 
 def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -> list[WalkedDevice]:
