@@ -272,7 +272,7 @@ def test_a_walk_of_every_feature_is_clean_under_the_sanitizers_and_the_same_in_c
 
 
 def test_what_cannot_leave_is_refused_in_one_line(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="a walk on a bottle cannot be exported"):
+    with pytest.raises(ScenarioError, match="a walk with a bottle cannot be exported"):
         c_library(load_walk("solenoid", bottle="paper-co2-9oz"))
     with pytest.raises(ScenarioError, match="did you mean 'solenoid'"):
         load_scenario("solenoide")
