@@ -64,7 +64,7 @@ def _document(file: Path) -> dict[str, Any]:
     """Return the content of a JSON file that contains an object."""
     document = read_json(file)
     if not isinstance(document, dict):
-        raise DataError(f"{file}: is not a table of names and values")
+        raise DataError(f"{file}: must be a JSON object")
     return document
 
 
@@ -74,7 +74,7 @@ def what_is_there(folder: Path, names: list[str]) -> tuple[str, dict[str, Any]]:
     Raises DataError for any other folder.
     """
     if MARK not in names:
-        raise DataError(f"{folder}: is not a result folder of ppafo")
+        raise DataError(f"{folder}: is not a result folder of ppafo; give a folder written by a ppafo command")
     command = marking_command(folder)
     pictures = [name for name in names if name.endswith(_PICTURES)]
     page = next((name for name in names if name.endswith(".html")), None)

@@ -133,7 +133,7 @@ def _plain(value: Any, path: str, level: int, copies: dict[int, tuple[Any, Any]]
         return copies[id(value)][1]
     scalar = _scalar(value)
     if scalar is None:
-        raise ArgumentError(f"{path} = {one_line(repr(value))}: is not a value; omit the key")
+        raise ArgumentError(f"{path} = {one_line(repr(value))}: has no value; omit the key for the default")
     # Values nested deeper than in any file are refused by the check of the document.
     if isinstance(scalar, bytes) or level > _MAXIMUM_LEVELS:
         return scalar

@@ -10,7 +10,7 @@ import functools
 import inspect
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
 
@@ -62,6 +62,17 @@ def argument_text(name: str, value: str = "", option: str = "") -> str:
     return f"{option} {shlex.quote(value)}" if value else option
 
 
+def override_text(overrides: Iterable[str]) -> str:
+    """Return overrides as written by the caller: words of the command line, or an argument in Python.
+
+    >>> override_text(["run.duration=2 s"])
+    "overrides=['run.duration=2 s']"
+    """
+    if _reader.get() != "command line":
+        return f"overrides={list(overrides)!r}"
+    return shlex.join(word for override in overrides for word in ("--set", override))
+
+
 def checked(function: Callable[P, R]) -> Callable[P, R]:
     """Return a function that checks and converts its arguments before the call."""
 
@@ -106,7 +117,7 @@ def _values(
     for name, value in by_name.items():
         if name not in parameters:
             hint = nearest_name(name, parameters)
-            raise ArgumentError(f"{function}() has no argument '{name}'{hint}; it has {', '.join(parameters)}")
+            raise ArgumentError(f"{function}() has no argument '{name}'{hint}; available: {', '.join(parameters)}")
         if name in values:
             raise ArgumentError(f"{function}(): {name} is given twice, by position and by name")
         values[name] = value

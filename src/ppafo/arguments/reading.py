@@ -122,7 +122,7 @@ def quantity(si_unit: str, allowed: NumberRange = ANY) -> Callable[[str], float]
         if si_unit in EXAMPLES and NUMBER.fullmatch(text.strip()):
             description, units = EXAMPLES[si_unit]
             examples = " or ".join(f"'{text.strip()} {unit}'" for unit in units)
-            raise ArgumentError(f"{text}: {description} needs its unit: {examples}")
+            raise ArgumentError(f"{text}: {description} needs a unit: {examples}")
         try:
             value = parse_quantity(text, si_unit)
         except UnitError as error:
@@ -141,7 +141,7 @@ def minutes(text: str) -> float:
     except UnitError as error:
         raise ArgumentError(f"{text!r}: must be a number of minutes, or a time such as '90 s': {error}") from error
     if not 0.0 < value < math.inf:
-        raise ArgumentError(f"{text}: must be above 0 min, and finite")
+        raise ArgumentError(f"{text}: must be finite and above 0 min")
     return value
 
 

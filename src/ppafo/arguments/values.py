@@ -228,7 +228,7 @@ def _mapping(element: AcceptedValues) -> AcceptedValues:
 
     def take(name: str, value: Any) -> dict[str, Any]:
         if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
-            raise ArgumentError(f"{name}={shown(value)}: must be a dictionary with texts as its keys")
+            raise ArgumentError(f"{name}={shown(value)}: must be a dictionary with strings as keys")
         return {key: element.take(f"{name}[{key!r}]", item) for key, item in value.items()}
 
     return AcceptedValues("a dictionary", take)

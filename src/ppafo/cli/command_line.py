@@ -271,7 +271,7 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     for parameter, reading in parameters_of(verb):
         if command.lists and values[parameter.name] is None and parameter.default is inspect.Parameter.empty:
             noun = reading.word.metavar.lower()
-            raise UsageError(f"no {noun} was given; 'ppafo {name} --list' shows what there is")
+            raise UsageError(f"no {noun} was given; 'ppafo {name} --list' shows the available names")
     folder = None
     if OUT not in parameters:
         folder = parsed.out

@@ -84,7 +84,7 @@ def doctor(
     why_not = "" if clear else refusal(folder)
     if warm:
         if why_not:
-            raise SimulationError(f"--warm: compiled models cannot be kept: {why_not}")
+            raise SimulationError(f"--warm: compiled models cannot be stored: {why_not}")
         from ppafo.simulation.loading import list_scenarios, load_scenario
         from ppafo.simulation.simulate import compile_models
 

@@ -51,8 +51,8 @@ def export_figure(folder: Folder, *, out: File | None = None) -> CommandOutput:
     if out is not None:
         if len(drawn) > 1:
             raise DataError(
-                f"--out {out}: {folder} has {len(drawn)} figures, {', '.join(drawn)}; without --out each is "
-                "written beside its recording"
+                f"--out {out}: {folder} has {len(drawn)} figures ({', '.join(drawn)}); omit --out to write each "
+                "beside its recording"
             )
         (content,) = render_figure(next(iter(drawn.values())), [out.suffix.removeprefix(".")]).values()
         written = [str(write_file(out, content))]

@@ -156,7 +156,7 @@ def _run(words: list[str]) -> int:
         # Refuse, before anything runs, a name that is not UTF-8: no result could say which file it is of.
         for word in words:
             if not word.isascii() and any("\ud800" <= character <= "\udfff" for character in word):
-                raise UsageError(f"'{one_line(word)}' is not text in UTF-8; give the file or folder another name")
+                raise UsageError(f"'{one_line(word)}' is not valid UTF-8; rename the file or folder")
         if words[:1] == ["--completion"]:  # its shell is a word that is no command
             if len(words) != 2 or words[1] not in SHELLS:
                 raise UsageError(f"--completion {' '.join(words[1:])}: must be {' or '.join(SHELLS)}")

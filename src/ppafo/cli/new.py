@@ -112,8 +112,8 @@ def new(
     if kind not in known:
         raise DataError(f"there is no kind of file '{kind}'{nearest_name(kind, known)}; available: {', '.join(known)}")
     if name is None or not _NAME.fullmatch(name):
-        given = "is missing, and" if name is None else f"{one_line(name)}:"
-        raise DataError(f"NAME {given} must consist of letters, digits, - and _; use --out for the path")
+        given = "is missing; it" if name is None else f"{one_line(name)}:"
+        raise DataError(f"NAME {given} must consist of letters, digits, - and _; give a path with --out")
     chosen, path = KINDS[kind], out or Path(name + _SUFFIX)
     if path.suffix != _SUFFIX:
         raise DataError(f"--out {path}: the name must end in {_SUFFIX}")

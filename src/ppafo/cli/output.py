@@ -157,7 +157,7 @@ def printing() -> Iterator[None]:
         _drop_output()
     except OSError as error:
         _drop_output()
-        raise DataError(f"standard output cannot be written: {reason(error)}") from error
+        raise DataError(f"cannot write to standard output: {reason(error)}") from error
 
 
 def _drop_output() -> None:

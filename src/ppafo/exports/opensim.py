@@ -64,7 +64,10 @@ def device_torque(result: WalkResult, side: Side = "right", strikes: Sequence[fl
     if strikes:
         check_strikes(strikes)
         if "external_torque" not in result.averages:
-            raise ScenarioError(f"{result.scenario.name}: has no complete assisted stride to place on heel strikes")
+            raise ScenarioError(
+                f"{result.scenario.name}: has no complete assisted stride between two heel "
+                "strikes; simulate a longer walk"
+            )
         mean = result.averages["external_torque"].mean
         parts = [first + PHASES[:-1] * (last - first) for first, last in pairwise(strikes)]
         time = np.append(np.concatenate(parts), strikes[-1])
@@ -82,6 +85,6 @@ def check_strikes(strikes: Sequence[float]) -> None:
     for first, last in pairwise(strikes):
         if not SHORTEST_STRIDE <= last - first <= LONGEST_STRIDE:
             raise ScenarioError(
-                f"{argument_text('strikes')}: from {first:g} to {last:g} s is not a stride: heel strikes of one foot "
-                f"are {SHORTEST_STRIDE:g} to {LONGEST_STRIDE:g} s apart, in order"
+                f"{argument_text('strikes')}: {first:g} to {last:g} s is not a stride: heel strikes of one foot "
+                f"must be {SHORTEST_STRIDE:g} to {LONGEST_STRIDE:g} s apart, in ascending order"
             )

@@ -66,8 +66,8 @@ def check_side(walk: MeanStride, usual: Gait) -> None:
     apart = abs((ankle - shank + 0.5) % 1.0 - 0.5)
     if apart > _OTHER_FOOT and in_place > _ALIKE_SHANK and best > _ALIKE and own < _UNLIKE:
         raise DataError(
-            f"{walk.file['ankle_angle']}: ankle_angle is {100.0 * apart:.0f} % of the stride from where this shank has "
-            "it: it belongs to the other foot; give the ankle of the same side as the shank"
+            f"{walk.file['ankle_angle']}: ankle_angle is shifted by {100.0 * apart:.0f} % of the stride against "
+            "shank_angle, so it belongs to the other foot; give ankle and shank of the same side"
         )
 
 

@@ -1,7 +1,6 @@
 """Gait files: layout, conversion to a ``Gait``, and conversion of a gait to the text of a file."""
 
 import functools
-import json
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -11,7 +10,7 @@ from pydantic import BaseModel, Field
 from ppafo.arguments import checked
 from ppafo.documents.models import SchemaVersion, make_schema, optional, table, validate
 from ppafo.documents.problems import NAME, QUANTITY
-from ppafo.documents.toml_text import TomlKind, label
+from ppafo.documents.toml_text import TomlKind, label, value_text
 from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.gait.gait import CURVES, REQUIRED, Gait, GaitCurve, plain_unit
 from ppafo.gait.plausible import check_gait
@@ -102,7 +101,7 @@ def gait_of(document: dict[str, Any], file: str) -> Gait:
     curves: dict[str, Any] = {name: _curve(document[name], name, file) for name in CURVES if name in document}
     # Required by the schema already: this tells the type checker.
     if numbers["stride.time"] is None or numbers["stride.stance_share"] is None or numbers["subject.body_mass"] is None:
-        raise DataError(f"{file}: [subject] and [stride] are not complete")
+        raise DataError(f"{file}: [subject] and [stride] are incomplete; import the gait again")
     return Gait(
         name=document["name"],
         title=document.get("title", ""),
@@ -131,9 +130,7 @@ def _number(document: dict[str, Any], path: str, file: str) -> float | None:
     with refused_as(DataError, f"{file}: {path} = {text!r}", UnitError):
         value = parse_quantity(text, unit)
     if not low <= value <= high:
-        raise DataError(
-            f"{file}: {path} = {text!r} is not allowed; it lies between {low:g} and {high:g} {unit}".strip()
-        )
+        raise DataError(f"{file}: {path} = {text!r}: must be from {low:g} to {high:g} {unit}".strip())
     return value
 
 
@@ -141,7 +138,7 @@ def _curve(table: dict[str, Any], name: str, file: str) -> GaitCurve:
     # The schema checks each list by itself; that both agree is said here.
     if len(table["cosine"]) != len(table["sine"]):
         counts = f"{len(table['cosine'])} numbers in cosine and {len(table['sine'])} in sine"
-        raise DataError(f"{file}: {name} has {counts}; a series has as many of both")
+        raise DataError(f"{file}: {name} has {counts}; both lists must have the same length")
 
     def si(value: float) -> float:
         return to_si(float(value), plain_unit(table["unit"]), plain_unit(CURVES[name]))
@@ -214,7 +211,7 @@ def gait_toml(gait: Gait) -> str:
     """Return a gait as the text of a gait file; reading the file gives the same gait, with angles rounded."""
     lines = ["schema_version = 1"]
     texts = {"name": gait.name, "title": gait.title, "origin": gait.origin, "source": gait.source, "notes": gait.notes}
-    lines += [f"{key} = {_text(value)}" for key, value in texts.items() if value]
+    lines += [f"{key} = {value_text(value)}" for key, value in texts.items() if value]
     lines += ["", "[subject]", f'body_mass = "{gait.body_mass!r} kg"']
     known = {"stature": "m", "walking_speed": "m/s", "recorded_speed": "m/s"}
     lines += [f'{key} = "{value!r} {unit}"' for key, unit in known.items() if (value := getattr(gait, key)) is not None]
@@ -226,7 +223,7 @@ def gait_toml(gait: Gait) -> str:
     lines.append(f"count = {gait.strides}")
     for name, curve in gait.curves.items():
         si_unit = CURVES[name]
-        lines += ["", f"[{name}]", f"unit = {_text(WRITTEN_UNITS.get(si_unit, si_unit))}"]
+        lines += ["", f"[{name}]", f"unit = {value_text(WRITTEN_UNITS.get(si_unit, si_unit))}"]
         lines.append(f"mean = {_number_text(curve.mean, si_unit)}")
         for key, values in (("cosine", curve.cosines), ("sine", curve.sines)):
             lines.append(f"{key} = [{', '.join(_number_text(value, si_unit) for value in values)}]")
@@ -238,9 +235,3 @@ def _number_text(value: float, si_unit: str) -> str:
     """Return a coefficient [SI] as text, in the unit used for its curve in a gait file."""
     unit = WRITTEN_UNITS.get(si_unit, si_unit)
     return repr(float(f"{from_si(value, plain_unit(unit), plain_unit(si_unit)):.{_DIGITS}g}"))
-
-
-def _text(text: str) -> str:
-    """Return a text as a TOML basic string; JSON uses the same escapes, except for DEL."""
-    # TOML forbids DEL in a string, which JSON allows.
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -72,7 +72,9 @@ class GaitCurve:
 
     def __post_init__(self) -> None:
         if len(self.cosines) != len(self.sines) or not self.cosines:
-            raise DataError(f"a series has as many cosines as sines, not {len(self.cosines)} and {len(self.sines)}")
+            raise DataError(
+                f"a Fourier series needs as many cosines as sines, it has {len(self.cosines)} and {len(self.sines)}"
+            )
 
     @property
     def harmonics(self) -> int:
@@ -150,8 +152,8 @@ class Gait:
     def __post_init__(self) -> None:
         if not (self.body_mass > 0.0 and self.stride_time > 0.0 and 0.0 < self.stance_share < 1.0):
             raise DataError(
-                f"gait '{self.name}': body mass {self.body_mass:g} kg and stride time {self.stride_time:g} s must be "
-                f"above 0, and the stance fraction {self.stance_share:g} between 0 and 1"
+                f"gait '{self.name}': body mass {self.body_mass:g} kg and stride time {self.stride_time:g} s must "
+                f"be above 0, and stance fraction {self.stance_share:g} must be between 0 and 1"
             )
 
     @property
@@ -164,7 +166,7 @@ class Gait:
         curves = self.curves
         if name not in curves:
             hint = nearest_name(name, curves)
-            raise DataError(f"gait '{self.name}' has no curve '{name}'{hint}; it has {', '.join(curves)}")
+            raise DataError(f"gait '{self.name}' has no curve '{name}'{hint}; available: {', '.join(curves)}")
         return curves[name]
 
 
@@ -207,7 +209,9 @@ def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[G
     Series and error are in the unit of ``values`` [SI]. Raises DataError if there are too few values.
     """
     if values.size < 2 * harmonics + 2:
-        raise DataError(f"{values.size} samples are too few for {harmonics} harmonics")
+        raise DataError(
+            f"{harmonics} harmonics need more than {values.size} samples; give fewer harmonics or more samples"
+        )
     # Both ends are the same phase: a series through both weighs it twice, as the recording has it.
     turns = 2.0 * np.pi * np.linspace(0.0, 1.0, values.size)
     orders = np.arange(1, harmonics + 1)
@@ -253,8 +257,8 @@ def at_speed(gait: Gait, speed: float) -> Gait:
     # A speed that was rounded to the printed limit is still within it.
     if not (math.isfinite(speed) and low * (1.0 - 1e-9) <= speed <= high * (1.0 + 1e-9)):
         raise DataError(
-            f"gait '{gait.name}' was recorded at {recorded:g} m/s and can be scaled from {low:.3g} to {high:.3g} m/s, "
-            f"not to {speed:g} m/s; import a gait that was recorded near that speed"
+            f"gait '{gait.name}' was recorded at {recorded:g} m/s and can be scaled to speeds of {low:.3g} to "
+            f"{high:.3g} m/s, not to {speed:g} m/s; import a gait recorded near that speed"
         )
     # A gait that was scaled before is scaled from where it is, and judged by where it was recorded.
     current = gait.walking_speed or recorded
@@ -273,7 +277,9 @@ def at_speed(gait: Gait, speed: float) -> Gait:
 def _recorded_speed(gait: Gait) -> float:
     speed = gait.recorded_speed or gait.walking_speed
     if speed is None:
-        raise DataError(f"gait '{gait.name}' has no walking speed, so it cannot be scaled; give one when importing it")
+        raise DataError(
+            f"gait '{gait.name}' has no walking speed, so it cannot be scaled; import it with a walking speed"
+        )
     return speed
 
 
@@ -289,7 +295,7 @@ def walk_recording(gait: Gait, strides: int) -> Recording:
     Raises DataError for an implausible number of strides.
     """
     if not 1 <= strides <= _MAXIMUM_STRIDES:
-        raise DataError(f"the number of strides must be from 1 to {_MAXIMUM_STRIDES}, not {strides}")
+        raise DataError(f"strides = {strides}: must be from 1 to {_MAXIMUM_STRIDES}")
     # A whole number of samples a stride: all strides are then equal to the last bit.
     per_stride = max(10, round(_RATE * gait.stride_time))
     phase = np.arange(strides * per_stride + 1) / per_stride

@@ -47,8 +47,8 @@ def check_stride_time(walk: MeanStride) -> None:
     low, high = STRIDE_TIME
     if not low <= walk.stride_time <= high:
         raise DataError(
-            f"{walk.file['shank_angle']}: a stride takes {walk.stride_time:.3g} s, plausible is {low:g} to {high:g} s; "
-            "is the time in seconds?"
+            f"{walk.file['shank_angle']}: the stride time is {walk.stride_time:.3g} s, plausible is {low:g} to "
+            f"{high:g} s; is the time in seconds?"
         )
 
 
@@ -97,14 +97,13 @@ def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
     low, high = FORCE_PEAK
     if -lowest > CLEARLY_BETTER * highest:
         raise DataError(
-            f"{file}: vertical_force is {lowest:.3g} body weights at its largest and points downwards: its sign is "
-            f"reversed; "
-            f"{other_sign(signs_from, 'vertical_force.positive')}"
+            f"{file}: vertical_force is {lowest:.3g} body weights at its largest and points downwards, so its "
+            f"sign is reversed; {other_sign(signs_from, 'vertical_force.positive')}"
         )
     if not low <= highest <= high:
         raise DataError(
-            f"{file}: vertical_force reaches {highest:.3g} body weights, plausible is {low:g} to {high:g}; "
-            "is the body mass right, and the unit (N, '-')?"
+            f"{file}: vertical_force reaches {highest:.3g} body weights, plausible is {low:g} to {high:g}; check "
+            "the body mass and the unit (N, '-')"
         )
 
 
@@ -116,14 +115,14 @@ def check_moment(walk: MeanStride) -> None:
     where = f"{walk.file['ankle_moment']}: ankle_moment"
     if float(np.mean(moment)) < 0.0 and float(-np.min(moment)) > CLEARLY_BETTER * float(np.max(moment)):
         raise DataError(
-            f"{where} is {np.min(moment):.3g} N m/kg at its largest, into dorsiflexion: its sign is reversed; "
+            f"{where} is {np.min(moment):.3g} N m/kg at its peak, towards dorsiflexion, so its sign is reversed; "
             f"{other_sign(walk.signs_from, 'ankle_moment.positive')}"
         )
     peak, (low, high) = float(np.max(moment)), MOMENT_PEAK
     if not low <= peak <= high:
         raise DataError(
-            f"{where} reaches {peak:.3g} N m/kg, plausible is {low:g} to {high:g} N m/kg; is the unit right "
-            "(N m, N m/kg, N mm/kg) and the body mass?"
+            f"{where} reaches {peak:.3g} N m/kg, plausible is {low:g} to {high:g} N m/kg; check the body mass and "
+            "the unit (N m, N m/kg, N mm/kg)"
         )
 
 
@@ -176,8 +175,8 @@ def check_force(walk: MeanStride) -> None:
     if not FORCE_PEAK[0] <= peak <= FORCE_PEAK[1] or not FORCE_MEAN[0] <= mean <= FORCE_MEAN[1]:
         raise DataError(
             f"{where} is {mean:.3g} body weights on average and {peak:.3g} at its peak, plausible is "
-            f"{FORCE_MEAN[0]:g} to {FORCE_MEAN[1]:g} and {FORCE_PEAK[0]:g} to {FORCE_PEAK[1]:g}; "
-            "is the body mass right, and the unit (N, '-')?"
+            f"{FORCE_MEAN[0]:g} to {FORCE_MEAN[1]:g} and {FORCE_PEAK[0]:g} to {FORCE_PEAK[1]:g}; check the body "
+            "mass and the unit (N, '-')"
         )
 
 

@@ -39,14 +39,14 @@ def check_shank(walk: MeanStride) -> None:
     growth = float(np.mean(phi[MIDSTANCE][-5:]) - np.mean(phi[MIDSTANCE][:5]))
     if growth > _TURNED_BACK * travel:
         raise DataError(
-            f"{where} grows by {growth:.2g} deg while the foot stands: the shank would rotate backwards over it; "
+            f"{where} grows by {growth:.2g} deg in stance, so the shank would rotate backwards over the foot; "
             f"{other_sign(walk.signs_from, 'shank_angle.positive')}{_other_foot(walk)}"
         )
     if float(phi[0]) < -10.0 or float(np.mean(phi)) > 10.0 or float(np.mean(phi)) < -50.0:
         raise DataError(
-            f"{where} is {phi[0]:.0f} deg at heel strike and {np.mean(phi):.0f} deg on average; plausible is above "
-            "-10 and -50 to 10 deg (0 is vertical, above 0 the ankle is in front); its zero or its columns are wrong"
-            f"{_other_foot(walk)}"
+            f"{where} is {phi[0]:.0f} deg at heel strike and {np.mean(phi):.0f} deg on average; plausible is "
+            "above -10 deg and -50 to 10 deg (0 is vertical, positive with the ankle in front of the knee); "
+            f"check its zero and its columns{_other_foot(walk)}"
         )
 
 
@@ -78,15 +78,16 @@ def check_ankle(walk: MeanStride) -> None:
     turned, reversed_turned = standing_turns(walk.curves["shank_angle"], walk.curves["ankle_angle"])
     if turned > CLEARLY_BETTER * reversed_turned and turned > _TURNS:
         raise DataError(
-            f"{where} goes into plantarflexion while the shank rotates forward over the standing foot, which would "
-            f"turn by {turned:.2g} deg (RMS), and by {reversed_turned:.2g} deg with the other sign: its sign is "
-            f"reversed; {other_sign(walk.signs_from, 'ankle_angle.positive', 'the other sign about 90 deg')}"
+            f"{where} turns into plantarflexion while the shank rotates forward: the standing foot would turn "
+            f"by {turned:.2g} deg (RMS), with the opposite sign by {reversed_turned:.2g} deg; its sign is reversed; "
+            f"{other_sign(walk.signs_from, 'ankle_angle.positive', 'the other sign about 90 deg')}"
         )
     foot = standing_tilt(walk.curves["shank_angle"], walk.curves["ankle_angle"])
     if abs(foot) > REFUSED_TILT or float(theta.min()) < ANKLE_LIMITS[0] or float(theta.max()) > ANKLE_LIMITS[1]:
         raise DataError(
-            f"{where} would tilt the standing foot by {foot:.0f} deg, plausible is within {REFUSED_TILT:g} deg "
-            f"(angles from {theta.min():.0f} to {theta.max():.0f} deg, neutral 90); {_NEUTRAL[walk.signs_from]}"
+            f"{where} would tilt the foot by {foot:.0f} deg in stance, plausible is up to {REFUSED_TILT:g} deg "
+            f"(angles from {theta.min():.0f} to {theta.max():.0f} deg, neutral 90 deg); "
+            f"{_NEUTRAL[walk.signs_from]}"
         )
 
 

@@ -158,7 +158,7 @@ def check_knee(walk: MeanStride) -> None:
     there = [name for name in KNEE if name in walk.curves]
     if len(there) == 1:
         (missing,) = set(KNEE) - set(there)
-        raise DataError(f"{walk.file[there[0]]}: {there[0]} is given without {missing}; give both, or neither")
+        raise DataError(f"{walk.file[there[0]]}: {there[0]} needs {missing}; give both, or neither")
     found = _mistaken_turning(walk)
     if found is not None and found[2] < _LEFT_BY_ONE:
         statement, remedy, _ = found
@@ -189,14 +189,14 @@ def _check_knee_curve(walk: MeanStride, name: str) -> None:
     if not low <= travel <= high:
         raise DataError(
             f"{where} covers a range of {travel:.3g} m/s^2 in a stride, plausible is {low:g} to {high:g} m/s^2; "
-            "is the unit right (m/s^2, or m for a position)?"
+            "check the unit (m/s^2, or m for a position)"
         )
     # Gait phase of the swing, below 0 before toe-off.
     swung = (np.linspace(0.0, 1.0, values.size) - walk.stance_share) / (1.0 - walk.stance_share)
     driven, held = (float(np.mean(values[(swung >= start) & (swung <= end)])) for start, end in _PARTS[name])
     if held - driven > _HELD_BACK * travel:
         raise DataError(
-            f"{where} is {driven:.3g} m/s^2 about toe-off and {held:.3g} m/s^2 in the middle of the swing, and it "
-            "is the other way round in walking: its sign is reversed, or it is of the other knee; "
+            f"{where} is {driven:.3g} m/s^2 about toe-off and {held:.3g} m/s^2 in mid-swing; in walking both "
+            "signs are opposite: its sign is reversed, or it is of the other knee; "
             f"{other_sign(walk.signs_from, f'the sign of knee.{name[5:]}')}"
         )

@@ -98,7 +98,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         if self.render_mode is None:
             return None
         if not self._frames:
-            raise SimulationError("there is no episode yet: call reset")
+            raise SimulationError("there is no episode; call reset() first")
         return picture(self._frames, self.world.task.unit, self._period, self.world.episodes.base.device)
 
     def _remember(self, error: float) -> None:
@@ -111,7 +111,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         Raises SimulationError before the first ``reset``.
         """
         if self._drawn is None:
-            raise SimulationError("there is no episode yet: call reset")
+            raise SimulationError("there is no episode; call reset() first")
         return self.world.episodes.shown(self._drawn)
 
     def numbers(self) -> dict[str, float]:
@@ -165,10 +165,13 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         """
         mask = (options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_))
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            raise ScenarioError(f"reset_mask must be {self.num_envs} truth values in an array")
+            raise ScenarioError(f"reset_mask: must be an array of {self.num_envs} booleans")
         seeds = [seed + number for number in range(self.num_envs)] if isinstance(seed, int) else seed
         if seeds is not None and len(seeds) != self.num_envs:
-            raise ScenarioError(f"{len(seeds)} seeds for {self.num_envs} environments; give one for each, or a number")
+            raise ScenarioError(
+                f"seed: {len(seeds)} seeds for {self.num_envs} environments; give one seed for "
+                "each environment, or a single number"
+            )
         places = np.flatnonzero(mask)
         for number in places.tolist():
             seed_of_environment = None if seeds is None else seeds[number]
@@ -189,7 +192,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         """
         before = self._ended
         if self.autoreset_mode is AutoresetMode.DISABLED and before.any():
-            raise SimulationError(f"environment {int(np.flatnonzero(before)[0])} has ended: reset it by its mask")
+            raise SimulationError(f"environment {int(np.flatnonzero(before)[0])} has ended; reset it with reset_mask")
         result = self.world.act(self._lanes, actions)
         self._ended = result.terminated | result.truncated
         infos: dict[str, Any] = {}

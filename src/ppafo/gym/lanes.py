@@ -36,14 +36,14 @@ class FromOutside:
     def update(self, time: float, reference: float, measurement: Measurement) -> float:  # noqa: ARG002 - a protocol
         """Raise an error, because an agent acts through its environment."""
         raise ScenarioError(
-            "in an environment the agent gives the commands; to simulate this scenario, give it a controller"
+            "this scenario has no controller, because the agent of an environment gives the commands; set a controller"
         )
 
 
 def episode_program(batch: Batch) -> tuple[Program, Clock]:
     """Return program and clock of a run with external commands; ScenarioError for samples within a step."""
     if batch.program.samples_inside:
-        raise ScenarioError("run.output_interval: must be a whole number of steps in an environment")
+        raise ScenarioError("run.output_interval: must be a whole number of run.step in an environment")
     return replace(batch.program, controller=None, starts_apart=True), batch.clock
 
 

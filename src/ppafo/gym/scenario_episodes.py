@@ -77,7 +77,8 @@ class ScenarioEpisodes:
             if not undrawn.size:
                 return columns, values
         raise ScenarioError(
-            f"{self.base.name}: {MOST_DRAWS} random episodes in a row are invalid: {reason}; narrow the ranges in vary"
+            f"{self.base.name}: {MOST_DRAWS} random episodes in succession are invalid: {reason}; narrow the "
+            "ranges in vary"
         )
 
     def shown(self, drawn: Floats) -> Scenario:
@@ -126,7 +127,7 @@ def scenario_episodes(base: Scenario, randomise: bool, vary: Ranges, targets: tu
                     f"vary: {path} = {ends!r}: {error}; give the lowest and the highest value"
                 ) from error
             if least > most:
-                raise ScenarioError(f"vary: {path} = {ends!r}: give the lowest value before the highest")
+                raise ScenarioError(f"vary: {path} = {ends!r}: the first value must be below the second")
             ranges[path] = (least, most)
             gauge |= {path} if varied.is_gauge else set()
         # Each episode has noise of its own, unless the caller says how the seed varies.

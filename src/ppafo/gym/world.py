@@ -65,14 +65,12 @@ def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> _
     """
     for name in ("task_sequence", "bottle"):
         if getattr(walk_of(configuration), name) is not None:
-            raise ScenarioError(
-                f"{configuration.origin.file}: {name}: an environment does not support it; leave it out"
-            )
+            raise ScenarioError(f"{configuration.origin.file}: {name}: is not supported in an environment; omit it")
     settings = configuration.controller.settings
     if not set(TorqueProfile._fields) <= set(settings):
         kind = configuration.controller.kind
         raise ScenarioError(
-            f"{configuration.origin.file}: controller.kind = '{kind}' has no torque profile; event_pid has one, for a "
+            f"{configuration.origin.file}: controller.kind = '{kind}' has no torque profile; use event_pid with a "
             "proportional valve"
         )
     goal = Goal(angle=0.0, profile=TorqueProfile(**{name: settings[name] for name in TorqueProfile._fields}))
@@ -154,9 +152,9 @@ class EnvironmentSettings:
                 hint = nearest_name(word, allowed)
                 raise ScenarioError(f"{name} = {word!r}: must be '{allowed[0]}' or '{allowed[1]}'{hint}")
         if self.vary and not self.randomise:
-            raise ScenarioError("vary: with randomise = False nothing is drawn; omit one of them")
+            raise ScenarioError("vary: has no effect with randomise = False; omit one of them")
         if not (isinstance(self.frame_skip, int) and self.frame_skip >= 1):
-            raise ScenarioError(f"frame_skip = {self.frame_skip!r}: must be a whole number of samples, at least 1")
+            raise ScenarioError(f"frame_skip = {self.frame_skip!r}: must be a whole number of at least 1")
 
 
 def settings_of(arguments: Mapping[str, Any]) -> EnvironmentSettings:
@@ -165,7 +163,7 @@ def settings_of(arguments: Mapping[str, Any]) -> EnvironmentSettings:
     for name in arguments:
         if name not in names:
             hint = nearest_name(name, names)
-            raise ScenarioError(f"an environment has no argument '{name}'{hint}; it has {', '.join(names)}")
+            raise ScenarioError(f"an environment has no argument '{name}'{hint}; available: {', '.join(names)}")
     return EnvironmentSettings(**arguments)
 
 
@@ -176,7 +174,9 @@ def episodes_of(
     duration = settings.duration
     if task == "walk":
         if varied:
-            raise ScenarioError(f"vary: {', '.join(varied)}: a walk varies its wearer and gait only; omit vary")
+            raise ScenarioError(
+                f"vary: {', '.join(varied)}: cannot be varied, because a walk varies only wearer and gait; omit vary"
+            )
         walk = load_walk(file, overrides)
         seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).run.duration
         return walk_episodes(walk, settings.randomise, seconds)
@@ -184,8 +184,8 @@ def episodes_of(
     scenario = load_scenario(file, over(overrides, length, ScenarioError))
     if task == "torque" and scenario.controlled != TORQUE:
         raise ScenarioError(
-            f"{scenario.name}: reference.of = '{scenario.controlled}': the task 'torque' follows a torque; take "
-            "another scenario, or the task 'angle'"
+            f"{scenario.name}: reference.of = '{scenario.controlled}', but the task 'torque' needs a torque "
+            "reference; choose another scenario, or the task 'angle'"
         )
     return scenario_episodes(scenario, settings.randomise, varied, settings.targets)
 
@@ -256,9 +256,7 @@ class World:
             numbers_of_actions[:, 0] = np.subtract(actions, 1)
         bad = np.flatnonzero(~np.isfinite(numbers_of_actions).all(axis=1))
         if bad.size:
-            raise SimulationError(
-                f"the action of environment {bad[0]} is {numbers_of_actions[bad[0]]}; it must be finite"
-            )
+            raise SimulationError(f"action of environment {bad[0]} is {numbers_of_actions[bad[0]]}: must be finite")
         result = lanes.step()
         for _ in range(self.settings.frame_skip - 1):
             result = result.then(lanes.step())

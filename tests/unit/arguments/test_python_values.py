@@ -103,7 +103,7 @@ def test_a_document_that_holds_itself_comes_to_an_end() -> None:
 def test_none_is_no_value_of_a_document() -> None:
     content = document()
     content["controller"]["proportional_gain"] = None
-    with pytest.raises(ArgumentError, match=r"controller\.proportional_gain = None: is not a value; omit the key"):
+    with pytest.raises(ArgumentError, match=r"controller\.proportional_gain = None: has no value; omit the key"):
         ppafo.scenario_from_dict(content)
 
 

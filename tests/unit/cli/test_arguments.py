@@ -122,7 +122,7 @@ def test_output_that_cannot_be_written_is_one_line_and_exit_code_2(words: list[s
     command = [sys.executable, "-c", "import sys; from ppafo.cli.main import main; sys.exit(main())", *words]
     with FULL.open("w") as full:
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
-    assert done.stderr == "ppafo: standard output cannot be written: no space left on device\n"
+    assert done.stderr == "ppafo: cannot write to standard output: no space left on device\n"
     assert done.returncode == 2
 
 
@@ -150,7 +150,7 @@ def test_name_that_is_not_utf_8_is_refused_before_anything_runs(
     monkeypatch.chdir(tmp_path)
     assert main(words) == 2
     said = capsys.readouterr().err
-    assert "is not text in UTF-8; give the file or folder another name" in said
+    assert "is not valid UTF-8; rename the file or folder" in said
     assert said.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
 

@@ -46,7 +46,7 @@ def test_json_is_in_si_and_says_simulated(capsys: pytest.CaptureFixture[str]) ->
 
 def test_a_mass_without_a_unit_is_refused_with_examples_of_one(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bottle", "--gas-per-stride", "0.3"]) == 2
-    assert capsys.readouterr().err == "ppafo: --gas-per-stride 0.3: a mass needs its unit: '0.3 g' or '0.3 kg'\n"
+    assert capsys.readouterr().err == "ppafo: --gas-per-stride 0.3: a mass needs a unit: '0.3 g' or '0.3 kg'\n"
 
 
 def test_the_result_names_its_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -110,4 +110,4 @@ def test_the_largest_flow_is_said_and_written_in_the_unit_in_which_it_was_given(
     assert main(["bottle", "--gas-per-stride", "0.5 g", *flow, "--longest", "1 min", "--out", str(tmp_path / "b")]) == 0
     assert "23 L/min (ANR, air), largest 40 L/min (ANR, air)" in capsys.readouterr().out
     assert main(["bottle", "--gas-per-stride", "0.5 g", "--peak-flow", "10 L/min (ANR, air)"]) == 2
-    assert "the largest flow, 10 L/min (ANR, air), must be at least" in capsys.readouterr().err
+    assert "the largest flow is 10 L/min (ANR, air); it must be at least" in capsys.readouterr().err

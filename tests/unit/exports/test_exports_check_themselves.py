@@ -36,7 +36,9 @@ def test_a_unit_with_other_numbers_than_python_is_not_written(
         return "\n".join([head, *rows[:-1], ",".join(last)]).encode()
 
     monkeypatch.setattr(trial, "expected_csv", of_another_device)
-    with pytest.raises(ProgramError, match=r"at 0\.\d+ s: pressure_1 is \d+\.\d+, Python has 7\.0; nothing is written"):
+    with pytest.raises(
+        ProgramError, match=r"at 0\.\d+ s: pressure_1 is \d+\.\d+, Python has 7\.0; no file was written"
+    ):
         functional_unit(interface(scenario), fmi, ["linux64"])
 
 

@@ -75,7 +75,7 @@ def test_a_recording_is_written_with_what_it_has(tmp_path: Path, capsys: pytest.
     [
         (["RECORDING", "--minutes", "1"], "--minutes: is for a walk, not a recording"),
         (["RECORDING", "--set", "wearer.keeps_gait=1"], "--set: is for a walk, not a recording"),
-        (["RECORDING", "--body-mass", "62"], "--body-mass 62: a mass needs its unit: '62 g' or '62 kg'"),
+        (["RECORDING", "--body-mass", "62"], "--body-mass 62: a mass needs a unit: '62 g' or '62 kg'"),
     ],
 )
 def test_options_of_the_other_source_are_refused(

@@ -55,6 +55,6 @@ def test_a_library_prepares_a_run_with_the_numbers_that_python_plans(name: str, 
 def test_a_number_that_no_function_prepares_is_named_with_its_group(monkeypatch: pytest.MonkeyPatch) -> None:
     unstarted = tuple(function for function in VANE_PREPARATION if function is not start)
     monkeypatch.setattr(c_library, "VANE_PREPARATION", unstarted)
-    said = r"preparation\.py:\d+: no function of preparation gives 'result', a LaneResult of the program"
+    said = r"preparation\.py:\d+: no preparation function sets 'result' \(LaneResult\) of the program"
     with pytest.raises(ProgramError, match=said):
         library_files(library_of(load_scenario("torque-task-proportional")))

@@ -114,7 +114,9 @@ def test_the_ankle_of_the_other_foot_is_refused_as_such_and_not_as_a_wrong_zero(
     columns: dict[str, Floats], remarks_of: Callable[..., tuple[str, ...]]
 ) -> None:
     other = later(columns, (ANKLE,), HALF_A_STRIDE / PER_SECOND)
-    with pytest.raises(DataError, match=r"ankle_angle is 50 % of the stride from where this shank has it: it belongs"):
+    with pytest.raises(
+        DataError, match=r"ankle_angle is shifted by 50 % of the stride against shank_angle, so it belongs"
+    ):
         remarks_of(other)
 
 

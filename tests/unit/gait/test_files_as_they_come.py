@@ -79,7 +79,7 @@ def test_one_contact_in_a_long_record_of_a_plate_is_a_force() -> None:
     check_force_scale("plate", weights, "columns")
     with pytest.raises(DataError, match="its sign is reversed"):
         check_force_scale("plate", -weights, "columns")
-    with pytest.raises(DataError, match="is the body mass right"):
+    with pytest.raises(DataError, match="check the body mass"):
         check_force_scale("plate", 10.0 * weights, "columns")
 
 
@@ -195,9 +195,9 @@ def test_the_foot_says_which_way_a_part_of_a_stride_on_a_treadmill_goes(tmp_path
 
 def test_gaps_are_filled_up_to_the_length_that_is_stated_and_named(tmp_path: Path) -> None:
     path = walked(tmp_path, (120, 126))
-    with pytest.raises(DataError, match=r"has 1 whole stride without a lost .*fill the gaps .longest_gap=0.07"):
+    with pytest.raises(DataError, match=r"has 1 whole stride without missing .*fill the gaps .longest_gap=0.07"):
         import_gait([path], PERSON)
-    with pytest.raises(DataError, match="has 1 whole stride without a lost sample"):
+    with pytest.raises(DataError, match="has 1 whole stride without missing samples"):
         import_gait([path], ImportSettings(MASS, longest_gap=0.05))
     beside = import_gait([path], ImportSettings(MASS, least_strides=1))
     assert len(beside.strides) == 1
@@ -243,7 +243,9 @@ def test_start_and_end_leave_out_the_rest(tmp_path: Path) -> None:
     part = import_gait([path], ImportSettings(MASS, start=1.2, end=4.5))
     assert (len(whole.strides), len(part.strides)) == (3, 2)
     assert all(item.start >= 1.2 and item.end <= 4.5 for item in part.strides)
-    with pytest.raises(DataError, match=r"has no samples from 7 to 5.19 s; the recording covers 0 to 5.19 s: choose"):
+    with pytest.raises(
+        DataError, match=r"has no samples from 7 to 5.19 s; choose .* within the recording, 0 to 5.19 s"
+    ):
         import_gait([path], ImportSettings(MASS, start=7.0))
     with pytest.raises(DataError, match=r"the start, 3 s, must be before the end, 2 s"):
         import_gait([path], ImportSettings(MASS, start=3.0, end=2.0))
@@ -342,7 +344,7 @@ def test_a_plain_table_with_opensims_names_is_read(
     ("text", "message"),
     [
         ("frame,shank\n1,2\n", "the first column must be 'time', it is 'frame'"),
-        ("percent [%],a [deg]\n0,1\n", "it is 'percent'; write a mean stride over 0 to 100 % against time"),
+        ("percent [%],a [deg]\n0,1\n", "it is 'percent'; give at least two strides over time"),
         ("time,a,\n0,1,2\n", "a column has no name"),
         ("time,a\n0,1,2\n", "line 2 has 3 values for 2 columns"),
         ("time,a\n0,one\n", "line 2"),

@@ -187,8 +187,8 @@ def test_a_knee_that_is_carried_backwards_is_refused(
     path = csv_of(rest | {"knee_forward [m]": forward - 2.6 * walk.time, "knee_up [m]": up})
     with pytest.raises(
         DataError,
-        match=r"goes back by 1.3 m/s: knee.forward points against the direction "
-        "of walking; correct it in the file",
+        match=r"moves backwards at 1.3 m/s, so knee.forward points against the "
+        "walking direction; correct it in the file",
     ):
         import_gait([path], ImportSettings(62.0))
 
@@ -196,10 +196,13 @@ def test_a_knee_that_is_carried_backwards_is_refused(
 @pytest.mark.parametrize(
     ("knee", "message"),
     [
-        ({"thigh": ("thigh",)}, "knee.thigh needs a length: give knee.thigh_length in the gait map, or the stature"),
+        (
+            {"thigh": ("thigh",)},
+            "knee.thigh needs the thigh length: give knee.thigh_length in the gait map, or the stature",
+        ),
         ({"thigh": ("thigh",), "thigh_length": "40"}, "knee.thigh_length = '40': a number without a unit"),
-        ({"thigh": ("thigh",), "thigh_length": "40 mm"}, "knee.thigh_length = '40 mm' is not plausible"),
-        ({"thigh": ("thigh",), "thigh_length": "0.4 m", "unit": "m/s^2"}, "is added to positions of the hip in m"),
+        ({"thigh": ("thigh",), "thigh_length": "40 mm"}, "knee.thigh_length = '40 mm': must be from 0.2 to 0.7 m"),
+        ({"thigh": ("thigh",), "thigh_length": "0.4 m", "unit": "m/s^2"}, "knee.thigh needs hip positions in m"),
         ({"unit": "N"}, "column 'knee_forward' [N]: unit 'N' does not fit"),
     ],
 )

@@ -159,8 +159,8 @@ def test_rows_of_a_motive_export_are_known_by_their_order_where_they_have_no_wor
 @pytest.mark.parametrize(
     ("write", "old", "new", "said"),
     [
-        (motive, "Marker,", "Bone,", "has no columns of markers; export the take with Markers, and their Position"),
-        (bts, "Point 3D tracks", "Emg tracks", "has 'Emg tracks' in the place of markers; export 'Point 3D tracks'"),
+        (motive, "Marker,", "Bone,", "has no marker positions; export the take with Markers and Position"),
+        (bts, "Point 3D tracks", "Emg tracks", "contains 'Emg tracks' instead of markers; export 'Point 3D tracks'"),
     ],
 )
 def test_an_export_without_markers_says_what_to_export(
@@ -200,7 +200,9 @@ def standing(path: Path, sway: float) -> Path:
 @pytest.mark.parametrize("sway", [0.0, 2.0])
 def test_of_a_standing_trial_it_is_said_alone_that_nobody_walks(sway: float, tmp_path: Path) -> None:
     path = standing(tmp_path / "standing.trc", sway)
-    with pytest.raises(DataError, match="deg in the whole record, a walk 25 or more: this is not walking;") as refused:
+    with pytest.raises(
+        DataError, match="deg in the whole recording, walking at least 25 deg: the recording shows no walking;"
+    ) as refused:
         import_gait([path], ImportSettings())
     assert not refused.value.parts
     assert "sign" not in str(refused.value)
@@ -209,8 +211,8 @@ def test_of_a_standing_trial_it_is_said_alone_that_nobody_walks(sway: float, tmp
 @pytest.mark.parametrize(
     ("forward", "vertical", "said"),
     [
-        ("y", "z", "along x: shank_angle.forward is 'y'; give 'x' or '-x', where the walk goes, in a gait map"),
-        ("x", "y", "is longest along z, and shank_angle.vertical is 'y': give 'z' in a gait map, for the ankle too"),
+        ("y", "z", "along x, and shank_angle.forward is 'y'; give 'x' or '-x', the walking direction, in a gait map"),
+        ("x", "y", "is longest along 'z'; give 'z' in a gait map, also for the ankle"),
     ],
 )
 def test_a_wrong_axis_of_a_map_is_named_before_any_sign(forward: str, vertical: str, said: str, tmp_path: Path) -> None:

@@ -109,7 +109,7 @@ def test_replayed_commands_have_the_bits_of_simulate(name: str, settings: dict[s
 
 
 def test_numbers_to_vary_are_refused_where_nothing_is_drawn() -> None:
-    with pytest.raises(ppafo.ScenarioError, match="vary: with randomise = False nothing is drawn"):
+    with pytest.raises(ppafo.ScenarioError, match="vary: has no effect with randomise = False"):
         one(TORQUE, randomise=False, vary={"valve.area": ("10 mm^2", "12 mm^2")})
 
 
@@ -275,13 +275,13 @@ def test_what_is_no_number_is_cut_off_at_the_lowest() -> None:
     [
         (TORQUE, {"actions": "onoff"}, "'continuous' or 'on_off', did you mean 'on_off'?"),
         (TORQUE, {"vary": {"valve.aera": ("1 mm^2", "2 mm^2")}}, "did you mean 'valve.area'?"),
-        (TORQUE, {"vary": {"valve.area": ("2 mm^2", "1 mm^2")}}, "the lowest value before the highest"),
+        (TORQUE, {"vary": {"valve.area": ("2 mm^2", "1 mm^2")}}, "the first value must be below the second"),
         (TORQUE, {"vary": {"valve.area": (1.0, 2.0)}}, "without a unit"),
-        (TORQUE, {"overrides": ["run.output_interval=1.5 ms"]}, "a whole number of steps"),
-        (WALK, {"vary": {"valve.area": ("1 mm^2", "2 mm^2")}}, "varies its wearer and gait only"),
+        (TORQUE, {"overrides": ["run.output_interval=1.5 ms"]}, "must be a whole number of run.step"),
+        (WALK, {"vary": {"valve.area": ("1 mm^2", "2 mm^2")}}, "a walk varies only wearer and gait"),
         (WALK, {"scenario": "off"}, "has no torque profile"),
         (TORQUE, {"observations": "scale"}, "'physical' or 'scaled', did you mean 'scaled'?"),
-        (TORQUE, {"frame_skip": 0}, "frame_skip = 0: must be a whole number of samples, at least 1"),
+        (TORQUE, {"frame_skip": 0}, "frame_skip = 0: must be a whole number of at least 1"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(name: str, settings: dict[str, Any], line: str) -> None:
@@ -343,7 +343,7 @@ def test_seeds_and_masks_of_another_length_are_refused() -> None:
     many = vector(TORQUE, AutoresetMode.DISABLED, 2, duration=0.02)
     with pytest.raises(ScenarioError, match="3 seeds for 2"):
         many.reset(seed=[1, 2, 3])
-    with pytest.raises(ScenarioError, match="reset_mask must be 2"):
+    with pytest.raises(ScenarioError, match="reset_mask: must be an array of 2"):
         many.reset(options={"reset_mask": [True, False]})
 
 

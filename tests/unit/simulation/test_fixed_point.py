@@ -96,5 +96,5 @@ def test_the_converter_shows_more_than_the_supply_of_any_device() -> None:
 
 
 def test_whole_numbers_have_no_exported_library() -> None:
-    with pytest.raises(ProgramError, match="no library yet; 'ppafo export firmware' writes it"):
+    with pytest.raises(ProgramError, match="cannot be exported as a C library; use 'ppafo export firmware'"):
         c_library(load_scenario("torque-task-solenoid", ("controller.kind=on_off_fixed_point",)))

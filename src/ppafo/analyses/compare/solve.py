@@ -97,12 +97,12 @@ def compared(
     names = [configuration.name for configuration in configurations]
     if baseline is not None and baseline not in names:
         hint = nearest_name(baseline, names)
-        raise StudyError(f"baseline: no configuration '{baseline}'{hint}; available: {', '.join(names)}")
+        raise StudyError(f"baseline: there is no configuration '{baseline}'{hint}; available: {', '.join(names)}")
     baseline = baseline or names[0]
     named_tasks = list(tasks) or [(AS_WRITTEN, ())]
     repeated = first_twice([name for name, _ in named_tasks])
     if repeated is not None:
-        raise StudyError(f"there are two tasks named '{repeated}'; give each its own name")
+        raise StudyError(f"two tasks are named '{repeated}'; give each its own name")
     scenarios = {
         (task, configuration.name): with_overrides(configuration.scenario, overrides)
         for task, overrides in named_tasks
@@ -117,8 +117,8 @@ def compared(
     uncertainty = distributions.with_noise_of(scenarios.values())
     if not uncertainty.drawn and draws.requested is not None:
         raise StudyError(
-            f"draws = {draws.requested}: nothing in this comparison is random; give a study or sensors with "
-            f"noise, or omit draws"
+            f"draws = {draws.requested}: nothing in this comparison is random; omit draws, or give a study or "
+            "sensors with noise"
         )
     seed = draws.seed
     if seed is None:
@@ -182,9 +182,9 @@ def _check_different_values(study: Study, scenarios: Scenarios) -> None:
         if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
             varied = varied_path(path, next(iter(scenarios.values())))
             raise StudyError(
-                f"the study draws '{path}' for every configuration, so the different values of the configurations "
-                f"({varied.quote(lowest)} and {varied.quote(highest)}) would be ignored; use a study that does not "
-                "draw it"
+                f"the study draws '{path}' for every configuration, so the values {varied.quote(lowest)} and "
+                f"{varied.quote(highest)} of the configurations would be ignored; use a study that does not draw "
+                f"'{path}'"
             )
 
 

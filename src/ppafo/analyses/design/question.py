@@ -88,9 +88,11 @@ def design(
         # Stature, toes and catalogue may be left out, so they are not among them.
         missing = [f"--{name}" for name, value in wished.items() if value is None]
         if len(missing) == len(wished) and stature is None:
-            raise StudyError(f"no design was given: name one, give a .toml file, or for a wearer {FOR_A_WEARER}")
+            raise StudyError(
+                f"no design was given; name a design, give a .toml file, or describe the wearer: {FOR_A_WEARER}"
+            )
         if mass is None or torque is None or pressure is None or minutes is None:
-            raise StudyError(f"for a wearer give {', '.join(missing)} too, for example {FOR_A_WEARER}")
+            raise StudyError(f"a design for a wearer also needs {', '.join(missing)}, for example {FOR_A_WEARER}")
         seconds = 60.0 * minutes
         requirements = DesignRequirements(mass, stature, float(torque), float(pressure), seconds, toes, gait=gait)
         with shown_in(units_given({"Pa_a": pressure, "N m": torque})):
@@ -100,7 +102,9 @@ def design(
     of_a_wearer |= {"bottle": bottle, "gait": gait}
     named = [f"--{name}" for name, value in of_a_wearer.items() if value is not None]
     if named:
-        raise StudyError(f"{', '.join(named)}: the design file states what is wanted; give one or the other")
+        raise StudyError(
+            f"{', '.join(named)} cannot be combined with a design file, which states the requirements; omit one of them"
+        )
     chosen = load_design(problem) if isinstance(problem, str | Path) else problem
     warn_of_coarse_pairs([chosen.scenario])
     return profile.finding_of(size_for_profile(chosen, threads, report))

@@ -167,13 +167,13 @@ def check_schedule(schedule: Schedule) -> None:
     """Raise ParameterError for a schedule of walking and rest that cannot be simulated."""
     for name, value, least in (("walk", schedule.walk, 1.0), ("longest", schedule.longest, 1.0)):
         if not least <= value < float("inf"):
-            raise ParameterError(f"{name} must be at least {least:g} s and finite, it is {value:g} s")
+            raise ParameterError(f"{name} = {value:g} s: must be finite and at least {least:g} s")
     if not 0.0 <= schedule.rest < float("inf"):
-        raise ParameterError(f"rest must be at least 0 s and finite, it is {schedule.rest:g} s")
+        raise ParameterError(f"rest = {schedule.rest:g} s: must be finite and at least 0 s")
     if schedule.rest > 0.0 and 2.0 * schedule.longest / (schedule.walk + schedule.rest) > MAXIMUM_INTERVALS:
         raise ParameterError(
-            f"walking {schedule.walk:g} s and resting {schedule.rest:g} s over {schedule.longest:g} s are more "
-            f"than {MAXIMUM_INTERVALS} periods: lengthen walking or resting, or shorten the longest time"
+            f"walking {schedule.walk:g} s and resting {schedule.rest:g} s give more than {MAXIMUM_INTERVALS} "
+            f"periods in {schedule.longest:g} s; increase walk or rest, or reduce longest"
         )
 
 
@@ -188,8 +188,8 @@ def discharge(bottle: Bottle, draw: GasDemand, schedule: Schedule) -> Discharge:
     if min(reserves(bottle, draw, content.pressure, content.temperature)) <= 0.0:
         most = flow_limit(bottle, content.pressure, content.temperature) * GRAMS_PER_KILOGRAM
         raise ParameterError(
-            f"even the full bottle cannot maintain the supply pressure at the largest flow, "
-            f"{draw.peak_flow * GRAMS_PER_KILOGRAM:.3g} g/s: its regulator passes {most:.3g} g/s (regulator.area)"
+            f"the largest flow is {draw.peak_flow * GRAMS_PER_KILOGRAM:.3g} g/s, but the regulator of the full "
+            f"bottle passes at most {most:.3g} g/s; increase regulator.area"
         )
     energy = content_energy(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
     start = np.array([bottle.mass, energy, bottle.room_temperature, 0.0, 0.0, 0.0])
@@ -318,7 +318,7 @@ def _solve_interval(
         atol=_ABSOLUTE,
     )
     if solution.status < 0:
-        raise SimulationError(f"the bottle could not be simulated beyond {solution.t[-1]:.4g} s: {solution.message}")
+        raise SimulationError(f"the simulation of the bottle failed at {solution.t[-1]:.4g} s: {solution.message}")
     stopped: Stop = "frozen" if len(solution.t_events[0]) else "supply"
     last = np.asarray(solution.y[:, -1])
     return _Interval(start, float(solution.t[-1]), flow, solution.sol, last, stopped if solution.status == 1 else None)

@@ -39,11 +39,11 @@ def demand_of_numbers(mass_per_stride: float, stride_time: float, peak_flow: flo
     """Return the gas demand for given numbers [kg], [s], [kg/s]; the default of the largest flow is the mean flow."""
     for name, value, unit in (("gas per stride", mass_per_stride, "kg"), ("stride time", stride_time, "s")):
         if not (math.isfinite(value) and value > 0.0):
-            raise ParameterError(f"{name} must be above 0, it is {value:g} {unit}")
+            raise ParameterError(f"{name} = {value:g} {unit}: must be above 0")
     mean = mass_per_stride / stride_time
     if peak_flow is not None and not (math.isfinite(peak_flow) and peak_flow >= mean):
         raise ParameterError(
-            f"the largest flow, {shown_text(peak_flow, 'kg/s', '.4g')}, must be at least the mean flow, "
+            f"the largest flow is {shown_text(peak_flow, 'kg/s', '.4g')}; it must be at least the mean flow, "
             f"{shown_text(mean, 'kg/s', '.4g')}"
         )
     return GasDemand(mass_per_stride, stride_time, mean if peak_flow is None else peak_flow, "numbers given")
@@ -52,23 +52,27 @@ def demand_of_numbers(mass_per_stride: float, stride_time: float, peak_flow: flo
 def demand_of_recording(recording: Recording, stride_time: float | None) -> GasDemand:
     """Return the gas demand of an endlessly repeated recording with ``supplied_mass``; it is one stride by default."""
     if "supplied_mass" not in recording:
-        raise DataError(f"{recording.label}: has no channel 'supplied_mass'; available: {', '.join(recording.names)}")
+        raise DataError(
+            f"{recording.label}: there is no channel 'supplied_mass'; available: {', '.join(recording.names)}"
+        )
     supplied = _gas_use(recording)
     # Not the last value alone: a recording may begin in the middle of a walk.
     gain = float(supplied[-1] - supplied[0])
     if recording.duration <= 0.0 or gain <= 0.0:
-        raise DataError(f"{recording.label}: no gas was taken from the supply, so a bottle would never be empty")
+        raise DataError(
+            f"{recording.label}: the run takes no gas from the supply, so no bottle would become "
+            "empty; give a recording that uses gas"
+        )
     returned = -float(np.minimum(np.diff(supplied), 0.0).sum())
     if returned > _MOST_RETURNED * gain:
         raise DataError(
-            f"{recording.label}: supplied_mass falls by {returned * GRAMS_PER_KILOGRAM:.3g} g in total while it "
-            f"gains {gain * GRAMS_PER_KILOGRAM:.3g} g; it must be cumulative from the start of the recording to "
-            "its end"
+            f"{recording.label}: supplied_mass falls by {returned * GRAMS_PER_KILOGRAM:.3g} g in total and rises "
+            f"by {gain * GRAMS_PER_KILOGRAM:.3g} g; it must be the cumulative gas from start to end"
         )
     stride = recording.duration if stride_time is None else stride_time
     if not 0.0 < stride <= recording.duration:
         raise DataError(
-            f"{recording.label}: a stride of {stride:g} s does not fit into a recording of {recording.duration:g} s"
+            f"{recording.label}: stride = {stride:g} s must not be longer than the recording, {recording.duration:g} s"
         )
     mean = gain / recording.duration
     peak = max(mean, largest_flow(recording))

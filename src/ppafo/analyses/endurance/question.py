@@ -86,8 +86,8 @@ def bottle(
         raise ParameterError(f"give either a recording or {argument_text('gas_per_stride')}, for example {example}")
     if walk is not None and rest is None:
         raise ParameterError(
-            f"{argument_text('walk')} is the walking time between two rests: give {argument_text('rest')} too, or "
-            f"{argument_text('longest')} for the total time"
+            f"{argument_text('walk')} is the walking time between two rests; also give {argument_text('rest')}, "
+            f"or use {argument_text('longest')} for the total time"
         )
     schedule = Schedule(BETWEEN_RESTS if walk is None else walk, rest or 0.0, longest)
     changes = tuple(overrides)
@@ -99,8 +99,8 @@ def bottle(
         return finding_of(replace(follow_bottle(full, draw, schedule), device_units=units))
     if peak_flow is not None:
         raise ParameterError(
-            f"{argument_text('peak_flow')} belongs to {argument_text('gas_per_stride')}; a recording has its own "
-            "largest flow"
+            f"{argument_text('peak_flow')} needs {argument_text('gas_per_stride')}; omit it for a recording, "
+            "which contains its largest flow"
         )
     endurances = {
         name: endurance_of_gas_use(name, use, stride_time, bottle, schedule, changes)

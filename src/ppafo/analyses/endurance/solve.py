@@ -73,7 +73,7 @@ def endurance_of_gas_use(
         if stride_time is not None:
             stride = f"its whole task sequence '{gas.task_sequence}'" if gas.task_sequence else "one stride of its walk"
             argument = argument_text("stride_time")
-            raise ParameterError(f"{argument}: a stride of {name} is {stride}; omit {argument}")
+            raise ParameterError(f"{argument} applies to recordings only: {name} repeats {stride}; omit {argument}")
         return endurance_of_walk_gas(gas, bottle, schedule, overrides)
     full = load_bottle(PAPER_BOTTLE if bottle is None else bottle, overrides)
     if isinstance(use, Recording):
@@ -89,8 +89,9 @@ def endurance_of_gas_use(
         molar_mass, fluid = gas_data.get("molar_mass") if isinstance(gas_data, dict) else None, full.fluid.name
         if isinstance(molar_mass, float) and not is_of_bottle(molar_mass, full):
             raise DataError(
-                f"{run}: its device is fed with gas of {1.0e3 * molar_mass:.4g} g/mol, and bottle '{full.name}' holds "
-                f"{fluid}: take a bottle of that gas (ppafo bottle --list), or simulate with gas.species={fluid}"
+                f"{run}: the device uses gas of {1000.0 * molar_mass:.4g} g/mol, but bottle '{full.name}' "
+                f"contains {fluid}; choose a bottle of that gas (ppafo bottle --list), or simulate with "
+                f"gas.species={fluid}"
             )
     endurance = follow_bottle(full, demand_of_recording(recording, stride_time), schedule)
     return replace(endurance, is_of_recording=stride_time is None, device_units=units)

@@ -61,7 +61,10 @@ def walk_gas(result: WalkResult) -> WalkGas:
 def demand_of_walk(walk: WalkGas) -> GasDemand:
     """Return the gas demand of a walk that continues; a stride is one of the leg with the device."""
     if walk.gas_per_stride <= 0.0:
-        raise DataError(f"walk '{walk.name}': no gas was taken from the supply, so a bottle would never be empty")
+        raise DataError(
+            f"walk '{walk.name}': takes no gas from the supply, so no bottle would become empty; give "
+            "a walk with assistance"
+        )
     # An open valve may let gas back into the supply for moments, so the largest flow is a mean over 0.1 s.
     peak = max(largest_flow(walk.recording), walk.gas_per_stride / walk.stride_time)
     draw = demand_of_numbers(walk.gas_per_stride, walk.stride_time, peak)
@@ -74,11 +77,13 @@ def read_walk_gas(folder: Path) -> WalkGas:
     path = folder / WALK_FILE
     document = read_json(path)
     if not isinstance(document, dict) or document.get("format") != WALK_FORMAT:
-        raise DataError(f"{path}: is not the result of a ppafo walk (its 'format' is not '{WALK_FORMAT}')")
+        raise DataError(f"{path}: is not a result of 'ppafo walk' (its 'format' is not '{WALK_FORMAT}')")
     file = _WalkFile(path, document)
     status = file.table("status").get("kind", "completed")
     if status != "completed":
-        raise DataError(f"{path}: the walk {status}, so it cannot be repeated")
+        raise DataError(
+            f"{path}: the walk {status}, so its gas demand cannot be repeated; give a walk that ran to its end"
+        )
     configuration = file.table("configuration")
     sequence = None if configuration.get("task_sequence") is None else file.table("configuration.task_sequence")
     metric = "gas" if sequence is None else "task_sequence_gas"
@@ -89,7 +94,7 @@ def read_walk_gas(folder: Path) -> WalkGas:
     stride_time = file.number(time, above=0.0)
     recording = read_recording(folder)
     if "supplied_mass" not in recording:
-        raise DataError(f"{recording.label}: has no channel 'supplied_mass'; repeat the walk with 'ppafo walk'")
+        raise DataError(f"{recording.label}: there is no channel 'supplied_mass'; repeat the walk with 'ppafo walk'")
     return WalkGas(
         str(configuration.get("name", folder.name)),
         recording,
@@ -113,9 +118,7 @@ class _WalkFile:
         for part in name.split("."):
             node = node.get(part, {})
             if not isinstance(node, Mapping):
-                raise DataError(
-                    f"{self.path}: '{part}' is not a table of names and values; repeat the walk with 'ppafo walk'"
-                )
+                raise DataError(f"{self.path}: '{part}' must be a JSON object; repeat the walk with 'ppafo walk'")
         return node
 
     def number(self, name: str, above: float) -> float:
@@ -124,10 +127,10 @@ class _WalkFile:
         for part in name.split("."):
             node = node.get(part) if isinstance(node, Mapping) else None
         if isinstance(node, bool) or not isinstance(node, int | float) or not abs(node) <= sys.float_info.max:
-            raise DataError(f"{self.path}: has no number at '{name}'; repeat the walk with 'ppafo walk'")
+            raise DataError(f"{self.path}: '{name}' must be a number; repeat the walk with 'ppafo walk'")
         if node <= above:
             raise DataError(
-                f"{self.path}: '{name}' is {node:g}, which is impossible for a walk; repeat the walk with 'ppafo walk'"
+                f"{self.path}: '{name}' = {node:g} is impossible for a walk; repeat the walk with 'ppafo walk'"
             )
         return float(node)
 
@@ -140,7 +143,7 @@ def _walked(configuration: Mapping[str, Any], file: Path) -> Scenario | None:
     source, name = configuration.get("file"), str(configuration.get("name", "walk"))
     with refused_as(DataError, f"{file}: its walk cannot be repeated", PpafoError):
         if not (isinstance(content, dict) and isinstance(overrides, list) and isinstance(source, str | None)):
-            raise DataError("'configuration' does not state a walk")
+            raise DataError("'configuration' has no [motion] of a walk")
         folder = Path() if source is None else Path(source).parent
         changes = read_overrides(map(str, overrides), ScenarioError)
         return scenario_of(ScenarioRequest(name, source, folder, content, changes), WALKING)

@@ -46,7 +46,7 @@ def range_of(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
         lower = parts[2] if split_quantity(parts[2])[1] else f"{parts[2]} {unit}".rstrip()
         low, high, path = path.level(lower), path.level(parts[3]), given_in(path, [parts[3]])
     if not low < high:
-        raise StudyError(f"'{one_line(text)}': the low end must be below the high end")
+        raise StudyError(f"'{one_line(text)}': the lower end must be below the upper end")
     return path, low, high
 
 
@@ -179,11 +179,11 @@ def outermost(
         ends = f"from {path.quote(low)} to {path.quote(high)}"
         if search.tried["oscillating"].any():
             raise StudyError(
-                f"scenario '{base.name}': in every run {ends} the loop oscillates: leave its gains out, so that they "
-                "follow the device"
+                f"scenario '{base.name}': the loop oscillates in every run {ends}; omit the gains of the "
+                "controller, so that they are computed for each device"
             )
         reason = f"; the first: {runs.reason}" if runs.reason else ""
-        raise StudyError(f"scenario '{base.name}': no run {ends} has a '{condition.metric}'{reason}")
+        raise StudyError(f"scenario '{base.name}': no run {ends} gives the metric '{condition.metric}'{reason}")
     # All parts of a bracket side by side: a bisection would wait for every one of its runs.
     index, neighbour = search.found
     while index is not None and neighbour is not None:

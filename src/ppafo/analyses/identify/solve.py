@@ -93,7 +93,7 @@ def _sources(
     """
     atmosphere = atmospheric_pressure(parameter_set)
     if path.is_dir():
-        raise IdentificationError(f"{path}: is a folder, which has no hash; name the recording in it")
+        raise IdentificationError(f"{path}: is a folder and cannot be hashed; give the recording in the folder")
     if columns is None:
         return (source_of(path, read_recording(path, atmosphere=atmosphere)),)
     molar_mass = number_in_si(parameter_set, "gas.molar_mass")
@@ -110,8 +110,8 @@ def _experiment_source(
     source, *others = _sources(problem, folder / recording, file, columns, parameter_set)
     if others:
         raise IdentificationError(
-            f"{recording}: columns.{columns}.trial: an experiment has one recording, not {1 + len(others)}: name one "
-            "trial"
+            f"{recording}: columns.{columns}.trial selects {1 + len(others)} trials, but an experiment has one "
+            "recording; name one trial"
         )
     return source
 

@@ -185,5 +185,5 @@ def _index_of(name: str, variables: Sequence[LinearSignal], kind: str) -> int:
     names = [variable.name for variable in variables]
     if name not in names:
         hint = nearest_name(name, names)
-        raise ScenarioError(f"the linear model has no {kind} '{one_line(name)}'{hint}; there are: {', '.join(names)}")
+        raise ScenarioError(f"the linear model has no {kind} '{one_line(name)}'{hint}; available: {', '.join(names)}")
     return names.index(name)

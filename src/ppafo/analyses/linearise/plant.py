@@ -131,7 +131,8 @@ def functions_in(run: Run) -> PythonFunctions:
     for effect in run.program.effects:
         if effect.state is not None and effect.is_of_device:
             raise SimulationError(
-                f"effect '{effect.name}' has state variables, which the linear model leaves out: switch the effect off"
+                f"effect '{effect.name}' has state variables, which the linear model does not include; switch the "
+                "effect off"
             )
     effects = zip(run.program.effects, run.effects, strict=True)
     return functions_of(run.program, {effect.name: row for effect, row in effects})

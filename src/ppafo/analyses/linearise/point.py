@@ -79,7 +79,10 @@ def _after(scenario: Scenario, run: Run, steps: int) -> tuple[dict[str, float], 
     outcome = run_batch(batch) if custom is None else run_sampled(batch, custom)
     rows = {name: float(outcome.states[row, 0]) for name, row in state_row_numbers(run).items()}
     if rows["result.failure_time"] < NEVER_FAILED or not all(map(np.isfinite, rows.values())):
-        raise SimulationError(f"{scenario.name}: the run diverges before {steps * run.step:g} s (ppafo simulate)")
+        raise SimulationError(
+            f"{scenario.name}: the run diverges before {steps * run.step:g} s; give an earlier "
+            "--at, and see 'ppafo simulate'"
+        )
     angle, rate = rows["state.angle"], rows["state.angular_velocity"]
     if run.program.angle is not None:
         angle, rate, _ = run.program.angle.value(run.path, steps * run.step)
@@ -118,13 +121,15 @@ def equilibrium(scenario: Scenario) -> Point:
     """
     planned, give_a_time = plan_run(scenario), f"give a time of the run, such as {argument_text('at', '1 s')}"
     if planned.leg is not None and planned.program.shank is not CONSTANT:
-        raise ScenarioError(f"{scenario.name}: no equilibrium while the shank of the leg moves; {give_a_time}")
+        raise ScenarioError(f"{scenario.name}: there is no equilibrium while the shank moves; {give_a_time}")
     values, _ = _after(scenario, planned, planned.step_count)
     values["angular_velocity"] = 0.0
     is_open_loop, quantity = scenario.controller.is_open_loop, CONTROLLED[scenario.controlled]
     if quantity.name == ANGLE and not is_open_loop:
-        line = f"reference.of = '{ANGLE}': an equilibrium is found for a torque or a pressure; {give_a_time}"
-        raise ScenarioError(f"{scenario.name}: {line}")
+        raise ScenarioError(
+            f"{scenario.name}: reference.of = '{ANGLE}': an equilibrium needs a reference of torque or pressure; "
+            f"{give_a_time}"
+        )
     end = np.array([scenario.run.duration])
     level = None if is_open_loop else float(profile_values(scenario.reference, end)[0][0])
     run = without_slew_limit(planned)
@@ -132,23 +137,27 @@ def equilibrium(scenario: Scenario) -> Point:
     steady = _steady(run, rest, values, quantity, level)
     if steady is None:
         if level is None:
-            line = f"no equilibrium found for the command {values['command']:g}"
-            raise ScenarioError(f"{scenario.name}: {line}; {give_a_time}")
+            raise ScenarioError(
+                f"{scenario.name}: no equilibrium was found for the command {values['command']:g}; {give_a_time}"
+            )
         kind = of_path("reference.level", quantity.level.unit, ".4g")
-        line = f"no equilibrium at {kind.text(level)}, the last value of the reference"
+        reached = ""
         full = 1.0 if (level > 0.0) != scenario.device.supply.is_vacuum else -1.0
         fully_open = values | dict.fromkeys(("command", *opening_names(values)), full)
         most = _steady(run, rest, fully_open, quantity, None)
         if most is not None and quantity.name == TORQUE:
             most_torque = run.program.actuator.torque(run.plant, most["angle"], most["pressure_1"], most["pressure_2"])
-            line += f": with the valve fully open the actuator comes to {most_torque:.4g} N m"
+            reached = f": with the valve fully open the actuator reaches {most_torque:.4g} N m"
         remedy = " or hold the ankle" if rest is not None else ""
-        raise ScenarioError(f"{scenario.name}: {line}; set another reference{remedy}, or {give_a_time}")
+        raise ScenarioError(
+            f"{scenario.name}: there is no equilibrium at {kind.text(level)}, the last value of the "
+            f"reference{reached}; set another reference{remedy}, or {give_a_time}"
+        )
     direction = _direction(run, steady, scenario.run.duration)
     if direction:
         raise ScenarioError(
-            f"{scenario.name}: no equilibrium: at {np.degrees(values['angle']):.4g} deg the torque accelerates the "
-            f"vane; {give_a_time}, or another reference"
+            f"{scenario.name}: there is no equilibrium, because the torque accelerates the vane at "
+            f"{np.degrees(values['angle']):.4g} deg; {give_a_time}, or another reference"
         )
     # A valve that is closed but for rounding is closed.
     steady |= {name: 0.0 for name in ("command", *opening_names(steady)) if abs(steady[name]) < STEADY}

@@ -99,11 +99,11 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
     """
     run = plan_run(scenario)
     if scenario.supply_lines is not None:
-        raise ScenarioError(f"{scenario.name}: a linear model assumes a constant supply pressure; omit [supply_line]")
+        raise ScenarioError(f"{scenario.name}: the linear model assumes a constant supply pressure; omit [supply_line]")
     if not opens_in_proportion(run):
         raise ScenarioError(
-            f"{scenario.name}: valve '{scenario.device.valve_name}' opens fully or at a constant speed: its flow "
-            f"has no derivative with respect to the command; set device.valve to a proportional valve"
+            f"{scenario.name}: valve '{scenario.device.valve_name}' switches on and off, so its flow has no "
+            "derivative with respect to the command; set device.valve to a proportional valve"
         )
     if at == EQUILIBRIUM:
         return model_at(scenario, run, equilibrium(scenario))

@@ -52,7 +52,9 @@ def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
     """
     result = walk(load_walk(name, overrides), minutes=MINUTES)
     if not (result.status.is_completed and result.is_helped):
-        raise SimulationError(f"{name}: {result.status.message}; the claims need a walk with help in most strides")
+        raise SimulationError(
+            f"{name}: {result.status.message}; a claim about walking needs a walk with assistance in most strides"
+        )
     return result
 
 
@@ -165,26 +167,24 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> _PublishedClaim:
     where = f"{file}: claims.{entry.id}"
     source = f"{entry.source or citation}, {entry.where}"
     if bool(entry.computation) == bool(entry.not_testable):
-        raise ScenarioError(f"{where}: give either computation or not_testable, which says why there is none")
+        raise ScenarioError(f"{where}: give either computation, or not_testable with the reason")
     if entry.not_testable:
         return _PublishedClaim(entry, None, {}, source)
     if entry.computation not in COMPUTATIONS:
         hint = nearest_name(entry.computation, COMPUTATIONS)
         known = ", ".join(COMPUTATIONS)
-        raise ScenarioError(f"{where}.computation: there is no '{entry.computation}'{hint}; available: {known}")
+        raise ScenarioError(f"{where}.computation: '{entry.computation}' is unknown{hint}; available: {known}")
     if entry.at_least is None and entry.at_most is None:
-        raise ScenarioError(f"{where}: give at_least, at_most or both: the range that agrees with the claim")
+        raise ScenarioError(f"{where}: give at_least, at_most or both, the range in which the claim holds")
     # A side that the file leaves open.
     low = -math.inf if entry.at_least is None else entry.at_least
     high = math.inf if entry.at_most is None else entry.at_most
     if low > high:
-        raise ScenarioError(f"{where}: at_least = {low:g} lies above at_most = {high:g}, so that no number can agree")
+        raise ScenarioError(f"{where}: at_least = {low:g} must not exceed at_most = {high:g}")
     # What is published has to agree with itself: else the range was typed wrongly.
     if entry.published is not None and not low <= entry.published <= high:
         name, limit = ("at_least", low) if entry.published < low else ("at_most", high)
-        raise ScenarioError(
-            f"{where}: published = {entry.published:g} is outside its own range, {name} = {limit:g}; widen the range"
-        )
+        raise ScenarioError(f"{where}: published = {entry.published:g} is outside {name} = {limit:g}; widen the range")
     computation = COMPUTATIONS[entry.computation]
     with refused_as(ScenarioError, f"{where}.unit", UnitError):
         # Only for what it raises: here the place in the file is known.
@@ -198,17 +198,19 @@ def _arguments(entry: ClaimEntry, computation: _Computation, where: str) -> dict
     for name in entry.arguments:
         if name not in computation.arguments:
             hint = nearest_name(name, computation.arguments)
-            raise ScenarioError(f"{where}.arguments: '{name}' is unknown{hint}; {entry.computation} takes {known}")
+            raise ScenarioError(
+                f"{where}.arguments: '{name}' is unknown{hint}; arguments of {entry.computation}: {known}"
+            )
     values: dict[str, float] = {}
     for name, unit in computation.arguments.items():
         if name not in entry.arguments:
-            raise ScenarioError(f"{where}.arguments: '{name}' is missing; {entry.computation} takes {known}")
+            raise ScenarioError(f"{where}.arguments: '{name}' is missing; arguments of {entry.computation}: {known}")
         key, text = f"{where}.arguments.{name}", entry.arguments[name]
         with refused_as(ScenarioError, key, UnitError):
             value = values[name] = parse_quantity(text, unit)
         # An absolute pressure and a time: neither lies below 0.
         if not 0.0 <= value < math.inf:
-            raise ScenarioError(f"{key} = '{text}': must be at least 0 {unit} and finite")
+            raise ScenarioError(f"{key} = '{text}': must be finite and at least 0 {unit}")
     return values
 
 
@@ -283,7 +285,7 @@ def check_study(study: str, overrides: Sequence[str]) -> None:
         hint = nearest_name(study, study_names())
         raise ScenarioError(f"there is no study '{label(study)}'{hint}; available: {known}, or give a .toml file")
     if overrides and study != SEED:
-        raise ScenarioError(f"--set {overrides[0]}: goes with the study '{SEED}' only; leave --set or --study out")
+        raise ScenarioError(f"--set {overrides[0]}: applies to the study '{SEED}' only; omit --set or --study")
 
 
 def run_studies(study: str, report: Report) -> tuple[tuple[Publication, tuple[JudgedClaim, ...]], ...]:

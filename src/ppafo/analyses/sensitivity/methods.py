@@ -84,7 +84,7 @@ class Method:
 def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
     """Return fractions in (0, 1) for a power of 2 of blocks; block b belongs to scramble b % SCRAMBLES."""
     if blocks & (blocks - 1):
-        raise StudyError(f"samples = {blocks}: Sobol indices need a power of 2, such as {1 << blocks.bit_length()}")
+        raise StudyError(f"samples = {blocks}: Sobol indices need a power of 2, for example {1 << blocks.bit_length()}")
     from scipy.stats import qmc
 
     dimensions, points_of_scramble = len(uncertainty.drawn), blocks // SCRAMBLES

@@ -133,11 +133,11 @@ def analyse(
     """
     if uncertainty.scores is not None and not method.takes_dependent:
         raise StudyError(
-            f"sensitivity: the indices of {method.name} need independent values, but the study has "
-            "[[correlations]]; use '--method shapley', or treat the values as independent (--independent)"
+            f"sensitivity: {method.name} assumes independent values, but the study has [[correlations]]; use "
+            "'--method shapley', or ignore the correlations with --independent"
         )
     if len(uncertainty.drawn) < 2:
-        raise StudyError("sensitivity: there is only one uncertain value; vary two or more")
+        raise StudyError("sensitivity: the study has only one uncertain value; vary two or more")
     if not method.fewest <= settings.samples <= method.most:
         raise StudyError(
             f"samples = {settings.samples}: {method.name} needs {method.fewest} to {method.most:,} {method.sizes_label}"
@@ -185,7 +185,10 @@ def _metric_sensitivity(
     """
     known = np.isfinite(values)
     if float(np.ptp(values[known])) == 0.0:
-        raise StudyError(f"sensitivity: '{name}' is {values[known][0]:g} in every run, so no value influences it")
+        raise StudyError(
+            f"sensitivity: '{name}' is {values[known][0]:g} in every run, so no value influences it; "
+            "choose another metric"
+        )
     # The formulas need whole blocks: one run without a value takes its block with it.
     is_whole = np.all(known.reshape(settings.samples, -1), axis=1)
     # All blocks, and halves, and halves of halves, as far as they say something: many of the first may be left out, and
@@ -198,8 +201,8 @@ def _metric_sensitivity(
             sizes.append(size)
     if settings.samples not in sizes:
         raise StudyError(
-            f"sensitivity: {int(np.count_nonzero(is_whole)):,} of {is_whole.size:,} {method.sizes_label} have '{name}' "
-            "in all their runs, which is too few; use more samples, or fix what makes the runs fail"
+            f"sensitivity: only {int(np.count_nonzero(is_whole)):,} of {is_whole.size:,} {method.sizes_label} "
+            f"have '{name}' in all their runs; use more samples, or correct the runs that fail"
         )
     settling = []
     for size in sizes:

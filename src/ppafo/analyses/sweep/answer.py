@@ -25,7 +25,7 @@ _Count = Annotated[int, Field(ge=0)]
 def _fraction(text: str) -> str:
     """Return a text unchanged if it is a fraction from 0 to 1; ValueError otherwise."""
     if not 0.0 <= float(text) <= 1.0:
-        raise ValueError("must be a fraction from 0 to 1")
+        raise ValueError("must be from 0 to 1")
     return text
 
 
@@ -40,7 +40,7 @@ class _Described(BaseModel, strict=True):
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
         if self.count and not {"mean", "quantiles"} <= self.model_fields_set:
-            raise ValueError("has a count, but no mean or no quantiles")
+            raise ValueError("has a count, but no mean or no quantiles; run the study again")
         return self
 
 
@@ -194,7 +194,7 @@ def load_study_results(folder: str | Path) -> Finding[StudyResults]:
         summary: dict[str, Any] = stored.read_document(SUMMARY)
     except (OSError, ValueError) as error:
         raise DataError(
-            f"{stored.path}: the study is not finished (no complete {SUMMARY}); run it again to resume"
+            f"{stored.path}: the study is not finished (there is no complete {SUMMARY}); run it again to resume"
         ) from error
     whose = f"{stored.path}: {SUMMARY} is damaged; run the study again into this folder"
     described = validate(_Summary, summary, whose, DataError)
@@ -203,5 +203,5 @@ def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     has_same_names = names == described.configurations.keys() == described.completed_by_configuration.keys()
     metrics = document["metrics"].keys()
     if not has_same_names or any(table.keys() != metrics for table in described.configurations.values()):
-        raise DataError(f"{whose}: its configurations and metrics differ from {MANIFEST}")
+        raise DataError(f"{whose}: its configurations and metrics differ from those of {MANIFEST}; run the study again")
     return finding_of(StudyResults(stored, document, summary))

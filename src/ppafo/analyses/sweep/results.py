@@ -98,7 +98,7 @@ class StudyResults:
         stored = list(dict.fromkeys([*outputs.get("trajectories", ()), *outputs.get("bands", ())]))
         if channel not in stored:
             raise StudyError(
-                f"no trajectories of '{channel}' were kept{nearest_name(channel, stored)}; available: {stored}"
+                f"the study stores no trajectories of '{channel}'{nearest_name(channel, stored)}; available: {stored}"
             )
         column = trace_column(channel)
         return np.concatenate([matrix_of(part.column(column)) for part in self.chunks([column])])
@@ -110,7 +110,7 @@ class StudyResults:
             check_types(table, BANDS)
             others = set(table.column_names) - set(_OF_BANDS)
             if not set(_OF_BANDS) < set(table.column_names) or not all(map(_QUANTILE.fullmatch, others)):
-                raise DataError(f"{BANDS}: has other columns than bands have")
+                raise DataError(f"{BANDS}: must have the columns of percentile bands; run the study again")
         except (DataError, OSError) as error:
             raise DataError(
                 f"{self.folder.path}/{BANDS}: is missing or damaged; run the study again into this folder"

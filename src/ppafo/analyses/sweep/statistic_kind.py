@@ -113,4 +113,4 @@ def parse_statistic(text: str, metric: str, atmosphere: float | None) -> Statist
     if probability is not None:
         threshold = level_of(probability[2], metric, f"statistic '{text}'", atmosphere)
         return probability_of(threshold, probability[1] == "above", probability[2])
-    raise StudyError(f"statistic '{text}' is not known; give {GRAMMAR}, with a fraction above 0 and below 1")
+    raise StudyError(f"statistic '{text}': must be {GRAMMAR}, with a fraction above 0 and below 1")

@@ -42,11 +42,11 @@ class StoppingRule:
     def __post_init__(self) -> None:
         """Raise StudyError for a rule that can never be met or that has invalid limits."""
         if not (math.isfinite(self.width) and self.width > 0.0):
-            raise StudyError(f"width = {self.width!r}: must be more than 0")
+            raise StudyError(f"width = {self.width!r}: must be above 0")
         if not FEWEST_DRAWS <= self.first <= self.maximum <= MAXIMUM_DRAWS:
             raise StudyError(
-                f"first = {self.first!r} and maximum = {self.maximum!r} draws: must be at least {FEWEST_DRAWS}, the "
-                f"first not more than the maximum, and the maximum not above {MAXIMUM_DRAWS:,}"
+                f"first = {self.first!r}, maximum = {self.maximum!r}: must be from {FEWEST_DRAWS} to "
+                f"{MAXIMUM_DRAWS:,} draws, and first must not exceed maximum"
             )
         check_fraction(self.confidence, *CONFIDENCE)
         check_fraction(self.maximum_failed, "maximum_failed")
@@ -78,7 +78,7 @@ def target_width(statistic: Statistic, metric: str, width: str) -> tuple[float, 
         try:
             return float(number_text(text)), False
         except ValueError as error:
-            raise StudyError(f"width = '{text}': for a probability give a plain number, such as 0.01") from error
+            raise StudyError(f"width = '{text}': must be a plain number for a probability, for example 0.01") from error
     if not text.endswith("%"):
         return difference_of(text, metric, f"width = '{width}'"), False
     with refused_as(StudyError, f"width = '{text}'", UnitError):

@@ -317,7 +317,7 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
         drawn = () if spread is None else (*spread.uncertainty.paths, *spread.uncertainty.same)
         repeated = first_twice(paths)
         if repeated is not None:
-            raise StudyError(f"'{repeated}' is searched twice; give it only one [[search]]")
+            raise StudyError(f"'{repeated}' appears in two [[search]] tables; omit one")
         varies = ATMOSPHERE_PATH in (*paths, *drawn)
         atmosphere = atmosphere_of(scenario, (*drawn, *paths))
         searched = tuple(_searched(gain, scenario, varies) for gain in parsed.search)
@@ -329,13 +329,13 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
             if goal.scale is not None:
                 scale = difference_of(goal.scale, goal.metric, where)
             if scale is not None and scale <= 0.0:
-                raise StudyError(f"{where} must be more than 0")
+                raise StudyError(f"{where}: must be above 0")
             goals.append(ObjectiveTerm(goal.metric, goal.weight, scale))
         for constraint in parsed.constraints:
             bounds = [text for text in (constraint.at_most, constraint.at_least) if text is not None]
             if len(bounds) != 1:
                 has = "both" if bounds else "none"
-                raise StudyError(f"constraint '{constraint.metric}': needs either at_most or at_least, it has {has}")
+                raise StudyError(f"constraint '{constraint.metric}': give at_most or at_least, it has {has}")
             where = f"constraint '{constraint.metric}' = '{bounds[0]}'"
             limit = level_of(bounds[0], constraint.metric, where, atmosphere)
             limits.append(MetricLimit(constraint.metric, limit, constraint.at_most is not None, bounds[0]))
@@ -360,9 +360,11 @@ def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) ->
         minimum, maximum = varied.level(gain.minimum), varied.level(gain.maximum)
         before = value_at(gain.path, scenario)
         if before is None:
-            raise ScenarioError(f"scenario '{scenario.name}' has no value for '{gain.path}'; set one with an override")
+            raise ScenarioError(f"scenario '{scenario.name}' has no value for '{gain.path}'; set it with an override")
     if gain.path == NOISE:
-        raise StudyError(f"search '{gain.path}': all candidates get the same noise, so it cannot be searched")
+        raise StudyError(
+            f"search '{gain.path}': cannot be searched, because all candidates use the same noise; omit it"
+        )
     if minimum >= maximum:
         raise StudyError(
             f"search '{gain.path}': minimum = {gain.minimum!r} must be less than maximum = {gain.maximum!r}"
@@ -386,11 +388,13 @@ def _spread(parsed: TuningFile, folder: Path, searched: Sequence[str], scenario:
         uncertainty = uncertainty_of(study).with_noise_of([scenario])
         if study.only:
             raise StudyError(
-                f"'{next(iter(study.only))}' varies only in some configurations of the study; a tuning needs a study "
+                f"'{next(iter(study.only))}' varies only in some configurations of the study; choose a study "
                 "without 'only'"
             )
     both = next((path for path in uncertainty.paths if path in searched), None)
     if both is not None:
-        raise StudyError(f"robust: study '{study.name}' draws '{both}', which is searched here; it cannot be both")
+        raise StudyError(
+            f"robust: study '{study.name}' draws '{both}', which is also searched; omit it from one of them"
+        )
     share = robust.share if robust.measure == "quantile" else None
     return Spread(uncertainty, study.name, robust.draws, study.sample.seed, robust.deviations, share)

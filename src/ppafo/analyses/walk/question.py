@@ -57,7 +57,7 @@ def walk_with_and_without(
     from ppafo.walking.walk import compare_walks
 
     if check and wearers is not None:
-        raise ArgumentError("check: is for the walk of one wearer; leave out wearers, or check")
+        raise ArgumentError("check: applies to the walk of one wearer; omit wearers or check")
     chosen = scenario
     # The options of the command line belong to a file: a scenario that was built has all of it already.
     if not isinstance(chosen, Scenario):

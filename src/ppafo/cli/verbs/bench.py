@@ -76,7 +76,7 @@ def rig_record(
         raise DataError("--duration: must be above 0 s")
     output.check_new_file(out)
     if out.suffix != ".csv":
-        raise DataError(f"--out {out}: must end in .csv")
+        raise DataError(f"--out {out}: the name must end in .csv")
     from ppafo.storage.files import check_files_can_be_added
 
     # What a bench did cannot be recorded a second time.

@@ -132,7 +132,7 @@ def gait_record(gait: Gait, *, strides: Count = 10, out: File) -> CommandOutput:
     from ppafo.storage import write_csv
 
     if out.suffix.lower() != ".csv":
-        raise DataError(f"--out {out}: a recording is written as .csv")
+        raise DataError(f"--out {out}: the name must end in .csv")
     check_new_file(out)
     recording = walk_recording(load_gait(gait), strides)
     write_csv(out, recording)

@@ -115,8 +115,8 @@ def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
     # Settings of law and frame stand in one section of a file, where a name can mean only one thing.
     if shared:
         raise ScenarioError(
-            f"controller '{law.name}' cannot walk: its setting '{min(shared)}' has the name of a setting that all "
-            f"walking controllers share; rename it"
+            f"controller '{law.name}': setting '{min(shared)}' has the name of a setting that all walking "
+            "controllers share; rename it"
         )
     # One class for each law, named after it: exported C has structs of these names.
     title = "".join(part.capitalize() for part in name.split("_"))

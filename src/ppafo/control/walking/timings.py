@@ -36,7 +36,7 @@ def with_timing(kind: ControllerKind, timing: TimingKind) -> ControllerKind:
     if timing is THRESHOLDS:
         return kind
     if not keeps_time(kind):
-        raise ScenarioError(f"controller '{kind.name}' uses no gait phase: timing.kind cannot be given")
+        raise ScenarioError(f"controller '{kind.name}' uses no gait phase; omit timing.kind")
     usual_state = type(kind.initial)
     # One class for each pair of controller and timing, named after both: exported C has structs of these names.
     title = timing.name.capitalize()

@@ -50,7 +50,7 @@ def scenario_library(scenario: Scenario) -> Library:
     """Return a library whose settings are all numbers of a scenario; ProgramError for a fixed-point controller."""
     if CONTROLLERS[scenario.controller.kind].plan is not None:
         raise ProgramError(
-            f"{scenario.name}: a fixed-point controller has no library yet; 'ppafo export firmware' writes it"
+            f"{scenario.name}: a fixed-point controller cannot be exported as a C library; use 'ppafo export firmware'"
         )
     program = exported(batch_of(plan_run(scenario)).program)
     settings = settings_of(scenario)
@@ -130,8 +130,8 @@ def library_of(scenario: Scenario) -> Library:
     """Return the library of a scenario or a walk; ProgramError for a controller that is a Python object."""
     if scenario.controller.is_outside:
         raise ProgramError(
-            f"{scenario.name}: a Python object cannot be exported as a controller; export the plant alone, or write "
-            f"the law as a controller kind"
+            f"{scenario.name}: a Python object cannot be exported as a controller; export the plant only, or "
+            "write the law as a controller kind"
         )
     library = _LIBRARIES[scenario.motion.motion_kind.layout](scenario)
     return replace(library, joint=scenario.device.joint, actuator=scenario.device.actuator.kind)

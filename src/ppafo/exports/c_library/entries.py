@@ -49,7 +49,7 @@ def prepare_entry(
     for name, row in (program.parameter_rows() | states).items():
         if name not in made and leaf_paths(row, name):
             last = place_of(functions[-1])
-            raise ProgramError(f"{last}: no function of preparation gives '{name}', a {row.__name__} of the program")
+            raise ProgramError(f"{last}: no preparation function sets '{name}' ({row.__name__}) of the program")
     cells = {setting.name: boundary.cell("settings", place, setting.name) for place, setting in enumerate(settings)}
     cells |= {name: cells.get(text, text) for name, text in second_chamber(preparation.scenario).items()}
 

@@ -77,13 +77,12 @@ def check_can_be_exported(configuration: Scenario) -> None:
     """Raise ScenarioError if a walk cannot be exported."""
     if walk_of(configuration).person:
         raise ScenarioError(
-            f"{configuration.name}: wearer.person is drawn in Python, so a walk with one cannot be exported: leave it "
-            "out"
+            f"{configuration.name}: wearer.person is drawn at random in Python and cannot be exported; omit it"
         )
     if walk_of(configuration).bottle is not None:
         raise ScenarioError(
-            f"{configuration.name}: a walk on a bottle cannot be exported: bottle and device are advanced in "
-            "alternation, in Python; leave the bottle out, or give it lines with [supply_line]"
+            f"{configuration.name}: a walk with a bottle cannot be exported, because Python steps bottle and "
+            "device in turn; omit the bottle, or add [supply_line]"
         )
 
 

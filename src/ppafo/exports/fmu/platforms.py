@@ -65,9 +65,9 @@ def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
         mathematics = [] if name == "win64" else ["-lm"]
         done = asked([*command, main, "-o", library.name, *mathematics], _REMEDY, folder, Path(folder))
         if done.returncode != 0:
-            raise ProgramError(f"{command[0]} does not build the library for {name}: {complaint(done)}")
+            raise ProgramError(f"{command[0]} failed to build the library for {name}: {complaint(done)}")
         if not library.is_file():
-            raise ProgramError(f"{command[0]} returned 0 but made no library for {name}; {_REMEDY}")
+            raise ProgramError(f"{command[0]} returned 0 but produced no library for {name}; {_REMEDY}")
         return library.read_bytes()
 
 
@@ -90,4 +90,4 @@ def compiler_for(name: str) -> Sequence[str]:
     if name == host_platform() == "linux64" and compiler is not None:
         return [compiler, "-s"]
     needed = "gcc, clang or the package ziglang" if name == "linux64" else "the package ziglang"
-    raise ProgramError(f"platform {name} needs {needed} (pip install 'ppafo[native]')")
+    raise ProgramError(f"platform {name} needs {needed}; install it with pip install 'ppafo[native]'")

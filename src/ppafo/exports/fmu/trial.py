@@ -123,8 +123,8 @@ def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> No
                     if status or value != python_value:
                         problem = f"{name} is {value!r}, Python has {python_value!r}" if not status else "a call fails"
                         raise ProgramError(
-                            f"{interface.library.title}: the FMU differs from the Python run at {time:g} s: {problem}; "
-                            f"nothing is written"
+                            f"{interface.library.title}: the FMU differs from the Python run at {time:g} s: "
+                            f"{problem}; no file was written"
                         )
 
 

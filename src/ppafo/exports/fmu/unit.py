@@ -40,7 +40,7 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     for name in platforms:
         if name not in PLATFORMS:
             hint = nearest_name(name, PLATFORMS)
-            raise ScenarioError(f"platform '{name}' is not known{hint}; available: {', '.join(PLATFORMS)}")
+            raise ScenarioError(f"platform '{name}' is unknown{hint}; available: {', '.join(PLATFORMS)}")
         if fmi == 2 and PLATFORMS[name].folder_2 is None:
             raise ScenarioError(f"platform {name} is not defined in FMI 2: give {argument_text('fmi')} 3")
     chosen = {name: PLATFORMS[name] for name in platforms}

@@ -208,7 +208,7 @@ class Bench:
         if self.answers.is_answered:
             return
         if is_stopped():
-            raise KeyboardInterrupt("interrupted before a controller answered; nothing is written")
+            raise KeyboardInterrupt("interrupted before a controller answered; no file was written")
         received = wire.described_refusals(self.reader.refused, self.answers.ignored.items())
         failure = f"; {self.port.failure}" if self.port.failure else ""
         raise ScenarioError(f"no controller answered within {patience:g} s; received: {received}{failure}")

@@ -35,13 +35,13 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> CompiledPlant:
         raise ScenarioError(f"{argument_text('rate')} {rate}: must be {limits}")
     if scenario.motion.motion_kind.reads_forces:
         raise ScenarioError(
-            f"'{scenario.name}' is a walk; the link transmits no ground reaction forces, so give a scenario without "
-            f"a walk"
+            f"'{scenario.name}' is a walk, but the hardware-in-the-loop link transmits no ground reaction forces; "
+            "give a scenario without a walk"
         )
     if scenario.controlled != TORQUE:
         raise ScenarioError(
-            f"{scenario.name}: reference.of = '{scenario.controlled}': the link transmits torque references only; "
-            f"give a scenario with reference.of = 'torque'"
+            f"{scenario.name}: reference.of = '{scenario.controlled}', but the link transmits torque "
+            "references only; give a scenario with reference.of = 'torque'"
         )
     period = 1.0 / rate
     chosen = replace(
@@ -61,6 +61,6 @@ def check_baud(baud: int, rate: int) -> None:
     bits = wire.sample_length(CHANNELS_SENT) * BITS_PER_BYTE
     if baud < bits * rate:
         raise ScenarioError(
-            f"{argument_text('baud')} {baud}: {rate} samples per second need {bits * rate} baud; use a faster line, "
-            f"or a {argument_text('rate')} of at most {baud // bits}"
+            f"{argument_text('baud')} {baud}: {rate} samples per second need {bits * rate} baud; increase baud, "
+            f"or reduce {argument_text('rate')} to {baud // bits} or less"
         )

@@ -283,7 +283,7 @@ def record(
             ended = "silence of the bench"
     if not collector:
         if is_stopped():
-            raise KeyboardInterrupt("interrupted before the first sample; nothing is written")
+            raise KeyboardInterrupt("interrupted before the first sample; no file was written")
         others = [*collector.ignored.items(), ("of somebody else", port.strangers)]
         came = wire.described_refusals(reader.refused, others)
         raise DataError(f"no sample received within {patience:g} s; received: {came}")
@@ -304,8 +304,7 @@ def kept_aside(target: Path) -> Iterator[Callable[[str], None]]:
         file = aside.open("xb", buffering=0)
     except FileExistsError:
         raise DataError(
-            f"{aside}: exists, with samples of an interrupted recording or of one still running: "
-            "rename it to keep them, or remove it"
+            f"{aside}: contains samples of an interrupted or running recording; rename it to keep them, or remove it"
         ) from None
     except OSError as error:
         raise DataError(f"{aside}: cannot be written: {reason(error)}") from error

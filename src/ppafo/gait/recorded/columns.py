@@ -84,7 +84,7 @@ def find_columns(
     if len(holders) > 1:
         files = " and ".join(table.file for table in holders)
         raise DataError(
-            f"{curve}: both {files} have the column {unsigned[0]!r}; give one of them, or name another column"
+            f"{curve}: {files} both have the column {unsigned[0]!r}; omit one file, or choose another column"
         )
     if holders:
         signs = [-1.0 if name.startswith("-") else 1.0 for name in names]
@@ -109,8 +109,8 @@ def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTa
         if twins:
             either = " or ".join(repr(_marker(name)) for name in twins if name[-2:] not in _COORDINATES[1:])
             raise DataError(
-                f"{curve}: {files} has {_marker(missing)!r} more than once, and they differ: choose one, "
-                f"{either}, in a gait map ({setting_text('columns')})"
+                f"{curve}: {files} has several different columns {_marker(missing)!r}; choose {either} in a gait "
+                f"map ({setting_text('columns')})"
             )
         reason = f"there is no column {missing!r}{nearest_column(missing, known)}"
         reasons.append(f"{curve}: {'no file has all of its columns' if missing in known else reason}")

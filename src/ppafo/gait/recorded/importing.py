@@ -230,12 +230,12 @@ def _check_enough(strides: StrideSelection, usable: list[Stride], walk: Mapping[
         filled = f"fill the gaps ({setting_text('longest_gap', needed, f'{needed:g} s')})"
         remedy = filled if needed <= LONGEST_FILLED else f"the longest gap of {longest:.3g} s cannot be filled"
         raise DataError(
-            f"{walk['shank_angle'].file}: has {count} without a lost sample, {least} are needed; {remedy}"
-            f"{', give' if fewer else ', or give'} a longer recording{fewer}"
+            f"{walk['shank_angle'].file}: has {count} without missing samples, at least {least} are needed; "
+            f"{remedy}{(', give' if fewer else ', or give')} a longer recording{fewer}"
         )
     raise DataError(
-        f"{walk['shank_angle'].file}: has {count} within angles and events ({events}; {spans}), {least} are needed; "
-        f"give a longer recording{fewer}"
+        f"{walk['shank_angle'].file}: has {count} covered by both angles and events ({events}; {spans}), at least "
+        f"{least} are needed; give a longer recording{fewer}"
     )
 
 

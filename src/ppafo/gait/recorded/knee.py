@@ -40,7 +40,7 @@ def knee_signals(
     if mapped.thigh is not None and mapped.thigh_length is None and stature is None:
         if is_default:
             return {}
-        raise DataError("knee.thigh needs a length: give knee.thigh_length in the gait map, or the stature")
+        raise DataError("knee.thigh needs the thigh length: give knee.thigh_length in the gait map, or the stature")
     thigh = mapped.thigh or ()
     found = find_columns("knee", (*mapped.forward, *mapped.up, *thigh), tables, is_default)
     if found is None:
@@ -50,21 +50,23 @@ def knee_signals(
     up, other = replace(found, terms=found.terms[slice(*ends)]).in_unit(mapped.unit, ("m/s^2", "m"))
     if mapped.thigh is not None:
         if "m/s^2" in (unit, other):
-            raise DataError(f"{found.table.file}: knee.thigh is added to positions of the hip in m, not to m/s^2")
+            raise DataError(
+                f"{found.table.file}: knee.thigh needs hip positions in m, not accelerations in "
+                "m/s^2; use positions, or omit knee.thigh"
+            )
         leaning = replace(found, terms=found.terms[ends[1] :], unit_key="knee.thigh_unit")
         lean, _ = leaning.in_unit(mapped.thigh_unit, ("rad",))
         for values, terms in ((forward, mapped.forward), (up, mapped.up)):
             if np.ptp(values) == 0.0:
                 raise DataError(
-                    f"{found.table.file}: the hip does not move ({', '.join(terms)} is constant), and without its "
-                    "motion the knee's is unknown; omit the stature, or knee in the gait map"
+                    f"{found.table.file}: the hip does not move ({', '.join(terms)} is constant), so the motion "
+                    "of the knee is unknown; omit the stature, or knee in the gait map"
                 )
         height = float(np.mean(up[np.isfinite(up)]))
         if -height > _HIP_HEIGHT:
             raise DataError(
-                f"{found.table.file}: the hip is {height:.2f} m high ({', '.join(mapped.up)}), below the ground, and "
-                f"{-height:.2f} m with the other sign: its sign is reversed; correct it in the file, or change the "
-                "sign of knee.up in a gait map"
+                f"{found.table.file}: the hip is {height:.2f} m high ({', '.join(mapped.up)}), which is below the "
+                "ground; its sign is reversed: correct the file, or change the sign of knee.up in a gait map"
             )
         # The file has the hip: the knee follows by the lean of the thigh.
         forward, up = knee_position(forward, up, lean, _thigh_length(mapped, stature))
@@ -108,9 +110,8 @@ def check_direction(walk: Mapping[str, Signal], signs_from: SignSource) -> None:
     speed = float((knee.values[-1] - knee.values[0]) / (knee.time[-1] - knee.time[0]))
     if speed < -_FASTEST_BACK:
         raise DataError(
-            f"{knee.file}: the knee goes back by {-speed:.2g} m/s: knee.forward points against the "
-            "direction of walking; "
-            f"{other_sign(signs_from, 'the sign of knee.forward')}"
+            f"{knee.file}: the knee moves backwards at {-speed:.2g} m/s, so knee.forward points against the "
+            f"walking direction; {other_sign(signs_from, 'the sign of knee.forward')}"
         )
 
 
@@ -126,5 +127,5 @@ def _thigh_length(mapped: KneeMap, stature: float | None) -> float:
     with refused_as(DataError, where, UnitError):
         length = parse_quantity(mapped.thigh_length, "m")
     if not low <= length <= high:
-        raise DataError(f"{where} is not plausible; a thigh is {low:g} to {high:g} m long")
+        raise DataError(f"{where}: must be from {low:g} to {high:g} m")
     return length

@@ -49,7 +49,7 @@ def form_of(path: str | Path, name: str = "") -> GaitForm:
         form = FORMS.get(name)
         if form is None:
             raise DataError(
-                f"there is no gait form '{one_line(name)}'{nearest_name(name, FORMS)}; available: {', '.join(FORMS)}"
+                f"there is no gait format '{one_line(name)}'{nearest_name(name, FORMS)}; available: {', '.join(FORMS)}"
             )
         return form
     # Any form may know the suffix: forms of other packages are loaded before it is refused.
@@ -135,7 +135,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     Raises DataError for a problem that ends the import, including all problems in ``wrong``.
     """
     if not files:
-        raise DataError("no file was given; a gait needs at least the angles of shank and ankle")
+        raise DataError("no file was given; a gait needs at least shank and ankle angles")
     cut, tables = (settings.longest_gap, settings.start, settings.end), []
     for path in files:
         with noted_in(wrong):

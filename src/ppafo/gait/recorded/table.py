@@ -72,7 +72,7 @@ def cut_table(
     rejected.
     """
     if table.time.size < 3:
-        raise DataError(f"{table.file}: has {table.time.size} rows; a stride needs several tens")
+        raise DataError(f"{table.file}: has only {table.time.size} rows; a stride needs several tens")
     low = float(table.time[0] if start is None else start)
     high = float(table.time[-1] if end is None else end)
     steps = np.diff(table.time)
@@ -95,8 +95,8 @@ def cut_table(
     inside = (table.time >= low) & (table.time <= high)
     if not inside.any():
         raise DataError(
-            f"{table.file}: has no samples from {low:g} to {high:g} s; the recording covers {table.time[0]:g} to "
-            f"{table.time[-1]:g} s: choose {argument_text('start')} and {argument_text('end')} within that"
+            f"{table.file}: has no samples from {low:g} to {high:g} s; choose {argument_text('start')} and "
+            f"{argument_text('end')} within the recording, {table.time[0]:g} to {table.time[-1]:g} s"
         )
     columns = {name: values[inside] for name, values in table.columns.items()}
     return replace(table, time=table.time[inside], columns=columns)

@@ -157,9 +157,9 @@ def foot_markers_angle(columns: CurveColumns, mapped: AngleMap, shank: Signal) -
     # Less than a tenth of a second of flat foot may be a pause of the swing.
     if np.count_nonzero(flat) < _LEAST_FLAT * recorded.rate:
         raise DataError(
-            f"{columns.table.file}: the line from {mapped.heel!r} to {mapped.toe!r} never stands still while the "
-            "shank leans forward, so the zero of the ankle is unknown; give the angle itself in ankle_angle.terms "
-            "of a gait map"
+            f"{columns.table.file}: the neutral ankle angle is unknown, because the line from {mapped.heel!r} to "
+            f"{mapped.toe!r} never rests while the shank leans forward; give the angle in ankle_angle.terms of a "
+            "gait map"
         )
     sign, neutral = mapped.sign_and_neutral()
     angle = _RIGHT_ANGLE + lean - (values - float(np.median(values[flat]))) - sign * neutral
@@ -172,12 +172,12 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
         return
     low, high = SHANK_RANGE
     travel = float(np.ptp(np.degrees(shank.values)))
-    range_text = f"covers a range of {travel:.2g} deg in the whole record, a walk {low:g} or more"
+    range_text = f"covers a range of {travel:.2g} deg in the whole recording, walking at least {low:g} deg"
     message = f"{shank.file}: shank_angle {range_text}"
     if mapped.terms is not None:
         # Radians that are called degrees have no event either, but a unit as a remedy.
         if travel < low and not low <= np.degrees(travel) <= high:
-            raise DataError(f"{message}: this is not walking, or these are not the columns of the shank")
+            raise DataError(f"{message}: the recording shows no walking, or the columns of the shank are wrong")
         return
     ends = {
         axis: [columns.table.columns.get(f"{label}.{axis}") for label in (mapped.knee, mapped.ankle)] for axis in "xyz"
@@ -188,8 +188,8 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
     length, longest = math.hypot(*means.values()), max(means, key=lambda axis: abs(means[axis]))
     if abs(means[mapped.vertical]) < _LEAST_UPRIGHT * length:
         raise DataError(
-            f"{shank.file}: the line from {mapped.knee!r} to {mapped.ankle!r} is longest along {longest}, and "
-            f"shank_angle.vertical is {mapped.vertical!r}: give {longest!r} in a gait map, for the ankle too"
+            f"{shank.file}: shank_angle.vertical = {mapped.vertical!r}, but the line from {mapped.knee!r} to "
+            f"{mapped.ankle!r} is longest along {longest!r}; give {longest!r} in a gait map, also for the ankle"
         )
     if travel >= low:
         return
@@ -199,7 +199,7 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
         leans = float(np.nanmax(lean) - np.nanmin(lean))
     if leans >= low:
         raise DataError(
-            f"{message}, and {leans:.2g} deg along {across}: shank_angle.forward is {mapped.forward!r}; "
-            f"give {across!r} or '-{across}', where the walk goes, in a gait map, for the ankle too"
+            f"{message}, but {leans:.2g} deg along {across}, and shank_angle.forward is {mapped.forward!r}; give "
+            f"{across!r} or '-{across}', the walking direction, in a gait map, also for the ankle"
         )
-    raise DataError(f"{message}: this is not walking; give a recording of walking")
+    raise DataError(f"{message}: the recording shows no walking; give a recording of walking")

@@ -177,13 +177,13 @@ def test_mistakes_are_one_line() -> None:
         compare(["torque-task-solenoid"])
     with pytest.raises(StudyError, match="two of the scenarios are named 'torque-task-solenoid'"):
         compare(["torque-task-solenoid", "torque-task-solenoid"])
-    with pytest.raises(StudyError, match="baseline: no configuration 'solenoids', did you mean 'solenoid'"):
+    with pytest.raises(StudyError, match="baseline: there is no configuration 'solenoids', did you mean 'solenoid'"):
         compare(study=STUDY, baseline="solenoids")
     with pytest.raises(StudyError, match="draws = 3: must be at least 32"):
         compare(study=STUDY, draws=3)
     with pytest.raises(StudyError, match=r"confidence = 1\.0"):
         compare(study=STUDY, confidence=1.0)
-    with pytest.raises(StudyError, match="draws = 64: nothing in this comparison is random; give a study"):
+    with pytest.raises(StudyError, match="draws = 64: nothing in this comparison is random; omit draws"):
         compare(["torque-task-solenoid", "torque-task-proportional"], draws=64)
 
 
@@ -233,5 +233,5 @@ def test_a_value_that_is_drawn_for_all_and_set_in_one_is_refused(
         name: ppafo.load_scenario("torque-task-proportional", ["run.duration=0.2 s", *own])
         for name, own in (("one", []), ("other", [override]))
     }
-    with pytest.raises(StudyError, match=f"the study draws '{path}' for every configuration, so the different values"):
+    with pytest.raises(StudyError, match=f"the study draws '{path}' for every configuration, so the values"):
         compare(pair, study=study, draws=32)

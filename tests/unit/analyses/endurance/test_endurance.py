@@ -71,7 +71,7 @@ def test_a_narrow_regulator_ends_the_run_early_for_want_of_flow() -> None:
 
 
 def test_a_flow_that_even_the_full_bottle_cannot_give_is_refused() -> None:
-    with pytest.raises(ParameterError, match=r"its regulator passes .* g/s"):
+    with pytest.raises(ParameterError, match=r"the full bottle passes at most .* g/s"):
         lasting(0.3, "regulator.area=0.01 mm^2", peak=4.5e-3)
 
 
@@ -139,8 +139,8 @@ def test_a_little_gas_that_flows_back_into_the_line_is_taken_off() -> None:
 @pytest.mark.parametrize(
     ("recording", "stride_time", "words"),
     [
-        (staircase(0.0, 2.2, 0.4), None, "never be empty"),
-        (staircase(6e-4, 2.2, 0.4), 3.0, "does not fit"),
+        (staircase(0.0, 2.2, 0.4), None, "would become empty"),
+        (staircase(6e-4, 2.2, 0.4), 3.0, "must not be longer than the recording"),
         (Recording("a", np.array([0.0, 1.0]), {"angle": Channel(np.zeros(2), "rad")}), None, "no channel"),
         (
             Recording("a", np.arange(3.0), {"supplied_mass": Channel(np.array([0.0, 2e-4, 1e-4]), "kg")}),
@@ -182,6 +182,6 @@ def test_the_verb_takes_recordings_one_or_several() -> None:
 
 def test_a_run_on_another_gas_than_the_bottle_holds_is_refused(tmp_path: Path) -> None:
     ppafo.simulate("torque-task-proportional", ["gas.species=air"]).save(tmp_path / "task")
-    with pytest.raises(ppafo.DataError, match=r"fed with gas of 28\.9. g/mol, and bottle 'paper-co2-9oz' holds CO2"):
+    with pytest.raises(ppafo.DataError, match=r"uses gas of 28\.9. g/mol, but bottle 'paper-co2-9oz' contains CO2"):
         ppafo.bottle(tmp_path / "task")
     assert ppafo.bottle(tmp_path / "task", bottle="air-48ci-3000psi").found.discharge.walking_time > 0.0

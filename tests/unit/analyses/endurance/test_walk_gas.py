@@ -70,12 +70,15 @@ def test_a_folder_says_what_the_walk_says(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ('{"format": "ppafo endurance"}', "is not the result of a ppafo walk"),
-        ('{"format": "ppafo walk", "configuration": {}}', "has no number at 'configuration.gait.stride_time'"),
-        ('{"format": "ppafo walk", "status": {"kind": "diverged"}}', "the walk diverged, so it cannot be repeated"),
+        ('{"format": "ppafo endurance"}', "is not a result of 'ppafo walk'"),
+        ('{"format": "ppafo walk", "configuration": {}}', "'configuration.gait.stride_time' must be a number"),
+        (
+            '{"format": "ppafo walk", "status": {"kind": "diverged"}}',
+            "the walk diverged, so its gas demand cannot be repeated",
+        ),
         ("[", "is not JSON"),
-        ('{"format": "ppafo walk", "status": "completed"}', "'status' is not a table of names and values"),
-        ('{"format": "ppafo walk", "configuration": 3}', "'configuration' is not a table of names and values"),
+        ('{"format": "ppafo walk", "status": "completed"}', "'status' must be a JSON object"),
+        ('{"format": "ppafo walk", "configuration": 3}', "'configuration' must be a JSON object"),
     ],
 )
 def test_a_folder_that_says_too_little_is_refused(tmp_path: Path, content: str, words: str) -> None:
@@ -87,16 +90,16 @@ def test_a_folder_that_says_too_little_is_refused(tmp_path: Path, content: str, 
 @pytest.mark.parametrize(
     ("path", "value", "words"),
     [
-        ("metrics", None, "'metrics' is not a table of names and values"),
-        ("metrics.gas", None, "has no number at 'metrics.gas.value'"),
-        ("metrics.gas.value", -1.0, "'metrics.gas.value' is -1, which is impossible for a walk"),
-        ("metrics.gas.value", 10**400, "has no number at 'metrics.gas.value'"),
+        ("metrics", None, "'metrics' must be a JSON object"),
+        ("metrics.gas", None, "'metrics.gas.value' must be a number"),
+        ("metrics.gas.value", -1.0, "'metrics.gas.value' = -1 is impossible for a walk"),
+        ("metrics.gas.value", 10**400, "'metrics.gas.value' must be a number"),
         (
             "configuration.gait.stride_time",
             0,
-            "'configuration.gait.stride_time' is 0, which is impossible for a walk",
+            "'configuration.gait.stride_time' = 0 is impossible for a walk",
         ),
-        ("configuration.gait", [], "has no number at 'configuration.gait.stride_time'"),
+        ("configuration.gait", [], "'configuration.gait.stride_time' must be a number"),
     ],
 )
 def test_a_damaged_walk_is_refused_in_one_line(
@@ -122,7 +125,7 @@ def test_a_recording_without_gas_is_refused(tmp_path: Path, capsys: pytest.Captu
     bare = Recording("bare", made.recording.time, {"angle": Channel(0.0 * made.recording.time, "rad")})
     folder = folder_of(replace(made, recording=bare), tmp_path / "walk")
     assert main(["bottle", str(folder)]) == 2
-    assert "has no channel 'supplied_mass'" in capsys.readouterr().err
+    assert "there is no channel 'supplied_mass'" in capsys.readouterr().err
 
 
 def test_a_walk_lasts_the_same_with_and_without_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -175,7 +178,7 @@ def test_several_recordings_have_one_folder_and_none_comes_twice(
 
 
 def test_a_walk_without_gas_lasts_for_ever() -> None:
-    with pytest.raises(DataError, match="never be empty"):
+    with pytest.raises(DataError, match="would become empty"):
         demand_of_walk(replace(pulses(5.0), gas_per_stride=0.0))
 
 
@@ -213,7 +216,9 @@ def test_every_door_says_how_long_a_device_lasts_in_the_same_words(
 
 
 def test_a_time_between_rests_without_a_rest_is_refused() -> None:
-    with pytest.raises(ParameterError, match=r"^walk is the walking time between two rests: give rest too, or longest"):
+    with pytest.raises(
+        ParameterError, match=r"^walk is the walking time between two rests; also give rest, or use longest"
+    ):
         endurance(gas_per_stride=3.0e-4, walk=60.0)
 
 

@@ -117,7 +117,7 @@ def test_runs_that_fail_count_as_not_met_and_are_said(of_curve: Callable[..., Fi
     assert found.value / BAR == pytest.approx(3.0, abs=1e-5)
     assert found.failed > 8
     assert "runs failed and count as not met; the first: diverged" in found.remarks[1]
-    with pytest.raises(StudyError, match="has a 'final_error'; the first: diverged"):
+    with pytest.raises(StudyError, match="gives the metric 'final_error'; the first: diverged"):
         of_curve(lambda p: np.full_like(p, np.nan))
 
 

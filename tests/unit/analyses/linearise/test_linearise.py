@@ -231,9 +231,9 @@ def test_a_time_is_taken_to_the_nearest_step_before_the_first_one_too() -> None:
 
 def test_what_python_hands_over_wrongly_is_refused_in_one_line(steady: LinearModel) -> None:
     assert steady.response([1.0]) == pytest.approx(steady.response(np.array([1.0])))  # type: ignore[arg-type]
-    with pytest.raises(ScenarioError, match=r"no output 'torqe', did you mean 'torque'.*there are: torque"):
+    with pytest.raises(ScenarioError, match=r"no output 'torqe', did you mean 'torque'.*available: torque"):
         steady.response(np.array([1.0]), "torqe")
-    with pytest.raises(ScenarioError, match="no input 'reference'; there are: command"):
+    with pytest.raises(ScenarioError, match="no input 'reference'; available: command"):
         steady.response(np.array([1.0]), source="reference")
     with pytest.raises(ArgumentError, match=r"at=None: must be a number of seconds, a time .* or 'equilibrium'"):
         linear(TASK, None)  # type: ignore[arg-type]
@@ -257,9 +257,9 @@ def test_without_a_leak_a_closed_valve_is_steady_and_its_sides_are_told_apart() 
 def test_what_has_no_linear_model_is_refused_in_one_line() -> None:
     for scenario, at, overrides, line in (
         (TASK, 9.0, (), "at='9 s' is outside the run, which lasts 3 s"),
-        (TASK, "equilibrium", (), "no equilibrium at 6 N m.*with the valve fully open the actuator comes to 5 N m"),
+        (TASK, "equilibrium", (), "no equilibrium at 6 N m.*with the valve fully open the actuator reaches 5 N m"),
         (TASK, "Equilibrium", (), "at: 'Equilibrium': must be a time such as .*, or 'equilibrium'"),
-        ("torque-task-solenoid", 1.0, (), "valve 'solenoid' opens fully or at a constant speed"),
+        ("torque-task-solenoid", 1.0, (), "valve 'solenoid' switches on and off"),
     ):
         with pytest.raises(ppafo.PpafoError, match=line) as refused:
             linear(scenario, at, overrides)

@@ -64,7 +64,7 @@ def test_results_load_again_from_their_folder(small_results: StudyResults) -> No
 
 
 def test_a_channel_that_was_not_kept_is_named_with_the_nearest(small_results: StudyResults) -> None:
-    with pytest.raises(StudyError, match=r"no trajectories of 'torqe' were kept, did you mean 'torque'\?"):
+    with pytest.raises(StudyError, match=r"the study stores no trajectories of 'torqe', did you mean 'torque'\?"):
         small_results.trajectories("torqe")
 
 

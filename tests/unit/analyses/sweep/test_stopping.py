@@ -232,16 +232,16 @@ def test_failed_draws_are_left_out_and_counted_or_refused() -> None:
     [
         (lambda: StoppingRule(0.0, False), "width = 0.0"),
         (lambda: StoppingRule(math.nan, False), "width = nan"),
-        (lambda: StoppingRule(1.0, False, first=4), "must be at least 32"),
-        (lambda: StoppingRule(1.0, False, first=512, maximum=256), "not more than the maximum"),
+        (lambda: StoppingRule(1.0, False, first=4), "must be from 32"),
+        (lambda: StoppingRule(1.0, False, first=512, maximum=256), "first must not exceed maximum"),
         (lambda: StoppingRule(1.0, False, confidence=0.2), "confidence = 0.2"),
-        (lambda: parse_statistic("median", METRIC, None), "statistic 'median' is not known"),
+        (lambda: parse_statistic("median", METRIC, None), "statistic 'median': must be 'mean'"),
         (lambda: parse_statistic("quantile 1.5", METRIC, None), "a fraction above 0 and below 1"),
         (lambda: parse_statistic("probability above 3 g", METRIC, None), "statistic 'probability above 3 g'"),
         (lambda: target_width(mean_of("N m"), METRIC, "3 g"), "width = '3 g'"),
         (
             lambda: target_width(parse_statistic("probability above 1 N m", METRIC, None), METRIC, "1 %"),
-            "plain number, such as 0.01",
+            "plain number for a probability, for example 0.01",
         ),
     ],
 )

@@ -125,7 +125,7 @@ def test_noise_is_drawn_for_every_candidate_alike_and_judged_on_fresh_draws() ->
     assert one.after.fresh["rms_error"] == pytest.approx(one.after.values["rms_error"], rel=0.1)
     assert one.after.share_of_noise["rms_error"].high == pytest.approx(1.0)
     assert any("due to sensor noise" in line for line in one.remarks)
-    with pytest.raises(StudyError, match="all candidates get the same noise"):
+    with pytest.raises(StudyError, match="all candidates use the same noise"):
         load_tuning(changed(search=[{"path": "sensors.seed", "minimum": 1, "maximum": 5}]))
 
 
@@ -147,7 +147,7 @@ def test_the_tunings_of_the_package_load_and_fit_the_published_schema() -> None:
         ({"objective": []}, "objective"),
         ({"surch": []}, "unknown key 'surch', did you mean 'search'"),
         ({"scenario": "torque-task-proportionel"}, "did you mean 'torque-task-proportional'"),
-        ({"search": [DOCUMENT["search"][0]] * 2}, "'controller.proportional_gain' is searched twice"),
+        ({"search": [DOCUMENT["search"][0]] * 2}, "'controller.proportional_gain' appears in two [[search]] tables"),
         ({"search": [DOCUMENT["search"][0] | {"path": "controller.proportional"}]}, "did you mean"),
         ({"search": [DOCUMENT["search"][0] | {"minimum": "2 1/(N m)"}]}, "must be less than maximum"),
         ({"search": [DOCUMENT["search"][0] | {"minimum": "2 kg"}]}, "search 'controller.proportional_gain'"),
@@ -160,8 +160,8 @@ def test_the_tunings_of_the_package_load_and_fit_the_published_schema() -> None:
         ({"objective": [{"metric": "rms_eror"}]}, "no metric 'rms_eror', did you mean 'rms_error'"),
         ({"objective": [{"metric": "rms_error", "weight": 0.0}]}, "weight = 0 has no effect"),
         ({"objective": [{"metric": "rms_error", "scale": "2 g"}]}, "objective 'rms_error': scale = '2 g'"),
-        ({"objective": [{"metric": "rms_error", "scale": "0 N m"}]}, "must be more than 0"),
-        ({"constraints": [{"metric": "rms_error"}]}, "needs either at_most or at_least, it has none"),
+        ({"objective": [{"metric": "rms_error", "scale": "0 N m"}]}, "must be above 0"),
+        ({"constraints": [{"metric": "rms_error"}]}, "give at_most or at_least, it has none"),
         ({"constraints": [{"metric": "rms_error", "at_most": "2 g"}]}, "constraint 'rms_error' = '2 g'"),
         (
             {"robust": {"study": "torque-task-uncertain"}},
@@ -172,7 +172,7 @@ def test_the_tunings_of_the_package_load_and_fit_the_published_schema() -> None:
                 "robust": {"study": "torque-task-uncertainty"},
                 "search": [{"path": "supply.pressure", "minimum": "40 psi_g", "maximum": "60 psi_g"}],
             },
-            "draws 'supply.pressure', which is searched here",
+            "draws 'supply.pressure', which is also searched",
         ),
     ],
 )
@@ -185,7 +185,7 @@ def test_a_file_that_makes_no_sense_is_one_line(changes: dict[str, Any], text: s
 
 def test_a_goal_that_is_zero_before_needs_a_scale() -> None:
     document = changed(objective=[{"metric": "mechanical_work"}])
-    with pytest.raises(StudyError, match="'mechanical_work' is 0 before tuning, which cannot be the scale; give one"):
+    with pytest.raises(StudyError, match="'mechanical_work' is 0 before tuning and cannot serve as scale; set"):
         tune(document)
 
 
@@ -225,7 +225,7 @@ def test_present_values_are_found(path: str, value: float) -> None:
 
 def test_a_value_that_is_not_there_yet_is_said() -> None:
     conductance = {"path": "valve.sonic_conductance", "minimum": "1e-9 m^3/(s Pa)", "maximum": "1e-8 m^3/(s Pa)"}
-    with pytest.raises(StudyError, match=r"has no value for 'valve.sonic_conductance'; set one"):
+    with pytest.raises(StudyError, match=r"has no value for 'valve.sonic_conductance'; set it"):
         load_tuning(changed(search=[conductance]))
 
 

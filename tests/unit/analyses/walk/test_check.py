@@ -20,5 +20,5 @@ def test_a_walk_whose_torque_loop_oscillates_fails_a_check_only() -> None:
 
 
 def test_a_check_is_of_one_wearer() -> None:
-    with pytest.raises(ArgumentError, match="check: is for the walk of one wearer"):
+    with pytest.raises(ArgumentError, match="check: applies to the walk of one wearer"):
         walk_with_and_without("proportional", wearers=2, check=True)

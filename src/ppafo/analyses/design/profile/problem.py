@@ -95,7 +95,7 @@ def read_profile(table: ProfileSection, folder: Path, file: str) -> RequiredTorq
     where = f"{file}: profile"
     is_typed = bool(table.time or table.torque)
     if is_typed == (table.recording is not None):
-        raise StudyError(f"{where}: give either recording, or time and torque")
+        raise StudyError(f"{where}: give either a recording, or both time and torque")
     if is_typed:
         time, torque, kind = *_profile_of_table(table, where), "typed"
     else:
@@ -104,12 +104,15 @@ def read_profile(table: ProfileSection, folder: Path, file: str) -> RequiredTorq
             channel: Any = recording[table.channel]
             unit = recording.unit(table.channel)
         if unit != _TORQUE:
-            raise StudyError(f"{where}.channel = '{table.channel}' is in '{unit}'; a torque in {_TORQUE} is needed")
+            raise StudyError(
+                f"{where}.channel = '{table.channel}' has the unit '{unit}'; choose a channel with a "
+                f"torque in {_TORQUE}"
+            )
         if len(recording) < 2:
-            raise StudyError(f"{where}.recording: has one sample only; a profile needs two or more")
+            raise StudyError(f"{where}.recording: has only one sample; a torque profile needs two or more")
         time, torque, kind = recording.time - recording.time[0], table.scale * channel, recording.kind
     if not np.any(torque):
-        raise StudyError(f"{where}: is 0 {_TORQUE} throughout; give a profile that requires a torque")
+        raise StudyError(f"{where}: the torque is 0 {_TORQUE} throughout; give a profile with a torque other than 0")
     # The last sample is the first of the next repetition. Where the two differ it stays, a moment earlier: the table
     # then jumps as the profile does.
     samples = time[:-1], torque[:-1]
@@ -137,8 +140,8 @@ def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:
 def _profile_of_table(table: ProfileSection, where: str) -> tuple[Floats, Floats]:
     if len(table.time) != len(table.torque) or len(table.time) < 2:
         raise StudyError(
-            f"{where}: time has {len(table.time)} and torque {len(table.torque)} entries; give as many of each, "
-            f"two or more"
+            f"{where}: time has {len(table.time)} entries and torque {len(table.torque)}; both need the same "
+            "number, two or more"
         )
     series = []
     for texts, unit, name in ((table.time, "s", "time"), (table.torque, _TORQUE, "torque")):
@@ -149,7 +152,7 @@ def _profile_of_table(table: ProfileSection, where: str) -> tuple[Floats, Floats
         series.append(np.array(numbers))
     time, torque = series
     if time[0] != 0.0 or np.any(np.diff(time) <= 0.0):
-        raise StudyError(f"{where}.time: must start at '0 s' and increase from entry to entry")
+        raise StudyError(f"{where}.time: must start at '0 s' and increase strictly")
     return time, table.scale * torque
 
 
@@ -290,8 +293,8 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
     for valve in valves:
         if valve.kind != kind:
             raise StudyError(
-                f"{file}: parts.valves: '{valve.name}' is a {valve.kind} valve; scenario '{scenario.name}' and its "
-                f"controller are for a {kind} one"
+                f"{file}: parts.valves: '{valve.name}' is a {valve.kind} valve, but scenario '{scenario.name}' "
+                f"needs a {kind} valve"
             )
     # The settings that multiply a torque error.
     quantities = CONTROLLERS[scenario.controller.kind].quantities
@@ -303,12 +306,12 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
     lowest, highest = pressures
     if not atmosphere < lowest < highest:
         raise StudyError(
-            f"{file}: pressure.lowest = '{document.pressure.lowest}' must be above the atmosphere and below "
+            f"{file}: pressure.lowest = '{document.pressure.lowest}': must be above the atmosphere and below "
             f"pressure.highest = '{document.pressure.highest}'"
         )
     use = document.use
     if (use.repetitions is None) == (use.hours is None):
-        raise StudyError(f"{file}: use: give either repetitions or hours")
+        raise StudyError(f"{file}: [use]: give either repetitions or hours")
     hours = _SECONDS_PER_HOUR * float(use.hours or 0.0)
     limit = document.limits.rms_error
     try:
@@ -317,7 +320,7 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
     except UnitError as error:
         raise StudyError(f"{file}: limits.rms_error = '{limit}': {error}; write '0.5 N m' or '5 %'") from error
     if largest_error <= 0.0:
-        raise StudyError(f"{file}: limits.rms_error = '{limit}': must be more than 0")
+        raise StudyError(f"{file}: limits.rms_error = '{limit}': must be above 0")
     return SizingProblem(
         name=document.name,
         description=document.description,
@@ -345,7 +348,10 @@ def _scenario(document: SizingFile, profile: RequiredTorque, folder: Path, file:
     plain = load_scenario(name, document.overrides)
     plain.device.check_torque_constant("the size of a device")
     if plain.controller.is_open_loop:
-        raise StudyError(f"{file}: scenario '{plain.name}' follows no reference (controller '{plain.controller.kind}')")
+        raise StudyError(
+            f"{file}: scenario '{plain.name}' has no reference (controller.kind = "
+            f"'{plain.controller.kind}'); choose a scenario with a reference"
+        )
     # The least common multiple of both times: the run then ends with a sample of the controller and of the output.
     a, b = (
         Fraction(interval).limit_denominator(_LARGEST_DENOMINATOR)

@@ -174,7 +174,7 @@ def try_pressures(trials: Trials, valve: Part) -> Trial:
     tried = trials.best(valve, np.linspace(problem.lowest_pressure, highest_pressure(problem, valve), GRID))
     if np.isnan(tried["error"]).all():
         reason = next(iter(trials.failures), "no reason was given")
-        raise StudyError(f"{problem.file}: every run with '{valve.name}' failed; the first: {reason}")
+        raise StudyError(f"{problem.file}: every run with valve '{valve.name}' failed; the first failure: {reason}")
     while lowest := first_of(works_in(problem, tried)):
         lower, upper = tried["pressure"][lowest - 1 : lowest + 1]
         if upper - lower <= FINENESS:

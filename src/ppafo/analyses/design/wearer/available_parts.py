@@ -50,7 +50,9 @@ def shelf_of(catalogue: str | Path) -> AvailableParts:
     groups = {group: user_groups[group] or parts for group, parts in package_groups.items()}
     groups["valves"] = {name: part for name, part in groups["valves"].items() if part.kind in WALKS}
     if not groups["valves"]:
-        raise StudyError(f"--catalogue {catalogue}: no valve is of a kind that walks: {', '.join(WALKS)}")
+        raise StudyError(
+            f"--catalogue {catalogue}: has no valve that a walk supports; supported kinds: {', '.join(WALKS)}"
+        )
     is_own = Path(catalogue).suffix == ".toml"
     return AvailableParts(
         groups, frozenset(name for name in user_groups if user_groups[name] and is_own), str(catalogue)

@@ -103,8 +103,8 @@ def check_requirements(requirements: DesignRequirements) -> None:
     if requirements.stature is None and not low <= height <= high:
         lightest, heaviest = (BODY_MASS_INDEX * tall * tall for tall in STATURES)
         raise StudyError(
-            f"--mass: {weight:g} kg: give --stature too; it is assumed from body mass for adults of {lightest:.1f} to "
-            f"{heaviest:.0f} kg only"
+            f"--mass: {weight:g} kg: give --stature too; it is derived from body mass only for {lightest:.1f} to "
+            f"{heaviest:.0f} kg"
         )
     if not requirements.pressure > STANDARD_ATMOSPHERE:
         raise StudyError("--pressure: must be above the atmosphere, for example '50 psi_g'")

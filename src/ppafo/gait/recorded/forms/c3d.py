@@ -59,7 +59,7 @@ def read_c3d(path: str | Path) -> MotionTable:
     rates = np.atleast_1d(parameters["POINT"]["RATE"]["value"])
     rate = float(rates[0]) if rates.size else 0.0
     if not 0.0 < rate < np.inf:
-        raise DataError(f"{path}: POINT:RATE is {rate:g}; points need a rate above 0 Hz")
+        raise DataError(f"{path}: POINT:RATE is {rate:g} Hz; it must be above 0 Hz")
     points: Floats = content["data"]["points"]
     # The labels, without the subject's name before a colon.
     group = parameters["POINT"]

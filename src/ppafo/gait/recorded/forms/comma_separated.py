@@ -36,7 +36,7 @@ def _recognises(path: str | Path) -> bool:
 def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Convention:
     """Return the map of the package's column names and signs; raises DataError for a left foot."""
     if side != "right":
-        raise DataError(f"a CSV file without a gait map has the columns of one foot; omit {setting_text('side')} left")
+        raise DataError(f"a CSV file without a gait map contains one foot; omit {setting_text('side')} left")
     return Convention(package_map())
 
 
@@ -76,11 +76,11 @@ def read_plain_csv(path: str | Path) -> MotionTable:
         at = 0
     if names[at].lower() not in _TIMES:
         raise DataError(
-            f"{path}: the first column must be 'time', it is {one_line(names[at])[:_LONGEST_SHOWN]!r}; write a mean "
-            f"stride over 0 to 100 % against time, repeated at least twice"
+            f"{path}: the first column must be 'time', it is {one_line(names[at])[:_LONGEST_SHOWN]!r}; give at "
+            "least two strides over time instead of one mean stride over percent"
         )
     if "" in names[at:]:
-        raise DataError(f"{path}: a column has no name; every column needs a name of its own")
+        raise DataError(f"{path}: a column has no name; name every column")
     # A decimal comma shows only where commas do not separate the cells.
     has_comma = delimiter != "," and any(re.search(r"\d,\d", line) for line in lines[first + 1 :])
     with refused_as(DataError, str(path), DataError):

@@ -250,8 +250,8 @@ def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tup
     if len(fitting) != 1:
         known = ", ".join(repr(unit) for unit in _FACTORS[kind])
         raise DataError(
-            f"{table.file}: column {name!r} reaches {peak:.4g} and its unit, {stated or 'not stated'!r}, does not fit "
-            f"a {kind} of walking; give it in a gait map: {known}"
+            f"{table.file}: column {name!r} reaches {peak:.4g}, which is implausible for a {kind} of walking in "
+            f"the unit {stated or 'not stated'!r}; give its unit in a gait map: {known}"
         )
     was = f"the file states {stated!r}" if stated in _FACTORS[kind] else "the file does not state it"
     return fitting[0], [f"column '{name}' was read in {fitting[0] or 'body weights'} by its size: {was}"]

@@ -28,7 +28,7 @@ def _read(path: str | Path) -> MotionTable:
     name = next((name for name in file.columns if name.rpartition(".")[2].lower() in _TIMES), None)
     if name is None:
         names = ", ".join(list(file.columns)[:12])
-        raise DataError(f"{path}: no variable is called 'time' or 't'; it has {names}{file.advice_on_objects()}")
+        raise DataError(f"{path}: there is no variable 'time' or 't'; available: {names}{file.advice_on_objects()}")
     time = file.columns[name]
     columns = {other: values for other, values in file.columns.items() if other != name and values.size == time.size}
     columns |= {
@@ -38,7 +38,7 @@ def _read(path: str | Path) -> MotionTable:
     }
     stalled = np.flatnonzero(np.diff(time) <= 0.0)
     if stalled.size:
-        raise DataError(f"{path}: {name} does not increase after its sample {stalled[0] + 1}")
+        raise DataError(f"{path}: {name} does not increase after sample {stalled[0] + 1}")
     # The unit of angles that the kept header of an OpenSim table states.
     stated = [match[1].lower() for word in file.words if (match := _DEGREES.search(word))]
     angle = {"yes": "deg", "no": "rad"}[stated[0]] if stated else ""

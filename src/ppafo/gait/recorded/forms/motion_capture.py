@@ -49,7 +49,7 @@ def _rate_in(path: str | Path, cell: str, line: int) -> float:
         rate = 0.0
     if not 0.0 < rate < np.inf:
         raise DataError(
-            f"{path}: line {line}: the frame rate is {one_line(cell)[:20]!r}; it must be a number above 0 Hz"
+            f"{path}: line {line}: the frame rate must be a number above 0 Hz, it is {one_line(cell)[:20]!r}"
         )
     return rate
 
@@ -108,7 +108,9 @@ def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBl
     delimiter = max(",;\t", key=head[2].count) if len(head) == 4 else ","
     axes = cells_of(head[2], delimiter) if len(head) == 4 else []
     if [axis.lower() for axis in axes[:2]] != ["frame", "sub frame"]:
-        raise DataError(f"{path}: line {start + 4}: must begin with 'Frame' and 'Sub Frame', as Nexus writes it")
+        raise DataError(
+            f"{path}: line {start + 4}: must begin with 'Frame' and 'Sub Frame'; export the file from Nexus again"
+        )
     labels, last = [], ""
     written = cells_of(head[1], delimiter)
     for label in [*written, *[""] * len(axes)][: len(axes)]:
@@ -166,7 +168,7 @@ def _read_qualisys(path: str | Path) -> MotionTable:
     block = NumberBlock(lines, first, "\t", decimal="," if "," in lines[min(first, len(lines) - 1)] else ".")
     units = [*["", "s"][: len(before)], *["mm"] * len(names)]
     if width < len(before) + len(names) - 2:
-        raise DataError(f"{path}: line {first + 1} has {width} values for {len(labels)} markers")
+        raise DataError(f"{path}: line {first + 1} has {width} values, expected {len(labels)} (one for each marker)")
     frame_rate = None if is_counted else _rate_in(path, rate, line + 1)
     clock = "time" if is_counted else ""
     return table_of(path, block, [*before, *names], units, clock, frame_rate=frame_rate, noun="markers")
@@ -185,7 +187,9 @@ def _read_motive(path: str | Path) -> MotionTable:
         # Some exports leave out what their rows are: types, names, and further ones above the quantities.
         rows = {"Type": above[0], "Name": above[1]}
     if at < 0 or "Name" not in rows:
-        raise DataError(f"{path}: has no header 'Frame, Time (Seconds), X, Y, Z, ...' below the names of its markers")
+        raise DataError(
+            f"{path}: has no header 'Frame, Time (Seconds), X, Y, Z, ...' below the marker names; export the file again"
+        )
     axes, quantities = cells_of(lines[at], ","), above[-1]
     kinds, labels = rows.get("Type", rows["Name"]), rows["Name"]
     names = []
@@ -194,7 +198,7 @@ def _read_motive(path: str | Path) -> MotionTable:
         is_marker = "marker" in kind.lower() and quantity.lower() == "position" and axis.lower() in AXES
         names.append(f"{bare_label(label)}.{axis.lower()}" if is_marker else "")
     if not any(names):
-        raise DataError(f"{path}: has no columns of markers; export the take with Markers, and their Position")
+        raise DataError(f"{path}: has no marker positions; export the take with Markers and Position")
     names[1] = "time"
     units = ["", "s", *[unit] * (len(names) - 2)]
     return table_of(path, NumberBlock(lines, at + 1, ","), names, units, "time", noun="markers")
@@ -221,7 +225,7 @@ def _read_bts(path: str | Path) -> MotionTable:
     kind = stated.get("Type:", "")
     if at < 0 or kind != "Point 3D tracks":
         raise DataError(
-            f"{path}: has '{one_line(kind)[:40]}' in the place of markers; export 'Point 3D tracks', with the line "
+            f"{path}: contains '{one_line(kind)[:40]}' instead of markers; export 'Point 3D tracks' with the line "
             "'Frame, Time, ...' above the numbers"
         )
     unit = stated.get("Measure unit:", "")

@@ -197,21 +197,25 @@ def test_simulated_repetitions_are_covered_to_a_whole_sample(folder: Path) -> No
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ("enfield-ls-v05s", "festo-vovg-5v-pair", "'festo-vovg-5v-pair' is a solenoid valve; scenario"),
+        ("enfield-ls-v05s", "festo-vovg-5v-pair", "'festo-vovg-5v-pair' is a solenoid valve, but scenario"),
         ("co2-3_5oz", "co2-3oz", "bottles has no part 'co2-3oz', did you mean 'co2-3_5oz'?"),
-        ("repetitions = 100", "", "use: give either repetitions or hours"),
-        ("repetitions = 100", "repetitions = 100\nhours = 1.0", "use: give either repetitions or hours"),
+        ("repetitions = 100", "", "[use]: give either repetitions or hours"),
+        ("repetitions = 100", "repetitions = 100\nhours = 1.0", "[use]: give either repetitions or hours"),
         ('"0.4 N m"', '"0.4"', "limits.rms_error = '0.4'"),
-        ('"0.4 N m"', '"0 %"', "must be more than 0"),
+        ('"0.4 N m"', '"0 %"', "must be above 0"),
         ('time = ["0 s", "0.3 s"', 'time = ["0.1 s", "0.3 s"', "must start at '0 s' and increase"),
         ('time = ["0 s", "0.3 s"', 'time = ["0 s", "0.7 s"', "must start at '0 s' and increase"),
-        ('time = ["0 s", "0.3 s"', 'time = ["0 s"', "time has 4 and torque 5 entries"),
-        ('"4 N m", "4 N m"', '"0 N m", "0 N m"', "is 0 N m throughout; give a profile that requires a torque"),
+        ('time = ["0 s", "0.3 s"', 'time = ["0 s"', "time has 4 entries and torque 5"),
+        (
+            '"4 N m", "4 N m"',
+            '"0 N m", "0 N m"',
+            "the torque is 0 N m throughout; give a profile with a torque other than 0",
+        ),
         ('"4 N m", "4 N m"', '"4 N", "4 N m"', "unit 'N' does not fit"),
-        ("[use]", 'recording = "a.csv"\n[use]', "give either recording, or time and torque"),
+        ("[use]", 'recording = "a.csv"\n[use]', "give either a recording, or both time and torque"),
         ("[use]", '[pressure]\nlowest = "-3 psi_g"\n[use]', "must be above the atmosphere and below"),
         ("[use]", "[usage]", "unknown key 'usage', did you mean 'use'?"),
-        ("torque-task-proportional", "step-response", "scenario 'step-response' follows no reference"),
+        ("torque-task-proportional", "step-response", "scenario 'step-response' has no reference"),
         ("torque-task-proportional", "torque-task-proportionel", "there is no scenario 'torque-task-proportionel'"),
     ],
 )
@@ -229,7 +233,9 @@ def test_runs_that_all_fail_are_said_in_one_line(folder: Path) -> None:
         "simulated = 1", 'simulated = 1\noverrides = ["actuator.dead_volume_1=1e-6 mm^3", "motion.angle=20 deg"]'
     )
     (folder / "failing.toml").write_text(late)
-    with pytest.raises(PpafoError, match=r"every run with 'enfield-ls-v05s' failed; the first: ") as caught:
+    with pytest.raises(
+        PpafoError, match=r"every run with valve 'enfield-ls-v05s' failed; the first failure: "
+    ) as caught:
         design(folder / "failing.toml")
     assert "\n" not in str(caught.value)
 
@@ -239,7 +245,7 @@ def test_runs_that_all_fail_are_said_in_one_line(folder: Path) -> None:
     [
         ("time [s],torque [N]\n0,1\n1,2\n", "unit 'N' does not fit"),
         ("time [s],moment [N m]\n0,1\n1,2\n", "there is no channel 'torque'"),
-        ("time [s],torque [N m]\n0,1\n", "has one sample only"),
+        ("time [s],torque [N m]\n0,1\n", "has only one sample"),
     ],
 )
 def test_a_recording_that_is_no_profile_is_one_line(tmp_path: Path, content: str, message: str) -> None:
