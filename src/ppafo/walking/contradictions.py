@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ppafo.arguments.door import argument_text
+from ppafo.arguments.door import override_text
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at, larger, smaller
@@ -108,7 +108,7 @@ def check_walk(scenario: Scenario, reading: DocumentReader) -> None:
             default = shown_text(number, quantity.unit, unit=_IN_FILES.get(quantity.unit, ""))
             raise ScenarioError(
                 f"{reading.file}: {path}, which is not given and takes its default, {default}: {reason(0)}; "
-                f"give it in the file or with {argument_text('overrides', f'{path}=...', '--set')}"
+                f"give it in the file or with {override_text([f'{path}=...'])}"
             )
 
 
