@@ -7,7 +7,7 @@ from typing import TextIO, final
 
 from ppafo import interrupts
 
-_BETWEEN_LINES = 10.0
+_BETWEEN_LINES = 5.0
 """Time [s] between two lines if the output is not a terminal."""
 
 

@@ -33,6 +33,8 @@ Evaluation = Callable[[Mapping[str, Floats]], tuple[Rows, str]]
 FAILED = "failed"
 _AT_ONCE, _SLOW_AT_ONCE = 16_384, 32
 """Largest number of runs between two reports: in general, and for a Python controller."""
+_FIRST_AT_ONCE, _BETWEEN_REPORTS = 1024, 3.0
+"""Largest number of runs before the first report, and time [s] for which later ones are sized."""
 
 
 @final
@@ -75,9 +77,17 @@ class Runs:
         """Return the rows of runs with these values [SI] by path, each column (runs,)."""
         runs = len(next(iter(columns.values())))
         parts = []
-        for first in range(0, runs, self._at_once):
-            part = {path: values[first : first + self._at_once] for path, values in columns.items()}
+        if not self._counter.done:
+            # A model may be compiled before the first run ends.
+            self._counter.add(0, 0)
+        first, size = 0, min(self._at_once, _FIRST_AT_ONCE)
+        while first < runs:
+            started = time.monotonic()
+            part = {path: values[first : first + size] for path, values in columns.items()}
             rows, reason = self._evaluate(part)
+            # Numbers that follow the varied ones may take longer than the runs, which no estimate knows.
+            first, rate = first + size, size / max(time.monotonic() - started, 1.0e-6)
+            size = max(1, min(self._at_once, int(_BETWEEN_REPORTS * rate)))
             parts.append(rows)
             self._parts.append({**part, **rows})
             self.reason = self.reason or reason

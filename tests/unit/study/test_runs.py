@@ -11,7 +11,7 @@ from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats
 from ppafo.study.blocks import runs_at_once
-from ppafo.study.runs import FAILED, RunCounter, Runs, scenario_runs, settled
+from ppafo.study.runs import FAILED, Rows, RunCounter, Runs, scenario_runs, settled
 from tests.model_runs import model_runs
 
 SHORT = ("run.duration=0.2 s",)
@@ -70,6 +70,26 @@ def test_the_table_has_all_rows_with_the_values_that_made_them() -> None:
     assert runs.table["x"].tolist() == [1.0, -4.0, 9.0]
     assert runs.table[FAILED].tolist() == [False, True, False]
     assert (runs.count, runs.failures, runs.reason) == (3, 1, "diverged")
+
+
+def test_the_first_count_comes_before_the_first_run_and_slow_runs_are_counted_in_fewer_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now: list[float] = [0.0]
+    sizes: list[int] = []
+    seen: list[Progress] = []
+
+    def slow(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
+        assert seen, "a count is there before anything is computed"
+        sizes.append(columns["x"].size)
+        now[0] += 0.01 * columns["x"].size
+        return {"y": columns["x"], FAILED: np.zeros(columns["x"].size, dtype=np.bool_)}, ""
+
+    monkeypatch.setattr("ppafo.study.runs.time.monotonic", lambda: now[0])
+    rows = Runs(slow, ["y"], RunCounter(2000, seen.append), 16_384).run({"x": np.arange(2000.0)})
+    assert rows["y"].tolist() == np.arange(2000.0).tolist()
+    assert (seen[0].done, sizes[0]) == (0, 1024)
+    assert max(sizes[1:]) == 300, "3 s at 10 ms each"
 
 
 def test_progress_grows_where_there_are_more_runs_than_were_thought() -> None:

@@ -281,6 +281,8 @@ def _compute_missing_chunks(store: StudyStore, threads: int | None, progress: Re
     known = store.finished()
     earlier = sum(chunk.runs for chunk in known)
     counter = RunCounter(study.runs, progress, earlier, sum(chunk.failed for chunk in known))
+    # The first chunk may wait for a compiler.
+    counter.add(0, 0)
     missing = sorted(set(range(chunk_count(study))) - {chunk.number for chunk in known})
     # Rows change below: an old summary would pass for a finished study meanwhile.
     if missing and SUMMARY in folder.names():
