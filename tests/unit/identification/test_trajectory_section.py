@@ -414,7 +414,7 @@ def test_a_held_vane_is_fitted_in_its_pressures(solve: Solve, laboratory: Path) 
         (TANK.replace("60 cm^3", "0 cm^3"), "volume = '0 cm^3' must be above zero"),
         (TANK.replace("60 cm^3", "60 psi"), "volume"),
         (f"{TANK}inputs = ['command', 'angle']\n", "the vane is locked or absent, but inputs has 'angle'"),
-        (f"{TANK}scenario = 'step-response'\n", "volume and a scenario"),
+        (f"{TANK}scenario = 'step-response'\n", "volume cannot be combined with a scenario"),
         (f"{STEP}inputs = ['angel']\n", "did you mean 'angle'"),
     ],
 )
