@@ -6,6 +6,7 @@ range and how often the valve is thrown over. Runs near its limits are counted a
 they are good. All is synthetic.
 """
 
+import ast
 import json
 import math
 import random
@@ -21,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.errors import PpafoError
+from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.reach import torque_reach
 from ppafo.running import tried
 from ppafo.simulation.loading import scenario_from_dict
@@ -125,6 +127,9 @@ def draw_joint(draw: random.Random, kind: str, folder: Path, number: int) -> Pat
         ("valves.pair.closing_delay", log(2.0, 20.0), "ms"),
         ("valves.pair.switching_interval", log(4.0, 50.0), "ms"),
     ]
+    if kind == "bladder":
+        # Its one chamber refuses the numbers of a second one.
+        numbers = [item for item in numbers if item[0] not in OF_SECOND_CHAMBER]
     head = (
         f'schema_version = 1\nname = "joint{number}"\ntitle = "Drawn joint {number}: {kind}"\ndefault_valve = "prop"\n'
         f'[valves.prop]\nkind = "proportional"\n[valves.pair]\nkind = "solenoid"\n{section}'
@@ -284,8 +289,8 @@ def judge(result: Result, only_switches: bool) -> str:
 
 def printed_remedy(sentence: str) -> list[str]:
     """Overrides of the remedy that a sentence prints as tried; none where it prints none."""
-    found = re.search(r"; with (.*) it follows, as a further run shows", sentence)
-    return [] if found is None else [text.replace(" = ", "=", 1) for text in re.findall(r"`([^`]*)`", found[1])]
+    found = re.search(r"; with overrides=(.*) it follows, as a further run shows", sentence)
+    return [] if found is None else list(ast.literal_eval(found[1]))
 
 
 def run_joints(seed: int, joints: int, log: Path, kinds: Sequence[str] = KINDS) -> list[dict[str, Any]]:

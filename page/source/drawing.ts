@@ -36,7 +36,7 @@ export class Drawing {
     this.root = shape(
       "svg",
       { viewBox: "0 0 384 204", role: "img", class: "drawing" },
-      shape("title", {}, `${name}: vane, chambers, valve, leg and foot`),
+      shape("title", {}, `${name}: actuator, chambers, valve, leg and foot`),
       ...this.chambers,
       ...this.ways,
       this.vane,

@@ -3,23 +3,24 @@
 The extensive code of walks is only loaded on request.
 """
 
-from collections.abc import Iterable, Mapping
+import shlex
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ppafo.arguments import Overrides, checked
-from ppafo.documents.toml_text import beside, label
+from ppafo.documents.toml_text import assignments, beside, label, table_lines
 from ppafo.errors import ScenarioError
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.loading import set_or_load
-from ppafo.parameters.overrides import read_overrides
+from ppafo.parameters.overrides import over, read_overrides
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import loading as of_vanes
 from ppafo.simulation import schema
 from ppafo.simulation.document import ScenarioRequest, kind_at
 from ppafo.simulation.motion_kind import is_walk
-from ppafo.simulation.overrides import over_layer
+from ppafo.simulation.overrides import apply_overrides, over_layer
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import nearest_name
 
@@ -146,6 +147,34 @@ def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:
     )
     read = of_vanes.scenario_of(replace(before, overrides=every), layout)
     return read if custom is None else read.controlled_by(custom)
+
+
+def usage_text(scenario: Scenario) -> str:
+    """Return the command that runs a scenario with its overrides, and the tables of a file that include these."""
+    origin, command = scenario.origin, scenario.motion.motion_kind.command
+    words = [word for override in origin.overrides for word in ("--set", override)]
+    name = origin.file or scenario.name
+    return "\n".join((shlex.join(("ppafo", command, name, *words)), "", _IN_FILE, *_changed_tables(scenario)))
+
+
+_IN_FILE = "# or in the file of a scenario, in place of the tables of these names"
+
+
+def _changed_tables(scenario: Scenario) -> Iterator[str]:
+    """Yield the TOML lines of the tables in which a scenario file would differ with the overrides of a scenario."""
+    request = of_vanes.request_again(scenario.origin)
+    declared = _layout(request.content).declared
+    given, changed = (
+        apply_overrides(request.content, overrides, request.file, declared) for overrides in ((), request.overrides)
+    )
+    if changed.device:
+        device = changed.document.setdefault("device", {})
+        words = [override.words for override in changed.device]
+        device["overrides"] = list(over(device.get("overrides", ()), words, valve=scenario.device.valve_name))
+    for name, table in changed.document.items():
+        if table == given.document.get(name):
+            continue
+        yield from table_lines(name, table) if isinstance(table, Mapping) else assignments({name: table})
 
 
 def json_schema() -> dict[str, Any]:

@@ -110,7 +110,8 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
         if not result.status.is_completed:
             continue
         if left is None:
-            return replace(verdict, cause=cause, tried=f"with {remedy.text} it follows, as a further run shows")
+            told = f"with {remedy.text} it follows, as a further run shows"
+            return replace(verdict, cause=cause, tried=told, mended=remedy.overrides if is_of_file else ())
         if cause == verdict.cause and left.error < 0.5 * verdict.error and (best is None or left.error < best[1]):
             best = (remedy, left.error)
     if best is not None:

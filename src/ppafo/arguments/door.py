@@ -10,7 +10,7 @@ import functools
 import inspect
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
 
@@ -60,6 +60,17 @@ def argument_text(name: str, value: str = "", option: str = "") -> str:
         return f"{name}={value!r}" if value else name
     option = option or f"--{name.replace('_', '-')}"
     return f"{option} {shlex.quote(value)}" if value else option
+
+
+def override_text(overrides: Iterable[str]) -> str:
+    """Return overrides as written by the caller: words of the command line, or an argument in Python.
+
+    >>> override_text(["run.duration=2 s"])
+    "overrides=['run.duration=2 s']"
+    """
+    if _reader.get() != "command line":
+        return f"overrides={list(overrides)!r}"
+    return shlex.join(word for override in overrides for word in ("--set", override))
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:

@@ -89,6 +89,14 @@ class _RunReport:
         return [sentence] if sentence else []
 
     @property
+    def usage(self) -> list[str]:
+        """Command and tables of a file for the remedy with which the run follows; empty without one."""
+        from ppafo.loading import reloaded, usage_text
+
+        mended = () if self.tracking is None else self.tracking.mended
+        return [usage_text(reloaded(self.result.scenario, mended))] if mended else []
+
+    @property
     def gain_text(self) -> list[str]:
         """Sentence on the gains in use; empty for a controller without gains."""
         return [] if self.gains is None else [self.gains.sentence]
@@ -117,7 +125,7 @@ def _text(report: _RunReport) -> str:
     if report.check is not None:
         accuracy = [repr(report.check)]
     # Gains that are in force are no news: they stand last.
-    last = [*accuracy, *report.gain_text]
+    last = [*accuracy, *report.gain_text, *(f"\nTo use the remedy\n{text}" for text in report.usage)]
     return "\n".join([*head, *metrics_lines(report.result.metrics), *([""] if last else []), *last])
 
 
@@ -168,6 +176,7 @@ def finding_of(report: _RunReport) -> "Finding[None]":
             ),
             Section() if check is None else Section("What can be repeated", code=repr(check)),
             Section(remarks=report.gain_text),
+            *(Section("To use the remedy", code=text) for text in report.usage),
         ),
         found=None,
         live=lambda: live_part([scenario]),

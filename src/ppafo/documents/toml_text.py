@@ -1,10 +1,11 @@
 """Reading of TOML files by name or path; each fault gives a one-line message."""
 
 import copy
+import json
 import os
 import re
 import tomllib
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources.abc import Traversable
@@ -25,6 +26,7 @@ _DEEP_KEY = re.compile(
     rf"(?:^[ \t]*+\[{{0,2}}+|[{{,])[ \t]*+(?>{_PART}\.[ \t]*+){{{MAXIMUM_LEVELS}}}", re.ASCII | re.MULTILINE
 )
 """Pattern of a key with too many dots; parsing time would grow at least with the square of their number."""
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _TOO_DEEP = f"has tables nested deeper than {MAXIMUM_LEVELS} levels; a few are enough"
 
 
@@ -119,6 +121,32 @@ def _float(text: str) -> float:
             f"{one_line(text)} is below the smallest 64-bit number and would become 0; write 0 or a larger number"
         )
     return value
+
+
+def value_text(value: object) -> str:
+    """Return a text, a number, a flag or a list of texts as a TOML value."""
+    if isinstance(value, float):
+        return repr(float(value))
+    # What JSON escapes in a text is escaped in the same way in TOML, but for DEL.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def assignments(values: Mapping[str, Any]) -> Iterator[str]:
+    """Yield one TOML line for each value."""
+    for key, value in values.items():
+        yield f"{_key(key)} = {value_text(value)}"
+
+
+def table_lines(name: str, table: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the TOML lines of a table and of the tables inside it, each after an empty line."""
+    inner = {key: value for key, value in table.items() if isinstance(value, Mapping)}
+    yield from ("", f"[{name}]", *assignments({key: value for key, value in table.items() if key not in inner}))
+    for key, value in inner.items():
+        yield from table_lines(f"{name}.{_key(key)}", value)
+
+
+def _key(key: str) -> str:
+    return key if _BARE_KEY.fullmatch(key) else value_text(key)
 
 
 def label(file: str) -> str:

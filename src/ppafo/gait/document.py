@@ -1,7 +1,6 @@
 """Gait files: layout, conversion to a ``Gait``, and conversion of a gait to the text of a file."""
 
 import functools
-import json
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -11,7 +10,7 @@ from pydantic import BaseModel, Field
 from ppafo.arguments import checked
 from ppafo.documents.models import SchemaVersion, make_schema, optional, table, validate
 from ppafo.documents.problems import NAME, QUANTITY
-from ppafo.documents.toml_text import TomlKind, label
+from ppafo.documents.toml_text import TomlKind, label, value_text
 from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.gait.gait import CURVES, REQUIRED, Gait, GaitCurve, plain_unit
 from ppafo.gait.plausible import check_gait
@@ -212,7 +211,7 @@ def gait_toml(gait: Gait) -> str:
     """Return a gait as the text of a gait file; reading the file gives the same gait, with angles rounded."""
     lines = ["schema_version = 1"]
     texts = {"name": gait.name, "title": gait.title, "origin": gait.origin, "source": gait.source, "notes": gait.notes}
-    lines += [f"{key} = {_text(value)}" for key, value in texts.items() if value]
+    lines += [f"{key} = {value_text(value)}" for key, value in texts.items() if value]
     lines += ["", "[subject]", f'body_mass = "{gait.body_mass!r} kg"']
     known = {"stature": "m", "walking_speed": "m/s", "recorded_speed": "m/s"}
     lines += [f'{key} = "{value!r} {unit}"' for key, unit in known.items() if (value := getattr(gait, key)) is not None]
@@ -224,7 +223,7 @@ def gait_toml(gait: Gait) -> str:
     lines.append(f"count = {gait.strides}")
     for name, curve in gait.curves.items():
         si_unit = CURVES[name]
-        lines += ["", f"[{name}]", f"unit = {_text(WRITTEN_UNITS.get(si_unit, si_unit))}"]
+        lines += ["", f"[{name}]", f"unit = {value_text(WRITTEN_UNITS.get(si_unit, si_unit))}"]
         lines.append(f"mean = {_number_text(curve.mean, si_unit)}")
         for key, values in (("cosine", curve.cosines), ("sine", curve.sines)):
             lines.append(f"{key} = [{', '.join(_number_text(value, si_unit) for value in values)}]")
@@ -236,9 +235,3 @@ def _number_text(value: float, si_unit: str) -> str:
     """Return a coefficient [SI] as text, in the unit used for its curve in a gait file."""
     unit = WRITTEN_UNITS.get(si_unit, si_unit)
     return repr(float(f"{from_si(value, plain_unit(unit), plain_unit(si_unit)):.{_DIGITS}g}"))
-
-
-def _text(text: str) -> str:
-    """Return a text as a TOML basic string; JSON uses the same escapes, except for DEL."""
-    # TOML forbids DEL in a string, which JSON allows.
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

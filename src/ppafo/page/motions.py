@@ -4,6 +4,7 @@ import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
+from ppafo.model.controlled import TORQUE
 from ppafo.simulation.declaration import OF_A_VANE, DeclaredContent
 from ppafo.simulation.motion_kind import WALK
 from ppafo.simulation.scenario import Scenario, vane_motion
@@ -32,8 +33,10 @@ def tab_title(scenario: Scenario) -> str:
         return "Walk"
     motion = vane_motion(scenario)
     if motion.profile is None:
-        return "Step response" if scenario.controller.is_open_loop else "Unconstrained vane"
-    return "Moving ankle" if motion.locked_angle is None else "Torque task"
+        return "Step response" if scenario.controller.is_open_loop else "Free motion"
+    if motion.locked_angle is None:
+        return "Moving ankle"
+    return "Torque task" if scenario.controlled == TORQUE else "Pressure task"
 
 
 def usual_changes(scenario: Scenario) -> dict[str, str]:

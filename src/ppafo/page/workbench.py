@@ -202,8 +202,9 @@ def _question(question: Mapping[str, Any], atmosphere: float) -> dict[str, Any]:
     if key in changes:
         # Rounded: a supply of 65 psi is one of 4.5 bar.
         level = from_si(parse_quantity(changes[key], "Pa_a", atmosphere), unit, "Pa_a", atmosphere)
-        changes[key] = f"{level:.2g} {unit}"
-        text = text.replace(f"{{{key}}}", f"{level:.2g} {bare}{' abs' if kind == 'a' else ''}")
+        level = float(f"{level:.2g}")
+        changes[key] = f"{level:.15g} {unit}"
+        text = text.replace(f"{{{key}}}", f"{level:.15g} {bare}{' abs' if kind == 'a' else ''}")
     return {"text": text, "changes": changes}
 
 
@@ -216,11 +217,15 @@ def _tabs(simulated: Sequence[PageSimulation]) -> list[dict[str, Any]]:
         alone = " ".join(group[0].scenario.description.split()).replace("psi_g", "psi") if len(group) == 1 else ""
         starts = [program.scenario for program in group[:_OPEN]]
         device = group[0].scenario.device
+        atmosphere = device.supply.atmospheric_pressure
+        # No supply far above the device's own: another device has its limits elsewhere, for example a measured one.
+        highest = 2.0 * device.supply.pressure - atmosphere
         with shown_in(device.shown):
             questions = [
-                _question(question, device.supply.atmospheric_pressure)
+                _question(question, atmosphere)
                 for question in words()["questions"]
                 if title in question["tabs"]
+                and parse_quantity(question["changes"].get("supply.pressure", "0 Pa_a"), "Pa_a", atmosphere) < highest
             ]
         tabs.append(
             {

@@ -1,9 +1,8 @@
 """Parameter set files: layout from the declarations, loading by name or path, and writing."""
 
 import functools
-import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 from importlib import resources
 from pathlib import Path
@@ -15,7 +14,7 @@ from pydantic import BaseModel, Field
 from ppafo.arguments import Name, Overrides, checked
 from ppafo.documents.models import SchemaVersion, make_schema, one_of, optional, table, validate
 from ppafo.documents.problems import NAME
-from ppafo.documents.toml_text import TomlKind, beside, label
+from ppafo.documents.toml_text import TomlKind, assignments, beside, label
 from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.kinds import Kinds
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES, device_effects, find_effects
@@ -333,41 +332,28 @@ def parameter_set_toml(parameter_set: ParameterSet) -> str:
         "parent": parameter_set.parent,
         "notes": parameter_set.notes,
     }
-    lines = [*_assignments({"schema_version": 1, **{key: value for key, value in head.items() if value}})]
+    lines = [*assignments({"schema_version": 1, **{key: value for key, value in head.items() if value}})]
     if parameter_set.citation is not None:
-        lines += ("", "[citation]", *_assignments(parameter_set.citation.model_dump(exclude_defaults=True)))
+        lines += ("", "[citation]", *assignments(parameter_set.citation.model_dump(exclude_defaults=True)))
     if parameter_set.joint != ANKLE:
-        lines += ("", "[joint]", *_assignments(asdict(parameter_set.joint)))
+        lines += ("", "[joint]", *assignments(asdict(parameter_set.joint)))
     if parameter_set.actuator_kind != VANE:
         file = {"file": parameter_set.actuator_file} if parameter_set.actuator_file else {}
-        lines += ("", "[actuator]", *_assignments({"kind": parameter_set.actuator_kind, **file}))
+        lines += ("", "[actuator]", *assignments({"kind": parameter_set.actuator_kind, **file}))
     # Section by section, in the order in which the sections first occur.
     entries = parameter_set.entries()
     sections = list(dict.fromkeys(path.rpartition(".")[0] for path in entries))
     heads = {
-        valve: ("", f"[valves.{valve}]", *_assignments({"kind": kind}))
+        valve: ("", f"[valves.{valve}]", *assignments({"kind": kind}))
         for valve, kind in parameter_set.valve_kinds.items()
     }
     for path in sorted(entries, key=lambda path: sections.index(path.rpartition(".")[0])):
         if path.startswith("valves."):
             lines += heads.pop(path.split(".")[1], ())
-        lines += ("", f"[{path}]", *_assignments(entries[path].model_dump(exclude_defaults=True)))
+        lines += ("", f"[{path}]", *assignments(entries[path].model_dump(exclude_defaults=True)))
     # A valve of which nothing but its kind is known has a table all the same.
     for lines_of_valve in heads.values():
         lines += lines_of_valve
     for finding, reason in parameter_set.accepted.items():
-        lines += ("", "[[accepted]]", *_assignments({"finding": finding, "reason": reason}))
+        lines += ("", "[[accepted]]", *assignments({"finding": finding, "reason": reason}))
     return "\n".join(lines) + "\n"
-
-
-def _assignments(values: Mapping[str, Any]) -> Iterator[str]:
-    """Yield one TOML line for each value: a text, a number, a flag or a list of texts."""
-    for key, value in values.items():
-        if isinstance(value, float):
-            text = repr(float(value))
-        elif isinstance(value, bool):
-            text = str(value).lower()
-        else:
-            # What JSON escapes in a text is escaped in the same way in TOML, but for DEL.
-            text = json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-        yield f"{key} = {text}"

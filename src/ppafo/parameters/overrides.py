@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from ppafo.arguments import Name, Overrides, checked
+from ppafo.arguments.door import override_text
 from ppafo.errors import ParameterError, PpafoError, UnitError
 from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.gas import SPECIES
@@ -267,10 +268,9 @@ def _in_conductance(override: Override) -> str:
     conductance = conductance_of(name.lower(), override.text)
     if conductance is None:
         return ""
-    return (
-        f": --set '{section}.sonic_conductance={shown_text(conductance, 'm^3/(s Pa)', '.4g')}' "
-        f"--set '{section}.critical_ratio={USUAL_CRITICAL_RATIO:g}'"
-    )
+    shown = shown_text(conductance, "m^3/(s Pa)", ".4g")
+    forms = (f"{section}.sonic_conductance={shown}", f"{section}.critical_ratio={USUAL_CRITICAL_RATIO:g}")
+    return f": {override_text(forms)}"
 
 
 def _with_species(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:

@@ -4,6 +4,7 @@ import logging
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from ppafo.arguments.door import override_text
 from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.ports import load_torque
@@ -98,9 +99,8 @@ def remark_on_following_gains(scenario: Scenario, varied: Collection[str]) -> st
     following = [gain for gain in gains.gains if f"controller.{gain.name}" in moved]
     if not following:
         return ""
-    options = " ".join(
-        f"--set 'controller.{gain.name}={f'{gain.value:.6g} {gain.unit}'.removesuffix(' -').rstrip()}'"
-        for gain in following
+    options = override_text(
+        f"controller.{gain.name}={f'{gain.value:.6g} {gain.unit}'.removesuffix(' -').rstrip()}" for gain in following
     )
     names = ", ".join(gain.name for gain in following)
     return (

@@ -66,7 +66,7 @@ class _MeasuredParts(NamedTuple):
 
 
 class _ShapedParts(NamedTuple):
-    """Functions of an actuator that is no vane: shape from settings and stops, both chambers, torque [N m]."""
+    """Functions of an actuator with a shape: shape from settings and stops, both chambers, torque [N m]."""
 
     shape: Callable[[Any, Range], Any]
     chambers: Callable[[Any, float, float, float], Chambers]
@@ -110,7 +110,7 @@ def vane_at(settings: VaneSettings, stops: Range, _around: Surroundings, angle: 
 
 
 def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float, *, parts: _ShapedParts) -> MeanChambers:
-    """Both chambers at an angle [rad] of an actuator that is no vane, at half of the supply's gauge pressure."""
+    """Both chambers at an angle [rad] of an actuator with a shape, at half of the supply's gauge pressure."""
     room = around.atmospheric_pressure
     plant = _RestingPlant(
         shape=parts.shape(settings, stops),
@@ -150,7 +150,7 @@ def vane_growth(settings: VaneSettings, _stops: Range, _around: Surroundings) ->
 
 
 def shaped_growth(settings: Any, stops: Range, around: Surroundings, *, parts: _ShapedParts) -> float:
-    """Mean volume displaced per angle [m^3/rad] in chamber 1 between the stops, for an actuator that is no vane."""
+    """Mean volume displaced per angle [m^3/rad] in chamber 1 between the stops, for an actuator with a shape."""
     gauge = around.supply_pressure - around.atmospheric_pressure
     return mean_growth(parts.shape(settings, stops), stops, gauge, parts.chambers)
 

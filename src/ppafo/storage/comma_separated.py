@@ -267,6 +267,11 @@ def recording_of_columns(
         raise DataError("has a header but no samples")
     series = []
     for column, numbers in zip(columns, values, strict=True):
+        if column.si_unit == PLAIN_NUMBER and column.unit.removeprefix("m") in ("V", "A"):
+            raise DataError(
+                f"column '{column.name} [{column.unit}]': '{column.name}' is a plain number; scale it by factor in a "
+                "column map (0.1 per V where 10 V is 1)"
+            )
         with refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
             series.append(in_si(column, numbers, atmosphere))
     time = counted_on(series[0])
@@ -320,6 +325,7 @@ def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats
             name, cell = header[is_number.index(False)].strip(), one_line(row[is_number.index(False)])[:LONGEST_SHOWN]
             is_comma = _DECIMAL_COMMA.fullmatch(cell)
             remedy = '; decimal commas need a column map with decimal = "comma"' if is_comma else ""
+            remedy = remedy if cell.strip() else "; remove the line, a sample that was lost, or the column"
             raise DataError(f"line {line}, column '{name}': {cell!r} is not a number, or not a finite one{remedy}")
         numbers.extend(values)
     return np.array(numbers).reshape(-1, len(header))

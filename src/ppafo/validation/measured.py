@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.arguments.door import argument_text
+from ppafo.arguments.door import override_text
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import DataError
 from ppafo.parameters.device import Device
@@ -194,7 +194,7 @@ def _check_pressures(recording: Recording, device: Device, file: str) -> None:
             atmosphere, is_recorded = supply.atmospheric_pressure, SUPPLY in recording
             shown = [shown_text(pressure, "Pa_a", ".4g", atmosphere) for pressure in (level, highest)]
             owner = f"the recorded '{SUPPLY}'" if is_recorded else f"the supply of {device.name}"
-            given = argument_text("overrides", f"supply.pressure={shown[0]}", "--set")
+            given = override_text([f"supply.pressure={shown[0]}"])
             remedy = "check both sensors" if is_recorded else f"record it, or give {given}"
             top = float(recording[name].max()) - atmosphere
             if _LEAST_OF_SUPPLY * (highest - atmosphere) < top * _KILOPASCALS_AS_PSI < allowed - atmosphere:

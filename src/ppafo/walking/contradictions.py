@@ -11,14 +11,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ppafo.arguments.door import argument_text
+from ppafo.arguments.door import override_text
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at, larger, smaller
 from ppafo.parameters.plant import valve_settings, venting_valve
 from ppafo.simulation.document import DocumentReader, value_at
 from ppafo.simulation.scenario import Scenario
-from ppafo.units.shown import shown_text
+from ppafo.units import split_quantity
+from ppafo.units.shown import shown_in, shown_text, units_beside
 from ppafo.walking.declaration import OF_A_WALK
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
@@ -89,24 +90,25 @@ class _Contradiction(NamedTuple):
 def check_walk(scenario: Scenario, reading: DocumentReader) -> None:
     """Raise ScenarioError for the first contradiction; ``reading`` provides each value as the user wrote it."""
     for path, is_bad, reason in _contradictions(scenario):
-        if is_bad:
-            if path in _OF_DEVICE:
-                raise ScenarioError(f"{reading.file}: {path}: {reason(0)}")
-            quantity = OF_A_WALK.quantities(reading.document).get(path)
-            if quantity is None or value_at(reading.document, path) is not None:
+        if not is_bad:
+            continue
+        if path in _OF_DEVICE:
+            raise ScenarioError(f"{reading.file}: {path}: {reason(0)}")
+        quantity, given = OF_A_WALK.quantities(reading.document).get(path), value_at(reading.document, path)
+        units = dict(scenario.device.shown)
+        # Limits in the unit of the value that is refused.
+        if quantity is not None and isinstance(given, str):
+            units |= units_beside(quantity.unit, split_quantity(given)[1])
+        with shown_in(units):
+            if quantity is None or given is not None:
                 raise reading.refusal(path, reason(0))
             section, _, name = path.partition(".")
             number = getattr(walk_of(scenario).wearer if section == "wearer" else scenario.controller, name)
             # In six digits, as the number that it contradicts.
-            default = shown_text(
-                number,
-                quantity.unit,
-                atmosphere=scenario.device.supply.atmospheric_pressure,
-                unit=_IN_FILES.get(quantity.unit, ""),
-            )
+            default = shown_text(number, quantity.unit, unit=_IN_FILES.get(quantity.unit, ""))
             raise ScenarioError(
                 f"{reading.file}: {path}, which is not given and takes its default, {default}: {reason(0)}; "
-                f"give it in the file or with {argument_text('overrides', f'{path}=...', '--set')}"
+                f"give it in the file or with {override_text([f'{path}=...'])}"
             )
 
 

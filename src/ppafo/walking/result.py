@@ -214,21 +214,14 @@ class WalkResult:
         return None if strides is None or strides.value == 0.0 else tracking_in(self)
 
     @in_units(_units_of)
-    def verdict_lines(self, verdict: Tracking | None) -> list[str]:
-        """Lines on whether the walk is useful: torque, strides with help, and toes that would drag.
+    def torque_sentence(self, verdict: Tracking | None) -> str:
+        """Sentence on the torque: whether it follows its reference; "" if not judged.
 
         ``verdict`` is ``tracking``, with or without remedies that were tried.
         """
         if verdict is not None:
-            lines = [verdict.sentence]
-        elif not self.is_helped:
-            lines = [self.help_text]
-        else:
-            lines = [following_text(self) if "strides" in self.metrics else ""]
-        toes = self.metrics.get("lowest_toes")
-        if toes is not None and toes.value < 0.0:
-            lines.append("the toes would drag in mid-swing: the ankle is not lifted enough")
-        return [line for line in lines if line]
+            return verdict.sentence
+        return following_text(self) if self.is_helped and "strides" in self.metrics else ""
 
     @property
     def help_text(self) -> str:
@@ -249,7 +242,13 @@ class WalkResult:
         """Return status, verdict and metrics in display units, as printed by ``ppafo simulate``."""
         from ppafo.report.display_units import metrics_lines
 
-        verdict = self.verdict_lines(self.tracking) if self.status.is_completed else []
+        verdict = []
+        if self.status.is_completed:
+            verdict = [self.torque_sentence(self.tracking), "" if self.is_helped else self.help_text]
+            toes = self.metrics.get("lowest_toes")
+            if toes is not None and toes.value < 0.0:
+                verdict.append("the toes would drag in mid-swing: the ankle is not lifted enough")
+        verdict = [line for line in verdict if line]
         return "\n".join([f"{self.scenario.name}: {self.status.kind}", *verdict, "", *metrics_lines(self.metrics)])
 
     @in_units(_units_of)

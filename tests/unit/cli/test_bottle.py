@@ -111,3 +111,10 @@ def test_the_largest_flow_is_said_and_written_in_the_unit_in_which_it_was_given(
     assert "23 L/min (ANR, air), largest 40 L/min (ANR, air)" in capsys.readouterr().out
     assert main(["bottle", "--gas-per-stride", "0.5 g", "--peak-flow", "10 L/min (ANR, air)"]) == 2
     assert "the largest flow is 10 L/min (ANR, air); it must be at least" in capsys.readouterr().err
+
+
+def test_a_flow_beyond_the_regulator_is_refused_in_the_unit_in_which_it_was_given(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main([*QUICK, "--peak-flow", "2000 L/min (ANR, CO2)"]) == 2
+    assert "the largest flow is 2000 L/min (ANR, CO2), but the regulator" in capsys.readouterr().err

@@ -66,7 +66,10 @@ def walked(ran: tuple[Path, list[str]]) -> Path:
 def test_a_walk_prints_its_table_and_where_the_files_are(ran: tuple[Path, list[str]]) -> None:
     folder, lines = ran
     assert lines[0] == "solenoid: completed, 4 strides of falisse2019-subject1"
-    assert lines[1] == "the toes would drag in mid-swing: the ankle is not lifted enough"
+    assert lines[1].startswith(
+        "the device helps in push-off but not in swing, against the same walk without it: 1.65 J of net work in "
+        "push-off (positive work 7.3 % of the healthy ankle's), ankle 9.04 deg from the healthy one (20.1 deg without)"
+    )
     assert lines[3].split() == ["with", "without", "healthy"]
     work = next(line for line in lines if line.startswith("Positive work on the wearer in push-off (J)")).split()
     assert float(work[-3]) > 0.5

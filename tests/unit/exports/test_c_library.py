@@ -518,6 +518,6 @@ def test_a_header_speaks_of_the_joint_and_the_actuator_of_its_set(make: Callable
     header = library_files(library)[f"{library.name}.h"].decode()
     # The author's own description stays as it is.
     summaries = [line.split("/*")[1] for line in header.splitlines() if line.startswith("    double ")]
-    assert any("angle of the cylinder, 90 deg neutral, growing in flexion" in summary for summary in summaries)
+    assert any("angle of the actuator, 90 deg neutral, growing in flexion" in summary for summary in summaries)
     assert any("elbow angle, growing in flexion" in summary for summary in summaries)
     assert not any(re.search("ankle|vane|plantar|dorsi", summary) for summary in summaries)

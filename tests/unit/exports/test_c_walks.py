@@ -20,7 +20,8 @@ from ppafo.engine.loading import BACKEND_VARIABLE, PYTHON
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ParameterError, ScenarioError
-from ppafo.exports.c_library import c_library, walk_library
+from ppafo.exports.c_library import c_library, library_of, walk_library
+from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.library import ExportParameter, c_identifier
 from ppafo.exports.c_library.walk_preparation import settings_of_walk
 from ppafo.loading import load_scenario
@@ -317,3 +318,14 @@ def test_a_walk_has_its_settings_in_the_order_of_earlier_libraries() -> None:
     paths = [item.path for item in settings_of_walk(load_walk("solenoid"))]
     sections = [section for section, _ in itertools.groupby(paths, key=lambda path: path.partition(".")[0])]
     assert sections[sections.index("valve") :] == ["valve", "run", "wearer", "controller", "sensors"]
+
+
+def test_a_library_of_another_actuator_says_nothing_of_a_vane_or_of_a_supply_that_it_has_not() -> None:
+    bladder = f"device.set={ACTUATORS / 'measured-bladder.toml'}"
+    files = library_files(library_of(load_walk("proportional", (bladder,))))
+    readme, source = files["README.md"].decode(), files["proportional.c"].decode()
+    assert "supply_dorsiflexion_pressure" not in readme
+    assert "`controller_nominal_dorsiflexion_pressure` (`supply_atmospheric_pressure`)" in readme
+    comments = re.findall(r"/\*.*?\*/", source, re.DOTALL)
+    assert [text for text in comments if re.search(r"\bvane\b", text)] == []
+    assert any("an actuator at rest" in text for text in comments)

@@ -7,9 +7,13 @@ from typing import Any
 import pytest
 
 from ppafo.constants import PASCALS_PER_PSI
+from ppafo.loading import load_scenario
+from ppafo.page.motions import tab_title
+from ppafo.page.workbench import workbench
 from scripts.live_page import missing, opened
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing() or "there is a browser")
+BLADDER = Path(__file__).parents[2] / "actuators" / "torque-task-measured-bladder.toml"
 RECORDING = "time [s],torque [N m]\n0,0\n1,1\n2,1\n3,0\n"
 LARGE = {"width": 1400, "height": 1000}
 FOCUSED = "document.activeElement.getAttribute('aria-label') ?? document.activeElement.tagName"
@@ -192,3 +196,25 @@ def test_work_for_settings_that_are_gone_is_given_up(chromium: Any, file: Path) 
     assert page.evaluate(f"{_NEW_RUNS}.reduce((sum, job) => sum + job.rows.length, 0)") == 200 * count
     page.locator(".recording tbody tr").first.wait_for(state="attached")
     assert page.said == []
+
+
+def test_a_page_of_one_chamber_draws_one_and_asks_only_what_its_device_can_answer(
+    chromium: Any, tmp_path: Path
+) -> None:
+    made = tmp_path / "bladder.html"
+    made.write_bytes(workbench(str(BLADDER)))
+    page = opened(chromium, made)
+    visible = page.locator(".drawing .chamber:not([hidden]), .drawing .way:not([hidden])")
+    assert visible.count() == 2
+    words = page.locator(".drawing .words:not([hidden])").all_text_contents()
+    assert [text[:2] for text in words if ":" in text] == ["1:"]
+    assert page.get_by_text("What if the task required 4 N m?").count() == 1
+    # Four times the supply with which it was measured.
+    assert page.get_by_text("What if the supply had").count() == 0
+    assert page.said == []
+
+
+def test_a_tab_is_called_after_what_is_controlled() -> None:
+    assert tab_title(load_scenario("torque-task-proportional")) == "Torque task"
+    assert tab_title(load_scenario("pressure-loop")) == "Pressure task"
+    assert tab_title(load_scenario("cylinder-servo")) == "Free motion"

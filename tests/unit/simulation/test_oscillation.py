@@ -35,7 +35,7 @@ def test_a_verdict_names_the_gain_that_mends_the_loop_and_it_does() -> None:
     assert verdict is not None
     assert verdict.reversals > 10.0
     assert verdict.sentence.startswith("the torque loop oscillates: ")
-    assert "`controller.derivative_gain = 0 " in verdict.sentence
+    assert "controller.derivative_gain=0 " in verdict.sentence
     mended = verdict.remedies[0].numbers["controller.proportional_gain"]
     given = [f"controller.proportional_gain={mended}", "controller.derivative_gain=0", FAST[-1]]
     again = simulate(TASK, given)
@@ -93,7 +93,7 @@ def test_a_walk_says_it_and_meters_count_what_its_recording_shows() -> None:
     verdict = alone.tracking
     assert verdict is not None
     assert verdict.per == "stride"
-    assert "its gains are not this device's: `controller.torque_gain = " in verdict.sentence
+    assert "its gains are not this device's: overrides=['controller.torque_gain=" in verdict.sentence
 
 
 def test_find_counts_what_oscillates_as_not_met() -> None:

@@ -82,6 +82,8 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
             "time [s],angle [rad]\n0,1\n1,nan\n",
             r"line 3, column 'angle \[rad\]': 'nan' is not a number, or not a finite one",
         ),
+        ("time [s],angle [rad]\n0,1\n1, \n", "'' is not a number, or not a finite one; remove the line"),
+        ("time [s],command [V]\n0,1\n1,10\n", "'command' is a plain number; scale it by factor in a column map"),
         ("time [s],angle [rad]\n0,1\n1,1_000\n", r"line 3, column 'angle \[rad\]': '1_000' is not a number"),
         ("time [s],angle [rad]\n0,1\n1,\uff12\n", "line 3, column 'angle \\[rad\\]': '\uff12' is not a number"),
         ("time [s],angle [rad]\n0,1\n1,\u0662\n", "line 3, column 'angle \\[rad\\]': '\u0662' is not a number"),

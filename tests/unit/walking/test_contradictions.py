@@ -22,7 +22,7 @@ MISTAKES = {
     "controller.unload_threshold=80 N": "must be below controller.load_threshold, which is 60 N",
     "controller.largest_force=100 N; controller.load_threshold=200 N": "must be above controller.load_threshold",
     "controller.first_stride_time=5 s": "between half and twice the stride of the gait, which is 1.0384 s",
-    "controller.frozen_time=10 ms; controller.rate=100 Hz": "than two sample periods of the controller, 0.01 s each",
+    "controller.frozen_time=10 ms; controller.rate=100 Hz": "than two sample periods of the controller, 10 ms each",
     "controller.lowest_angle=100 deg; controller.highest_angle=90 deg": "must be below controller.highest_angle",
     "controller.push_off_end=0.39": "must be above controller.push_off_start, which is 0.4",
     "controller.highest_angle=90 deg": r"its default, 96.2569 deg: .* 90 deg; give it .*'controller.swing_angle=",
@@ -43,6 +43,8 @@ MISTAKES = {
     "controller.flat_from=0.3": "must be below controller.flat_to, which is 0.24",
     "supply.atmospheric_pressure=80 kPa_a; controller.lowest_pressure=90 kPa_a": "must be below the atmosphere, which",
     "controller.filled_pressure=60 psi_g": "must be between atmosphere and supply, which are 0 psi_g and 50 psi_g",
+    "controller.filled_pressure=9 bar_g": r"atmosphere and supply, which are 0 bar_g and 3\.44738 bar_g$",
+    "supply.pressure=100 bar_g": r"its default, 18\.9868 bar_g: must be above \S+ bar_g: a moving foot",
     "controller.highest_pressure=60 psi_g": "must be above 88.8",
     "sensors.angle_bandwidth=-1 Hz": "must be at least 0 Hz and at most 1e",
     "sensors.pressure_lost_share=2": "must be at least 0 and at most 1",
@@ -67,7 +69,7 @@ def test_a_mistake_is_named_in_one_line(overrides: str) -> None:
 
 @pytest.mark.parametrize("name", ["solenoid", "solenoid-regulators"])
 def test_supplies_that_let_no_gas_back_ask_for_room_above_their_pressure(name: str) -> None:
-    with pytest.raises(ScenarioError, match=r"must be above 88\.8\d* psi_g: a moving foot compresses the gas"):
+    with pytest.raises(ScenarioError, match=r"must be above 713\.7\d* kPa_a: a moving foot compresses the gas"):
         load_walk(name, ["controller.highest_pressure=600 kPa_a"])
 
 

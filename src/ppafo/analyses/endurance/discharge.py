@@ -26,6 +26,7 @@ from ppafo.model.source import (
 from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
+from ppafo.units.shown import shown_text
 from ppafo.walking.bottle.coupling import BottleLife, Schedule
 from ppafo.walking.bottle.course import WALKED, SupplyBalance
 
@@ -186,10 +187,10 @@ def discharge(bottle: Bottle, draw: GasDemand, schedule: Schedule) -> Discharge:
     check_schedule(schedule)
     content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
     if min(reserves(bottle, draw, content.pressure, content.temperature)) <= 0.0:
-        most = flow_limit(bottle, content.pressure, content.temperature) * GRAMS_PER_KILOGRAM
+        most = flow_limit(bottle, content.pressure, content.temperature)
         raise ParameterError(
-            f"the largest flow is {draw.peak_flow * GRAMS_PER_KILOGRAM:.3g} g/s, but the regulator of the full "
-            f"bottle passes at most {most:.3g} g/s; increase regulator.area"
+            f"the largest flow is {shown_text(draw.peak_flow, 'kg/s', '.3g')}, but the regulator of the full bottle "
+            f"passes at most {shown_text(most, 'kg/s', '.3g')}; increase regulator.area"
         )
     energy = content_energy(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
     start = np.array([bottle.mass, energy, bottle.room_temperature, 0.0, 0.0, 0.0])

@@ -95,8 +95,8 @@ def bottle(
         units = units_given({"kg/s": peak_flow})
         with shown_in({**units_in_force(), **units}):
             draw = demand_of_numbers(gas_per_stride, STRIDE_TIME if stride_time is None else stride_time, peak_flow)
-        full = load_bottle(PAPER_BOTTLE if bottle is None else bottle, changes)
-        return finding_of(replace(follow_bottle(full, draw, schedule), device_units=units))
+            full = load_bottle(PAPER_BOTTLE if bottle is None else bottle, changes)
+            return finding_of(replace(follow_bottle(full, draw, schedule), device_units=units))
     if peak_flow is not None:
         raise ParameterError(
             f"{argument_text('peak_flow')} needs {argument_text('gas_per_stride')}; omit it for a recording, "

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.analyses.find.solve import FindResult
+from ppafo.arguments.door import override_text
 from ppafo.metrics.tracking import ONE_INSTANT
 from ppafo.report.display_units import metric_words
 from ppafo.report.finding import Column, Finding, Section
@@ -72,6 +73,8 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
     met, (index, neighbour) = outcome.met_intervals, outcome.found
     columns = [Column(title, [kind.text(ends[end]) for ends in met]) for end, title in enumerate(("from", "to"))]
     remarks = list(_remarks(outcome, kind))
+    # In more digits than are shown, so that the value that is pasted meets the condition.
+    used = "" if index is None else override_text([f"{path.path}={kind.text(float(tried['value'][index]), '.9g')}"])
     return Finding(
         name="find",
         kicker="Search",
@@ -79,6 +82,7 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
         said=(_verdict(outcome, kind), *remarks),
         parts=(
             Section("Met in the range that was tried", columns),
+            Section("To use the value" if used else "", code=used),
             Section(
                 "Metric over the value",
                 panels=(_panel(outcome, kind),),

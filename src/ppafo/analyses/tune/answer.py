@@ -2,7 +2,6 @@
 
 import json
 import math
-import shlex
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from ppafo.analyses.tune.problem import Problem
 from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, GainResult, SearchStart, Tuned, agreement
+from ppafo.loading import reloaded, usage_text
 from ppafo.metrics.metric import controlled_in
 from ppafo.metrics.tracking import ONE_INSTANT
 from ppafo.model.controlled import CONTROLLED, TORQUE
@@ -138,11 +138,11 @@ def finding_of(tuned: Tuned) -> Finding[Tuned]:
         rows.append((gain.path, *map(gain.place.quote, numbers), end))
     # The scenario's file, or the name of one that comes with the package, finds it again.
     name, motion_kind = scenario.origin.file or scenario.name, scenario.motion.motion_kind
-    options = " ".join(f"--set {shlex.quote(line)}" for line in tuned.overrides)
     # Texts of TOML and of Python alike.
+    used = usage_text(reloaded(scenario, problem.lines(after.gains)))
     listed = ", ".join(json.dumps(line, ensure_ascii=False) for line in tuned.overrides)
     pasted = (
-        f"# {tuned.verdict}\n\n# on the command line\n{options}\n\n# in a study file\noverrides = [{listed}]\n\n"
+        f"# {tuned.verdict}\n\n# on the command line\n{used}\n\n# in a study file\noverrides = [{listed}]\n\n"
         f"# in Python\n{motion_kind.python_call.format(name=name, overrides=listed)}\n"
     )
     return Finding(
@@ -168,7 +168,7 @@ def finding_of(tuned: Tuned) -> Finding[Tuned]:
                 caption=_SEARCH_CAPTION,
                 size=(5.4, max(2.2, 0.9 + 0.3 * len(problem.searched))),
             ),
-            Section("To use the gains", code=f"ppafo {motion_kind.command} {shlex.quote(name)} {options}"),
+            Section("To use the gains", code=used),
         ),
         found=tuned,
         passed=after.is_feasible and not after.useless,

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from ppafo.arguments.door import argument_text
 from ppafo.parameters.device import Device
 from ppafo.report.display_units import display_value
 from ppafo.report.kind import Kind
@@ -79,7 +80,12 @@ def verdict(validation: Validation) -> str:
         "nothing but noise is left" if validation.causes.is_noise else "; ".join([size, *([why] if why else [])])
     )
     if not validation.passes:
-        return f"{name} does not agree: {failed}; {explanation}"
+        # A cause is searched with the motion as it was said, which is wrong for a device that something else moved.
+        is_found = validation.causes.found is not None
+        is_free = not is_found and any(agreement.motion == "free" for agreement in validation.recordings)
+        motion = argument_text("motion", "leg")
+        moved = f"; of a device on a leg, held or driven give {motion}, locked or measured" if is_free else ""
+        return f"{name} does not agree: {failed}; {explanation}{moved}"
     return (
         f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {explanation}"
     )

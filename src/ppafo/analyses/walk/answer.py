@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.analyses.walk.benefit import benefit_sentence
 from ppafo.analyses.walk.bottle import bottle_data, bottle_parts
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes, versions, walk_document
 from ppafo.analyses.walk.task_sequence import (
@@ -19,6 +20,7 @@ from ppafo.analyses.walk.task_sequence import (
 from ppafo.arguments.door import argument_text
 from ppafo.control.walking.assistance import PEAKS
 from ppafo.documents.json_text import plain
+from ppafo.loading import reloaded, usage_text
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
 from ppafo.report.display_units import quantity_text
@@ -200,9 +202,11 @@ def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
     along = "" if motion.task_sequence is None else f", task sequence {motion.task_sequence.name}"
     assumed = [(assumption.path, assumption.note) for assumption in configuration.assumptions]
     verdict = tried(configuration, worn.tracking)
+    mended = reloaded(configuration, verdict.mended) if verdict is not None and verdict.mended else None
     # How the torque follows what is requested, and the gains in force with their origin.
     in_force = gains_of(configuration, law_of(configuration))
-    first_lines = [*worn.verdict_lines(verdict), "" if in_force is None else in_force.sentence]
+    torque = worn.torque_sentence(verdict)
+    first_lines = [benefit_sentence(comparison), torque, "" if in_force is None else in_force.sentence]
     gait, overrides = motion.gait, configuration.origin.overrides
     title = f" ({gait.title})" if gait.title else ""
     set_up = (
@@ -228,6 +232,7 @@ def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
             *task_sequence_parts(comparison),
             Section(columns=comparison_table(comparison), remarks=_remarks(comparison)),
             *bottle_parts(worn),
+            Section("To use the remedy" if mended else "", code=usage_text(mended) if mended else ""),
             Section("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
             *_pictures(comparison),
             Section(

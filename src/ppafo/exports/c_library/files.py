@@ -53,7 +53,7 @@ def library_files(library: Library) -> dict[str, bytes]:
     settings = [setting.name for setting in library.settings]
     # The interface is written around the functions, whose names must not hide its own.
     interface = "".join(filled(template(_FOLDER, file), words) for file in ("interface.c", api.source))
-    functions = c_text_of_run(program, title, name, settings, further, interface)
+    functions = c_text_of_run(program, title, name, settings, further, interface, library.worded)
     texts[f"{name}.c"] = f"{head}{functions}\n{interface}"
     return {file: text.encode() for file, text in sorted(texts.items())}
 

@@ -76,8 +76,8 @@ LOOP = LibraryApi("interface.h", "main.c", "README.md", "loop.c")
 """API of the closed loop, which advances from sample to sample."""
 
 
-_VANE = re.compile(r"\bvane\b")
-"""The word for the actuator in summaries."""
+_VANE = re.compile(r"\b(?P<article>[Aa] )?vane\b")
+"""Word for the actuator in summaries and comments, with its article."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +110,10 @@ class Library:
     actuator: str = VANE
 
     def worded(self, summary: str) -> str:
-        """Return a summary about a vane on an ankle in the words of this actuator and joint."""
-        return self.joint.said(summary if self.actuator == VANE else _VANE.sub(self.actuator, summary))
+        """Return a summary or comment about a vane on an ankle in the words of this actuator and joint."""
+        if self.actuator == VANE:
+            return self.joint.said(summary)
+        return self.joint.said(_VANE.sub(lambda found: f"{(found[1] or '').replace(' ', 'n ')}actuator", summary))
 
     @property
     def name(self) -> str:

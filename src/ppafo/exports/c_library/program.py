@@ -7,7 +7,7 @@ name becomes a field, every number is a scalar, and a function over runs is call
 import ast
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from types import FunctionType
@@ -83,11 +83,12 @@ def c_text_of_run(
     settings: Sequence[str],
     further: Sequence[Further],
     around: str,
+    worded: Callable[[str], str],
 ) -> str:
     """Return all functions of an exported program as readable C: for a single run, without lanes, with structs.
 
     ``name`` is the prefix of the structs of settings and metrics, which the enclosing file declares. ``further`` may
-    add functions that take ``settings``.
+    add functions that take ``settings``. ``worded`` puts comments in the words of the actuator and joint.
     """
     from ppafo.translation.c99 import ReadableUnit, c_source, documents_of
     from ppafo.translation.c_terms import is_free
@@ -113,7 +114,7 @@ def c_text_of_run(
         "prepare": (settings_row, parameters, states, struct_of_numbers("run_counts", COUNTS)),
         "follow": (settings_row, settings_row),
     }
-    documents = documents_of(collector) | _DOCUMENTS
+    documents = {name: worded(text) for name, text in (documents_of(collector) | _DOCUMENTS).items()}
     # A short name is taken only where it is unambiguous and C leaves it free; all others keep their module's path.
     own = {name: re.sub(r"\W", "_", owner.__qualname__).strip("_") for name, owner in collector.owners.items()}
     # Functions of the step that divide it have their ending beside those that do not.

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from ppafo.exports.c_library.conditions import choosing
 from ppafo.exports.c_library.library import c_identifier
+from ppafo.exports.c_library.settings import second_chamber
 from ppafo.metrics import METRICS
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.effects import effects_of
@@ -45,7 +46,7 @@ def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
     return {
         "fixed": _listed(fixed),
         "precomputed": "nothing",
-        "traps": _followers(links),
+        "traps": _followers(links, second_chamber(scenario)),
         "metrics_said": _METRICS_OF_SCENARIO.format(left_out=", ".join(f"`{name}`" for name in left_out)),
     }
 
@@ -72,16 +73,22 @@ def words_of_walk(walk: Scenario, links: Graph, failing: "Mapping[str, FaultSett
     return {
         "fixed": _listed(fixed),
         "precomputed": "the gait alone" if sequence is None else "the gait and its task sequence alone",
-        "traps": f"{_followers(links)}\n{_TRAPS_OF_WALK}",
+        "traps": f"{_followers(links, second_chamber(walk))}\n{_TRAPS_OF_WALK}",
         "metrics_said": _METRICS_OF_WALK,
     }
 
 
-def _followers(links: Graph) -> str:
-    """Return the README line on parameters that follow others."""
+def _followers(links: Graph, absent: Mapping[str, str]) -> str:
+    """Return the README line on parameters that follow others; ``absent`` gives numbers of a missing chamber by name.
+
+    Its pressures are named as what they are, the atmosphere; its other numbers are constants, which nothing follows.
+    """
     followers = []
     for path, follows in links.items():
-        sources = dict.fromkeys(f"`{c_identifier(source)}`" for link in follows for source in link.sources)
+        names = (c_identifier(source) for link in follows for source in link.sources)
+        sources = dict.fromkeys(
+            f"`{text}`" for text in (absent.get(name, name) for name in names) if text.isidentifier()
+        )
         followers.append(f"`{c_identifier(path)}` ({', '.join(sources)})")
     return _FOLLOWS.format(followers=", ".join(followers) or "none")
 

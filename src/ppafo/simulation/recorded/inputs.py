@@ -102,7 +102,11 @@ def between_stops(angles: Floats, device: Device, file: str) -> Floats:
     if not lowest - margin <= worst <= highest + margin:
         shown, low, high = np.degrees([worst, lowest, highest])
         is_negative = lowest - margin <= float(-angles.max()) and float(-angles.min()) <= highest + margin
-        hint = "; with the other sign all angles would lie between them" if is_negative else ""
+        hint = (
+            "; with the other sign all angles would lie between them"
+            if is_negative
+            else "; if it is counted from another zero, give sign and offset in a column map"
+        )
         raise DataError(
             f"{file}: 'angle' is {shown:.4g} deg, beyond the stops of {device.name}, {low:g} to {high:g} deg{hint}"
         )

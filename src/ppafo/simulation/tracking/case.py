@@ -10,7 +10,7 @@ from ppafo.metrics.switching import SHUT
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import Remedy
-from ppafo.simulation.tracking.rule import Failure, SettledPart
+from ppafo.simulation.tracking.rule import Failure, SettledPart, only_switches
 
 _FULLY_OPEN = 0.98
 """Command above which a valve counts as fully open [-]."""
@@ -36,8 +36,8 @@ class Case(NamedTuple):
 
     @property
     def only_switches(self) -> bool:
-        """True for a controller that opens the valve fully or not at all."""
-        return self.law is not None and self.law.only_switches
+        """True for a valve that is only ever fully open or shut, by its controller or as a pair."""
+        return only_switches(self.scenario, self.law)
 
     @property
     def is_fully_open(self) -> NDArray[np.bool_]:

@@ -13,7 +13,7 @@ from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.load_causes import flung_at_start, load_beyond_reach, stop_of, torque_beyond_reach
 from ppafo.simulation.tracking.pair_step import pair_step
 from ppafo.simulation.tracking.remedies import (
-    Remedy,
+    CASCADE,
     change_text,
     dead_band,
     gain_of_device,
@@ -33,6 +33,10 @@ from ppafo.simulation.tracking.rule import LARGEST_SHARE
 
 _MOSTLY = 0.5
 """Fraction of the settled part that counts as most of it [-]."""
+_ALWAYS = 0.9
+"""Fraction of the samples that counts as nearly all [-]."""
+_FINE = 0.1
+"""Step of an on/off valve during its dead time divided by the wanted change, up to which it makes no loop fail [-]."""
 _EDGE = 1.05
 """Command divided by the dead band, up to which the command counts as within the band [-]."""
 _EXPLAINED = 0.6
@@ -77,17 +81,22 @@ def oscillation(case: Case) -> TrackingCause | None:
     # Gains are those of where the joint is to be, where that is known.
     is_known = scenario.motion.motion_kind.sees(scenario).places is not anywhere
     quicker = 1.0 if is_known else quicker_at(scenario.device, angle, scenario.controlled)
-    if law.only_switches:
-        # A pair changes the quantity during its dead time, however little is wanted.
+    if case.only_switches:
+        # Full openings change the quantity during the dead time, however little is wanted.
         step, dead_time = pair_step(scenario, law)
         step *= quicker
         ratio = step / case.settled.wanted
+        if ratio <= _FINE and not case.oscillates:
+            return None
         controlled = scenario.controlled if TORQUE in law.controls else TORQUE
+        opens = "" if law.only_switches else f"`{law.name}` asks for openings that on/off valves do not have: "
         text = (
-            f"its valves change it by {change_text(controlled, step)} in their dead time of {1.0e3 * dead_time:.3g} "
-            f"ms, {ratio:.2g} times what is wanted"
+            f"{opens}its valves change it by {change_text(controlled, step)} in their dead time of "
+            f"{1.0e3 * dead_time:.3g} ms, {ratio:.2g} times what is wanted"
         )
-        return TrackingCause(text, smaller_pair(scenario, ratio), "take faster or smaller valves")
+        # Where a valve has gradual openings, a law that uses them for an angle is the better remedy.
+        gradual = (CASCADE,) if scenario.controlled == ANGLE else ()
+        return TrackingCause(text, (*gradual, *smaller_pair(scenario, ratio)), "take faster or smaller valves")
     names = [quantity.name for quantity in speed_settings(scenario, law).values()]
     if not names:
         return TrackingCause("its law is too fast for what is late", (), "give its law smaller gains, or a slower one")
@@ -139,22 +148,31 @@ def _static_friction(case: Case) -> TrackingCause | None:
 
 
 def _fully_open_valve(case: Case) -> TrackingCause | None:
-    """Cause: the valve is fully open for most of the settled part, towards the reference or away from it."""
-    scenario, samples = case.scenario, case.settled.samples
-    command = case.recording["command"][samples]
-    is_open = case.is_fully_open
+    """Cause: the valve is fully open for most of the settled part, and too small."""
+    share = float(np.mean(case.is_fully_open))
+    if share <= _MOSTLY:
+        return None
+    text = f"its valve is fully open for {100.0 * share:.0f} % of the time: it is too small for this task"
+    return TrackingCause(text, sized_valves(case.scenario, (3.0, 10.0)), "take a larger valve or a slower reference")
+
+
+def _opened_away(case: Case) -> TrackingCause | None:
+    """Cause: the valve is fully open for most of the settled part, away from the reference."""
+    scenario, samples, is_open = case.scenario, case.settled.samples, case.is_fully_open
     if np.mean(is_open) <= _MOSTLY:
         return None
     reference, value = (series[samples] for series in followed(case.recording))
     # Sign of the command that reduces a positive error.
     upwards = error_functions(scenario.controlled, scenario.device.supply.is_vacuum).steered(1.0)
-    is_away = np.asarray(upwards * command * (reference - value) < 0.0)[is_open]
-    opened = f"its valve is fully open for {100.0 * np.mean(is_open):.0f} % of the time"
-    if np.mean(is_away) > _MOSTLY:
-        text = f"{opened}, away from the reference for {100.0 * np.mean(is_away):.0f} % of it"
-        return TrackingCause(text, (), "turn the sign of its command or of what it measures")
-    text = f"{opened}: it is too small for this task"
-    return TrackingCause(text, sized_valves(case.scenario, (3.0, 10.0)), "take a larger valve or a slower reference")
+    is_away = np.asarray(upwards * case.recording["command"][samples] * (reference - value) < 0.0)[is_open]
+    # An on/off loop that swings about its reference is late for half of the time.
+    if np.mean(is_away) <= (_ALWAYS if case.only_switches else _MOSTLY):
+        return None
+    text = (
+        f"its valve is fully open for {100.0 * np.mean(is_open):.0f} % of the time, away from the reference for "
+        f"{100.0 * np.mean(is_away):.0f} % of it"
+    )
+    return TrackingCause(text, (), "turn the sign of its command or of what it measures")
 
 
 def _lag(case: Case) -> TrackingCause | None:
@@ -193,7 +211,7 @@ def _law_without_torque_loop(case: Case) -> TrackingCause | None:
     if torque_asked(case.scenario, law, case.settled.error) is not None:
         return None
     text = f"`{law.name}` acts on the angle without a torque loop inside, and is slow against load and friction"
-    return TrackingCause(text, (Remedy({}, ("controller.kind=cascade",)),), "take `controller.kind = cascade`")
+    return TrackingCause(text, (CASCADE,), f"take {CASCADE.text}")
 
 
 def _is_settling(case: Case) -> bool:
@@ -227,6 +245,7 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     flung_at_start,
     _static_friction,
     _shut_valve,
+    _opened_away,
     oscillation,
     _fully_open_valve,
     gains_of_another_device,

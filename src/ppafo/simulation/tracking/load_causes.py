@@ -10,8 +10,10 @@ from ppafo.parameters.reach import static_torque, supply_for, supply_that_moves,
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.tracking.case import Case, TrackingCause
-from ppafo.simulation.tracking.remedies import change_text, level_text, remedy, stiffer_laws, torque_asked
+from ppafo.simulation.tracking.remedies import Remedy, change_text, level_text, remedy, stiffer_laws, torque_asked
 
+LOCKED = Remedy({}, ("motion.kind=locked",))
+"""Remedy for a free joint that nothing resists."""
 _ON_STOP = 1.0e-3
 """Distance from a stop up to which a joint rests on it [rad]."""
 _MOSTLY = 0.5
@@ -43,9 +45,7 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
         f"actuator gives {level_text('N m', reach)} at most"
     )
     if lies:
-        return TrackingCause(
-            text, (), "lock the joint (`motion.kind = locked`) or give it a load", is_beyond_reach=True
-        )
+        return TrackingCause(text, (), f"lock the joint ({LOCKED.text}) or give it a load", is_beyond_reach=True)
     remedies = []
     needed = supply_for(scenario.device, wanted_at, 1.05 * wanted)
     if needed is not None:

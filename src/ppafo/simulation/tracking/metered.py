@@ -24,6 +24,7 @@ from ppafo.simulation.tracking.rule import (
     excess_of_task,
     excess_of_walk,
     is_noisy,
+    only_switches,
     torque_limit,
 )
 
@@ -64,8 +65,7 @@ def tracking_excess(scenario: Scenario, metrics: Mapping[str, Floats], most_reve
             known = (np.isfinite(error) & (requested > 0.0)) | (np.isnan(error) & np.isfinite(peak) & (limit > 0.0))
             return np.where(known, excess, np.nan)
         settled = _settled_task(scenario, {name.removeprefix("settled_"): row for name, row in numbers.items()}, least)
-        law = scenario.law
-        found = excess_of_task(settled, law is not None and law.only_switches)
+        found = excess_of_task(settled, only_switches(scenario, scenario.law))
         # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does.
         # On the ramp every loop is behind, and what lies beyond reach may not have been asked for yet.
         is_short = (shortfall(scenario) > 0.0) & ~np.asarray(settled.ends_on_ramp)

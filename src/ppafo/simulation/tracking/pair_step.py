@@ -11,7 +11,7 @@ from ppafo.simulation.numbers import number_at
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import change_text, smaller_pair
-from ppafo.simulation.tracking.rule import smallest_change, torque_limit
+from ppafo.simulation.tracking.rule import is_pair, smallest_change, torque_limit
 from ppafo.units.shown import in_units
 
 logger = logging.getLogger("ppafo")
@@ -42,8 +42,7 @@ def coarse_pair(scenario: Scenario) -> str:
     depends on the joint as much as on the pair.
     """
     law, controlled = scenario.law, CONTROLLED[scenario.controlled]
-    is_pair = "switching_interval" in scenario.device.valve.settings
-    if law is None or not is_pair or controlled.name == ANGLE:
+    if law is None or not is_pair(scenario) or controlled.name == ANGLE:
         return ""
     if scenario.follows_reference:
         initial = scenario.initial

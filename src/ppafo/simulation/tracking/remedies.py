@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from ppafo.arguments.door import override_text
 from ppafo.control import angle_loop, torque_loop
 from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import ANGLE, CONTROLLED
@@ -47,8 +48,12 @@ class Remedy:
 
     @property
     def text(self) -> str:
-        """Overrides as part of a sentence."""
-        return " and ".join(f"`{override.replace('=', ' = ', 1)}`" for override in self.overrides)
+        """Overrides as the caller gives them."""
+        return override_text(self.overrides)
+
+
+CASCADE = Remedy({}, ("controller.kind=cascade",))
+"""Remedy for a law that opens the valve by an angle alone: a torque loop inside."""
 
 
 def remedy(scenario: Scenario, numbers: Mapping[str, float]) -> Remedy:

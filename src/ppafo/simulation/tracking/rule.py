@@ -110,8 +110,8 @@ def most_reversals(scenario: Scenario, law: ControllerKind | None, duration: flo
 
     ``stride_time`` [s] is the stride time of a walk, 0 for a task.
     """
-    # A law that requests openings between shut and open should not reverse.
-    if law is None or not scenario.motion.motion_kind.asks_gradually(law):
+    # A law that requests openings between shut and open should not reverse, where the valve has these openings.
+    if law is None or is_pair(scenario) or not scenario.motion.motion_kind.asks_gradually(law):
         return math.inf
     if stride_time > 0.0:
         return duration * MOST_PER_STRIDE / stride_time
@@ -126,6 +126,16 @@ def most_reversals(scenario: Scenario, law: ControllerKind | None, duration: flo
     times = np.linspace(0.0, duration, _TIMES_OF_REFERENCE)
     values = np.asarray(profile_values(scenario.reference, times)[0], dtype=np.float64)
     return most + PER_TURN * reversals(values, OSCILLATION_THRESHOLD * (highest - lowest))
+
+
+def is_pair(scenario: Scenario) -> bool:
+    """True if the valve of the device is a pair of on/off valves."""
+    return "switching_interval" in scenario.device.valve.settings
+
+
+def only_switches(scenario: Scenario, law: ControllerKind | None) -> bool:
+    """True if a valve is only ever fully open or shut, by its controller or as a pair: the loop swings by design."""
+    return is_pair(scenario) or (law is not None and law.only_switches)
 
 
 def is_noisy(scenario: Scenario) -> bool:
@@ -261,9 +271,9 @@ class _TaskExcess(NamedTuple):
     still: Floats
 
 
-def largest_error(settled: SettledPart, only_switches: bool) -> Floats:
+def largest_error(settled: SettledPart, is_switched: bool) -> Floats:
     """Largest RMS error with which a task follows, in the unit of ``settled``, whose numbers may be arrays (runs,)."""
-    if only_switches:
+    if is_switched:
         return LARGEST_SHARE_SWITCHED * np.asarray(settled.wanted)
     rests, wanted, wave = np.asarray(settled.rests), np.asarray(settled.wanted), np.asarray(settled.wave)
     # A wave below what a reference at rest may be missed by is judged as rest.
@@ -275,18 +285,18 @@ def largest_error(settled: SettledPart, only_switches: bool) -> Floats:
     return limit
 
 
-def excess_of_task(settled: SettledPart, only_switches: bool) -> _TaskExcess:
+def excess_of_task(settled: SettledPart, is_switched: bool) -> _TaskExcess:
     """Numbers of a task divided by their limits, apart from command reversals: the task follows if none is above 1.
 
-    ``only_switches`` is true for a controller without gradual openings. The numbers of ``settled`` may be arrays
+    ``is_switched`` is true for a valve without gradual openings. The numbers of ``settled`` may be arrays
     (runs,).
     """
     rests, share, way = np.asarray(settled.rests), np.asarray(settled.share), np.asarray(settled.way)
     # Degrees count for an angle, however far it goes.
     worst = settled.worst / np.maximum(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * way)
     span = np.where(way > 0.0, settled.span / np.maximum(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * way), 0.0)
-    off = np.asarray(settled.error) / largest_error(settled, only_switches)
-    if only_switches:
+    off = np.asarray(settled.error) / largest_error(settled, is_switched)
+    if is_switched:
         # It swings about its reference by design: its mean error is to be less.
         beside = np.abs(settled.missing) / (LARGEST_MEAN_SWITCHED * settled.wanted)
         off = np.where(rests, np.maximum(off, beside), off)
@@ -294,27 +304,27 @@ def excess_of_task(settled: SettledPart, only_switches: bool) -> _TaskExcess:
         off = np.maximum(off, np.where(rests, span, np.where(way > 0.0, worst, 0.0)))
     # A run that ends on its ramp has no settled part: every loop is behind there.
     off = np.where(settled.ends_on_ramp, 0.0, off)
-    if only_switches:
+    if is_switched:
         swings = np.where(settled.swing > np.abs(settled.missing), off, 0.0)
     else:
         swings = np.where(rests | (off > 1.0), np.asarray(settled.turns) / (SUSTAINED - 1), 0.0)
         # A joint that creeps has a range of its error, too, and is no loop that swings.
         is_swing = rests & (settled.swing > np.abs(settled.missing))
         swings = np.where(is_swing, np.maximum(swings, span), swings)
-    is_counted = rests & (not only_switches)
+    is_counted = rests & (not is_switched)
     peak = np.where(is_counted, settled.peak / (LARGEST_PEAK * settled.wanted), 0.0)
     is_still = (share > LARGEST_SHARE) & (settled.moved <= SMALLEST_MOVE * settled.wanted)
     still = np.where(is_still, share / LARGEST_SHARE, 0.0)
     return _TaskExcess(off=off, swings=swings, peak=peak, still=still)
 
 
-def failure_of_task(settled: SettledPart, turning: float, only_switches: bool) -> Failure | None:
+def failure_of_task(settled: SettledPart, turning: float, is_switched: bool) -> Failure | None:
     """Kind of failure of a task; None if the task follows.
 
-    ``turning`` is the number of command reversals divided by its limit; ``only_switches`` is true for a controller
-    without gradual openings.
+    ``turning`` is the number of command reversals divided by its limit; ``is_switched`` is true for a valve without
+    gradual openings.
     """
-    off, swings, peak, still = (float(number) for number in excess_of_task(settled, only_switches))
+    off, swings, peak, still = (float(number) for number in excess_of_task(settled, is_switched))
     if still > 1.0:
         return "does not move"
     if turning > 1.0 or swings > 1.0:

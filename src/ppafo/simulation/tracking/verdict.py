@@ -20,6 +20,7 @@ from ppafo.simulation.tracking.rule import (
     is_noisy,
     largest_error,
     most_reversals,
+    only_switches,
     settled_task,
     settled_walk,
     torque_limit,
@@ -42,9 +43,10 @@ class Tracking:
     ``missing`` the mean error and ``moved`` the range of the value, all in SI of the ``controlled`` quantity.
     ``reversals`` is the number of command reversals per stride or second, as ``per`` says. ``cause`` is the cause, with
     ``advice``; ``remedies`` are the remedies, most promising first; ``others`` are further, less certain causes;
-    ``tried`` is the result of tried remedies. ``accepted`` is the scenario's reason for a reference beyond reach, else
-    "". ``at_rest`` is true if reference and joint stand still. ``since`` [s] is the start of the settled part, 0 for a
-    walk. ``span`` is the range of the error of an angle that swings slowly, else 0.
+    ``tried`` is the result of tried remedies, and ``mended`` the overrides with which the run follows. ``accepted`` is
+    the scenario's reason for a reference beyond reach, else "". ``at_rest`` is true if reference and joint stand still.
+    ``since`` [s] is the start of the settled part, 0 for a walk. ``span`` is the range of the error of an angle that
+    swings slowly, else 0.
     """
 
     kind: Failure
@@ -61,6 +63,7 @@ class Tracking:
     others: tuple[TrackingCause, ...] = ()
     accepted: str = ""
     tried: str = ""
+    mended: tuple[str, ...] = ()
     at_rest: bool = True
     since: float = 0.0
     span: float = 0.0
@@ -193,7 +196,7 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None
     counted = settled.reversals * max(recording.duration, 1.0) if is_noisy(scenario) else reversals
     turning = counted / most_reversals(scenario, law, recording.duration, stride_time)
     if is_task:
-        failure = failure_of_task(settled, turning, law is not None and law.only_switches)
+        failure = failure_of_task(settled, turning, only_switches(scenario, law))
     else:
         failure = failure_of_walk(settled, turning, limit)
     case = Case(scenario=scenario, law=law, recording=recording, settled=settled, failure=failure)

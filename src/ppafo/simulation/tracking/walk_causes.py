@@ -38,19 +38,20 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
         # Dorsiflexion torque requested from an actuator that pushes in plantarflexion only.
         asked, lowest = float(reference[places].min()), float(reaches[:, 0].min())
         text = (
-            f"its controller asks for {level_text('N m', asked)}, where the actuator gives "
+            f"its controller requests {level_text('N m', asked)}, where the actuator gives "
             f"{level_text('N m', lowest)} at most: it pushes one way only"
         )
         settings = scenario.controller.settings
         unasked = {f"controller.{name}": 0.0 for name in _DORSIFLEXION if settings.get(name, 0.0) > 0.0}
         omission = (remedy(scenario, unasked),) if unasked else ()
-        advice = "ask for no dorsiflexion, or let a spring lift the foot"
+        advice = "request no dorsiflexion, or let a spring lift the foot"
         return TrackingCause(text, omission, advice, is_beyond_reach=True)
     lacks_most = int(np.argmax(np.maximum(above, below)))
     given = float(reaches[lacks_most, 1 if above[lacks_most] > 0.0 else 0])
     text = (
-        f"in {100.0 * share:.0f} % of the time its controller asks for more than the actuator gives there, "
-        f"{level_text('N m', given)} of {level_text('N m', float(reference[places][lacks_most]))} asked for at worst"
+        f"its controller requests more torque than the actuator can give in {100.0 * share:.0f} % of the time, such as "
+        f"{level_text('N m', float(reference[places][lacks_most]))} where the actuator gives "
+        f"{level_text('N m', given)}"
     )
     numbers: dict[str, float] = {}
     for path, lacking in (("supply.pressure", above), ("supply.dorsiflexion_pressure", below)):
@@ -65,7 +66,9 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
         least = float(np.quantile(np.where(reference[places] > 0.0, reaches[:, 1], -reaches[:, 0]), _OFTEN))
         if least > 0.0:
             remedies.append(remedy(scenario, {"controller.largest_torque": least}))
-    return TrackingCause(text, tuple(remedies), "take a higher `supply.pressure` or ask for less", is_beyond_reach=True)
+    return TrackingCause(
+        text, tuple(remedies), "take a higher `supply.pressure` or request less torque", is_beyond_reach=True
+    )
 
 
 def _valve_of_walk(case: Case) -> TrackingCause | None:

@@ -1,0 +1,97 @@
+"""Verdict on a walk: benefit of the device, compared with the same walk without it, and a remedy if it has none."""
+
+import contextlib
+
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import PpafoError
+from ppafo.loading import reloaded
+from ppafo.report.kind import Kind
+from ppafo.simulation.tracking.remedies import remedy
+from ppafo.walking.motion import walk_of
+from ppafo.walking.result import WalkResult
+from ppafo.walking.safety_events import event_lines
+from ppafo.walking.walk import WalkComparison, walk
+
+_WORK, _SHARE = Kind("", "J", "energy", ".3g"), Kind("", "1", "fraction", ".2g")
+_ANGLE, _HEIGHT = Kind("", "rad", "angle", ".3g"), Kind("", "m", "length", ".2g")
+_LAWS = (
+    ("controller.kind=event_proportional",),
+    ("controller.kind=event_proportional", "device.valve=proportional"),
+)
+"""Controller tried for a walk without one, and the valve that it needs."""
+_PRESSURES = (1.2, 1.4, 1.7, 2.0, 3.0, 5.0)
+"""Factors on the gauge pressures of supply that are tried for toes that would drag."""
+_HIGHEST_PRESSURE = 1.0e6
+"""Highest gauge pressure [Pa] that is tried: ten bar, the rating of most small pneumatic parts."""
+_MINUTES = 0.15
+"""Minutes of a walk with a remedy: a few strides after the transient."""
+
+
+def benefit_sentence(comparison: WalkComparison) -> str:
+    """Return whether the device helps, with the numbers of the walks with and without it; "" for a walk that diverged.
+
+    Helpful are net work in push-off, toes above the ground, and an ankle closer to the healthy one.
+    """
+    worn, bare = comparison.with_device, comparison.without_device
+    if not comparison.is_completed or "net_push_off_work" not in worn.metrics:
+        faults = event_lines(worn.events)[:1]
+        return "" if worn.is_helped else f"the device does not help: {'; '.join((worn.help_text, *faults))}"
+    numbers = {name: metric.value for name, metric in worn.metrics.items()}
+    without = {name: metric.value for name, metric in bare.metrics.items()}
+    work, toes, bare_toes = numbers["net_push_off_work"], numbers.get("lowest_toes"), without.get("lowest_toes")
+    has_work, drags, dragged = work > 0.0, toes is not None and toes < 0.0, bare_toes is not None and bare_toes < 0.0
+    said = [f"{_WORK.text(work)} of net work in push-off"]
+    if "push_off_share" in numbers:
+        said[0] += f" (positive work {_SHARE.text(numbers['push_off_share'])} of the healthy ankle's)"
+    closer = 0.0
+    if "angle_difference" in numbers and "angle_difference" in without:
+        closer = without["angle_difference"] - numbers["angle_difference"]
+        angles = _ANGLE.text(numbers["angle_difference"]), _ANGLE.text(without["angle_difference"])
+        said.append(f"ankle {angles[0]} from the healthy one ({angles[1]} without)")
+    if toes is not None:
+        height = "toes would drag" if drags else f"toes {_HEIGHT.text(toes)} over the ground"
+        said.append(f"{height} ({'also' if drags == dragged else 'would drag' if dragged else 'clear'} without)")
+    lifts = not drags and (dragged or closer > 0.0)
+    where = {(True, True): "", (True, False): " in push-off but not in swing", (False, True): " in swing alone"}
+    if not worn.is_helped or not (has_work or lifts):
+        verdict = "the device does not help"
+        said += [] if worn.is_helped else [worn.help_text, *event_lines(worn.events)[:1]]
+    else:
+        verdict = f"the device helps{where[has_work, lifts or not drags]}"
+    needs = drags or not has_work
+    return f"{verdict}, against the same walk without it: {', '.join(said)}{_remedied(worn, drags) if needs else ''}"
+
+
+def _remedied(worn: WalkResult, drags: bool) -> str:
+    """Return the cause of missing help and the first remedy with work in push-off and toes above the ground."""
+    scenario, supply = worn.scenario, worn.scenario.device.supply
+    if walk_of(scenario).bottle is not None or not worn.is_helped:
+        return ""
+    if scenario.controller.kind == "off":
+        cause, candidates = "its controller is off", list(_LAWS)
+        advice = "another controller alone does not mend it"
+    else:
+        cause = "the ankle is not lifted enough" if drags else "the torque comes against the motion"
+        advice = "more supply pressure alone does not mend it: take an actuator with more torque"
+        paths = {"supply.pressure": supply.pressure}
+        if supply.dorsiflexion_pressure != supply.pressure:
+            paths["supply.dorsiflexion_pressure"] = supply.dorsiflexion_pressure
+        candidates = [
+            remedy(
+                scenario,
+                {path: STANDARD_ATMOSPHERE + factor * (level - STANDARD_ATMOSPHERE) for path, level in paths.items()},
+            ).overrides
+            for factor in _PRESSURES
+            if factor * (supply.pressure - STANDARD_ATMOSPHERE) <= _HIGHEST_PRESSURE
+        ]
+    for overrides in candidates:
+        with contextlib.suppress(PpafoError):
+            again = walk(reloaded(scenario, overrides), minutes=_MINUTES)
+            lowest, work = (again.metrics[name].value for name in ("lowest_toes", "net_push_off_work"))
+            if again.status.is_completed and again.is_helped and work > 0.0 and (lowest >= 0.0 or not drags):
+                changed = " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
+                return (
+                    f"; {cause}: with {changed}, toes {_HEIGHT.text(lowest)} over the ground and {_WORK.text(work)}, "
+                    "as a further walk shows"
+                )
+    return f"; {cause}, and {advice}"

@@ -1,0 +1,54 @@
+"""Second line of a walk: whether the device helps, with numbers of both walks, the cause if not, and a remedy."""
+
+import re
+
+import pytest
+
+import ppafo
+from ppafo.analyses.walk.benefit import benefit_sentence
+from ppafo.walking.walk import compare_walks
+
+
+def sentence(name: str, *overrides: str, minutes: float = 0.1) -> str:
+    return benefit_sentence(compare_walks(ppafo.load_walk(name, overrides), minutes=minutes))
+
+
+def test_a_walk_that_helps_says_with_which_numbers_and_against_which_walk() -> None:
+    said = sentence("proportional")
+    assert said == (
+        "the device helps, against the same walk without it: 1.66 J of net work in push-off (positive work 7.4 % of "
+        "the healthy ankle's), ankle 3.51 deg from the healthy one (20.1 deg without), toes 6.8 mm over the ground "
+        "(would drag without)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "verdict", "cause"),
+    [
+        ("solenoid", "the device helps in push-off but not in swing, ", "the ankle is not lifted enough"),
+        ("off", "the device does not help, ", "its controller is off"),
+    ],
+)
+def test_the_remedy_of_a_walk_that_does_not_lift_the_toes_lifts_them(name: str, verdict: str, cause: str) -> None:
+    said = sentence(name)
+    assert said.startswith(verdict)
+    assert f"; {cause}: with `" in said
+    remedy = tuple(text.replace(" = ", "=", 1) for text in re.findall("`(.*?)`", said))
+    again = sentence(name, *remedy, minutes=0.15)
+    assert again.startswith("the device helps, against the same walk without it")
+
+
+def test_strides_without_help_are_the_reason_and_the_first_fault_is_named() -> None:
+    stuck = ("faults.heel.kind=stuck", "faults.heel.time=3 s", "faults.heel.reading=0 N")
+    said = sentence("proportional", *stuck, minutes=0.2)
+    assert said.startswith("the device does not help: help in 2 of 10 strides: fewer than half; lift-only")
+
+
+def test_a_request_beyond_the_actuator_names_both_torques() -> None:
+    tracking = ppafo.walk("proportional", minutes=0.1, overrides=["supply.pressure=15 psi_g"]).tracking
+    assert tracking is not None
+    assert re.fullmatch(
+        r"its controller requests more torque than the actuator can give in \d+ % of the time, such as -5 N m where "
+        r"the actuator gives -1\.\d+ N m",
+        tracking.cause,
+    )
