@@ -84,9 +84,11 @@ class _RunReport:
 
     @property
     def verdict(self) -> list[str]:
-        """Sentence on following the reference; empty for a run without a reference."""
+        """Sentences on following the reference, and on how often valves switch; empty for a run without a reference."""
+        from ppafo.simulation.tracking.pair_step import unlimited_switching
+
         sentence = self.result.following if self.tracking is None else self.tracking.sentence
-        return [sentence] if sentence else []
+        return [said for said in (sentence, unlimited_switching(self.result)) if said]
 
     @property
     def usage(self) -> list[str]:

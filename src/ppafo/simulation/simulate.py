@@ -125,10 +125,10 @@ class Result:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Reasons why the run is of limited use, a sentence each: a missed reference, a too coarse pair of valves."""
-        from ppafo.simulation.tracking.pair_step import coarse_pair
+        from ppafo.simulation.tracking.pair_step import coarse_pair, unlimited_switching
 
         verdict = self.tracking
-        said = ("" if verdict is None else verdict.sentence, coarse_pair(self.scenario))
+        said = ("" if verdict is None else verdict.sentence, unlimited_switching(self), coarse_pair(self.scenario))
         return tuple(sentence for sentence in said if sentence)
 
     @in_units(_units_of)

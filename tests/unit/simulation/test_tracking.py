@@ -418,3 +418,22 @@ def test_a_law_that_switches_a_gradual_valve_by_an_angle_is_told_the_law_that_op
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
     assert verdict.mended == ("controller.kind=cascade",)
+
+
+def test_valves_whose_set_limits_nothing_are_told_how_often_they_switch() -> None:
+    changes = ["valve.switching_interval=0 s", "controller.rate=1 kHz", "reference.level=3 N m"]
+    quick = simulate("torque-task-solenoid", changes)
+    assert quick.tracking is None
+    (remark,) = (said for said in quick.warnings if "a second" in said)
+    assert re.match(r"its valves are reversed \d+ times a second, and no number of the set limits that ", remark)
+    assert remark in str(quick)
+    for limited in ("valve.switching_interval=20 ms", "valve.opening_delay=5 ms"):
+        told = simulate("torque-task-solenoid", [*changes[1:], limited])
+        assert not any("a second, and no number" in said for said in told.warnings)
+    assert simulate(TASK, ["reference.level=4 N m"]).warnings == ()
+
+
+def test_a_reference_just_beyond_reach_that_is_followed_within_the_limit_is_told_the_reach() -> None:
+    told = simulate(TASK, ["reference.level=5.1 N m", "run.duration=6 s"]).following
+    assert told.endswith("N m allowed; at 75 deg and 50 psi_g the actuator gives 5 N m at most")
+    assert "at most" not in simulate(TASK, ["reference.level=4 N m"]).following

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import ANGLE, CONTROLLED
@@ -11,11 +12,24 @@ from ppafo.simulation.numbers import number_at
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import change_text, smaller_pair
-from ppafo.simulation.tracking.rule import is_pair, smallest_change, torque_limit
+from ppafo.simulation.tracking.rule import (
+    REVERSALS,
+    is_pair,
+    only_switches,
+    smallest_change,
+    torque_limit,
+)
 from ppafo.units.shown import in_units
+
+if TYPE_CHECKING:
+    from ppafo.simulation.at_hand import RecordedResult
 
 logger = logging.getLogger("ppafo")
 
+_LIMITS = ("opening_delay", "closing_delay", "switching_interval", "spool_frequency", "slew_limit")
+"""Numbers of a valve that limit how often it switches; each limits nothing where it is 0."""
+_REPORTED_SWITCHING = 20.0
+"""Switching frequency of the solenoid valves of the paper [Hz], the only one that it reports."""
 _LARGEST_STEP = 0.25
 """Step of a pair divided by the wanted change, above which a warning is logged [-]."""
 
@@ -25,6 +39,26 @@ def pair_step(scenario: Scenario, law: ControllerKind) -> tuple[float, float]:
     terms = terms_of(scenario, law)
     rate, dead_time = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
     return rate * dead_time, dead_time
+
+
+def unlimited_switching(result: "RecordedResult") -> str:
+    """Remark on valves that switch quickly in a task, with no number in their set that limits the rate; "" for others.
+
+    Quickly means above the switching frequency that the paper reports of its solenoid valves.
+    """
+    scenario = result.scenario
+    if not (scenario.follows_reference and only_switches(scenario, scenario.law)) or REVERSALS not in result.metrics:
+        return ""
+    often = result.metrics[REVERSALS].value / max(result.recording.duration, 1.0)
+    valve = scenario.device.valve.settings
+    limits = [name for name in _LIMITS if name in valve]
+    if often <= _REPORTED_SWITCHING or any(valve[name] > 0.0 for name in limits):
+        return ""
+    missing = ", ".join(f"`valve.{name}`" for name in limits)
+    return (
+        f"its valves are reversed {often:.3g} times a second, and no number of the set limits that ({missing} are 0): "
+        f"give those of the valve, or a lower `controller.rate`"
+    )
 
 
 def warn_of_coarse_pairs(scenarios: Iterable[Scenario]) -> None:
