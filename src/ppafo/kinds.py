@@ -100,7 +100,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
             try:
                 if point.name in self._own:
                     name = f"{self.word} '{one_line(point.name)}' of {_package(point)}"
-                    raise KindError(f"{name} has the name of one of ppafo's own; it needs another name")
+                    raise KindError(f"{name}: ppafo already has a kind of this name; rename it")
                 if point.name not in self._kinds:
                     self._kinds[point.name] = self._load(point)
             except KindError as error:
@@ -144,7 +144,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
             raise KindError(f"{where} {is_a}")
         name = getattr(kind, "name", called)
         if called and name != called:
-            raise KindError(f"{where} calls itself '{one_line(name)}'; entry point and kind need one name")
+            raise KindError(f"{where}: its kind is named '{one_line(name)}'; give entry point and kind the same name")
         return kind
 
 

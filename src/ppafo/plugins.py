@@ -133,7 +133,7 @@ def object_of(word: str) -> Any:
     plugin = next((named[known] for known in (module, *reversed(parents)) if known in named), None)
     if plugin is None and module not in sys.modules:
         raise KindError(
-            f"a file runs no code, and you have not named the module '{module}'; if you trust it, add "
+            f"module '{module}' is not allowed, because a file runs no code; if you trust the module, add "
             f"--plugin {_remedy(module)} (in Python plugins=['{_remedy(module)}'])"
         )
     loaded = sys.modules[module] if plugin is None else _imported(module, plugin.folder)

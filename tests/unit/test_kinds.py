@@ -87,9 +87,7 @@ def test_a_name_of_one_of_our_own_is_refused_by_name(install: Install) -> None:
     ours = CONTROLLERS["pid"]
     install("clashing_laws", LAW.format(name="on_off", call="pid"), controllers="pid")
     (problem,) = CONTROLLERS.load_all()
-    assert problem == (
-        "controller 'pid' of package 'clashing_laws' has the name of one of ppafo's own; it needs another name"
-    )
+    assert problem == ("controller 'pid' of package 'clashing_laws': ppafo already has a kind of this name; rename it")
     assert CONTROLLERS["pid"] is ours
 
 
@@ -104,7 +102,7 @@ def test_two_packages_with_one_name_are_both_named(install: Install) -> None:
     ("text", "problem"),
     [
         ("KIND = 1.0\n", "is of type float, not ControllerKind"),
-        (LAW.format(name="on_off", call="another"), "calls itself 'another'"),
+        (LAW.format(name="on_off", call="another"), "its kind is named 'another'"),
         ("", "cannot be loaded: AttributeError"),
     ],
 )
@@ -129,7 +127,10 @@ def test_a_law_is_named_by_module_and_object_from_the_working_folder(
     for name, problem in (
         ("nowhere:KIND", "No module named 'nowhere'"),
         ("beside:LAW", "has no attribute 'LAW'"),
-        ("json.tool:main", "you have not named the module 'json.tool'; if you trust it, add --plugin"),
+        (
+            "json.tool:main",
+            "module 'json.tool' is not allowed, because a file runs no code; if you trust the module, add --plugin",
+        ),
         ("math:pi", "is of type float"),
     ):
         with pytest.raises(KindError, match=problem):

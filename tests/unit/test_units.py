@@ -85,7 +85,7 @@ def test_absolute_pressure_and_differences_ignore_the_atmosphere() -> None:
 
 @pytest.mark.parametrize("unit", ["psi", "bar", "kPa", "Pa", "MPa", "lbf/in^2", "kgf/cm2", "mmHg"])
 def test_a_bare_pressure_is_refused_with_the_ways_to_say_it_that_fit(unit: str) -> None:
-    said = f"'{unit}' does not say which pressure: write {unit}_"
+    said = f"'{unit}' needs the kind of pressure: write {unit}_"
     with pytest.raises(UnitError, match=re.escape(f"{said}g for gauge or {unit}_a for absolute") + "$"):
         parse_quantity(f"50 {unit}", "Pa_a")
     with pytest.raises(UnitError, match=re.escape(f"{said}d for a difference") + "$"):
@@ -329,7 +329,7 @@ def test_what_a_parser_may_take_for_a_number_is_no_unit(unit: str) -> None:
 
 @pytest.mark.parametrize("unit", ["mdegC", "kdegC s", "J/(kg udegC)", "millidegC", "kdegC_g"])
 def test_a_temperature_with_a_zero_of_its_own_takes_no_prefix(unit: str) -> None:
-    with pytest.raises(UnitError, match=f"'{re.escape(unit)}': degC takes no prefix"):
+    with pytest.raises(UnitError, match=f"'{re.escape(unit)}': degC and degF take no prefix"):
         to_si(20.0, unit, "K")
 
 

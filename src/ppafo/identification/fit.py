@@ -131,7 +131,7 @@ def fit(
     samples = sum(block.rows.stop - block.rows.start for block in blocks)
     sought = sum(math.isinf(number.deviation) for number in numbers)
     if samples <= sought:
-        raise IdentificationError(f"{samples} samples for {sought} numbers that are sought; more samples are needed")
+        raise IdentificationError(f"{samples} samples cannot determine {sought} parameters; give more samples")
     best = _fit_from(runs, runs.start, confidence)
     # A right law in its right place has neither.
     if best.conflict is None and best.has_converged:
@@ -198,7 +198,9 @@ def _search(runs: FitRuns, start: Floats) -> tuple[Floats, Indices]:
     point, outliers = np.clip(start, runs.low, runs.high), np.zeros(0, dtype=np.intp)
     residuals = runs.residuals_at(point)
     if not np.isfinite(residuals).all():
-        raise IdentificationError("no run succeeds at the start values; give others, or check the recordings")
+        raise IdentificationError(
+            "every run fails at the start values; give other start values, or check the recordings"
+        )
     noise, _ = runs.deviations(residuals[:, None])
     begun = time.monotonic()
     for number in range(_PASSES):

@@ -61,7 +61,7 @@ class ProcedureContext:
         """Return the value at a path [SI]. Raises IdentificationError if the set has none."""
         value = number_in_si(with_followers(self.parameter_set), path)
         if value is None:
-            raise IdentificationError(f"{self.label}: needs {path}, which {self.parameter_set.file} does not have")
+            raise IdentificationError(f"{self.label}: {path} is missing; add it to {self.parameter_set.file}")
         return value
 
     def gas(self, problem: "OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem") -> GasAt:

@@ -125,8 +125,8 @@ class FitRuns:
         if failing.size:
             number = self.numbers[failing[0]]
             raise IdentificationError(
-                f"{number.name}: no run succeeds near {point[failing[0]] * number.scale:.6g}; give other bounds or "
-                "another start"
+                f"{number.name}: every run fails near {point[failing[0]] * number.scale:.6g}; give other bounds "
+                "or another start value"
             )
         at_first = np.where(runs_above, values_above, values_below)
         at_second = np.where(runs_both, values_below, self.residuals_at(point)[:, None])

@@ -147,7 +147,9 @@ def check_valve(
     """
     for override in sorted(overrides) if valve else ():
         if valve and of_another_valve(override.typed, valve):
-            raise error(f"override '{override}' and {choice}: with the latter that valve is not used; omit one")
+            raise error(
+                f"override '{override}' has no effect with {choice}, which selects another valve; omit one of them"
+            )
 
 
 def other_forms(path: str, forms: Forms = FORMS) -> tuple[str, ...]:

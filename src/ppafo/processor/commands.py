@@ -64,11 +64,13 @@ def export_firmware(
         raise ScenarioError(f"{trial} needs a scenario, or {argument_text('table')}")
     if table and (scenarios or overrides):
         sets = argument_text("overrides", option="--set")
-        raise ScenarioError(f"{argument_text('table')} has scenarios of its own: give no scenario and no {sets}")
+        raise ScenarioError(f"{argument_text('table')} runs a fixed list of scenarios; omit the scenario and {sets}")
     if samples is not None and samples > MOST_SAMPLES:
         raise ScenarioError(f"{argument_text('samples', str(samples))}: must be 1 to {MOST_SAMPLES}")
     if samples is not None and len(scenarios) > 1:
-        raise ScenarioError(f"{argument_text('samples')} takes one scenario; without it several are drawn together")
+        raise ScenarioError(
+            f"{argument_text('samples')} needs exactly one scenario; omit it to plot several scenarios together"
+        )
     output.check_output(out, COMMAND)
     from ppafo.processor import words
 

@@ -123,7 +123,7 @@ def processor_simulator(contents: Mapping[str, bytes], target: Target) -> Iterat
     missing = missing_tools(target)
     if missing:
         raise SimulationError(
-            f"the simulator of {target.name} needs {', '.join(missing)}; {target.packages} are packages of Debian"
+            f"the simulator of {target.name} needs {', '.join(missing)}; install the Debian packages {target.packages}"
         )
     with temporary_folder("ppafo-processor", contents) as folder:
         make_firmware(Path(folder))

@@ -179,7 +179,7 @@ def drawn_readings(top: int, samples: int, seed: int) -> Iterator[ConverterCount
 def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision]) -> Cost:
     """Resources used by decisions on a processor. Raises SimulationError if there are no decisions."""
     if not decisions:
-        raise SimulationError("no sample was taken on the processor")
+        raise SimulationError("the simulated processor took no sample; simulate a longer run")
     work = [decision.work for decision in decisions]
     return Cost(target, image.shipped, stack, worst=max(work), mean=sum(work) / len(work))
 

@@ -88,7 +88,9 @@ def scenario_or_load(
     if not isinstance(scenario, Scenario):
         return load(scenario, overrides)
     if tuple(overrides):
-        raise ScenarioError(f"{scenario.name}: overrides are for the name or file of a scenario, not for a loaded one")
+        raise ScenarioError(
+            f"{scenario.name}: overrides apply to the name or file of a scenario; give them when loading the scenario"
+        )
     check_parts(scenario)
     return scenario
 

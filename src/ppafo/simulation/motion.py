@@ -223,7 +223,7 @@ def _read_leg(reading: DocumentReader, device: Device, _duration: float, _step: 
         if not PROFILES[kind].is_smooth:
             smooth = ", ".join([name for name, profile in PROFILES.items() if profile.is_smooth] + [GAIT_SHANK])
             raise reading.refusal(
-                f"{_SHANK}.kind", f"this profile has corners, at which the foot would be struck; use one of {smooth}"
+                f"{_SHANK}.kind", f"this profile has corners, at which the angular velocity jumps; use {smooth}"
             )
         return FreeMotion(*start, leg=Leg(**numbers, shank=shank))
     # A vane alone, or on a shank at rest, loads no gaits.

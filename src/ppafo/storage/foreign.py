@@ -49,8 +49,8 @@ def read_foreign(
     if len(recordings) > 1:
         with refused_as(DataError, path, DataError), in_map(map_name):
             raise DataError(
-                f"trial: {len(recordings)} recordings, where one is needed: name one; a procedure of 'ppafo identify' "
-                "takes all"
+                f"trial: the file has {len(recordings)} recordings; name one, or use all in a procedure of 'ppafo "
+                "identify'"
             )
     return recordings[0]
 
@@ -151,7 +151,7 @@ def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
     is_flow = HeaderColumn(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
     if not is_flow:
         if mapped.at is not None or mapped.gas is not None:
-            raise UnitError("at and gas belong to a volume flow, such as 'L/min', in the place of a mass flow")
+            raise UnitError("at and gas apply only to a volume flow, such as 'L/min'")
         return unit
     return with_condition(unit, mapped.at, mapped.gas or gas) if mapped.at else unit
 

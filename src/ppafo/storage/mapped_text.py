@@ -257,8 +257,7 @@ class _Numbers:
             grouped = _GROUPED[self.thousands].match(text)
             if grouped is None:
                 raise DataError(
-                    f"{at}: {_shown(text)} does not have groups of three digits, as thousands = "
-                    f'"{self.thousands}" says {key}'
+                    f"{at}: {_shown(text)} must have groups of three digits with thousands = '{self.thousands}' {key}"
                 )
             text = grouped.group().replace(mark, "") + text[grouped.end() :]
         # A point that is no decimal mark of the file makes the text no number.

@@ -175,10 +175,10 @@ def _own_items(group: Any) -> Iterator[tuple[str, Any]]:
 
     for name in group:
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            raise ValueError(f"'{one_line(name)}' is a link; a file must contain its numbers itself")
+            raise ValueError(f"'{one_line(name)}' is a link; save its numbers in the file itself")
         node = group[name]
         if isinstance(node, h5py.Dataset) and (node.is_virtual or node.external):
-            raise ValueError(f"the numbers of '{one_line(name)}' are in another file")
+            raise ValueError(f"the numbers of '{one_line(name)}' are in another file; save them in the file itself")
         yield name, node
 
 

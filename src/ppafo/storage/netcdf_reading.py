@@ -88,13 +88,13 @@ def _own_variables(file: Any) -> dict[str, Any]:
         raise DataError(f"there is no variable '{TIME}'")
     for name in names:
         if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-            raise DataError(f"'{name}' is a link; a recording must contain its numbers itself")
+            raise DataError(f"'{name}' is a link; save its numbers in the file itself")
     variables = {name: file[name] for name in names}
     for name, variable in variables.items():
         if len(getattr(variable, "shape", None) or ()) != 1 or variable.dtype.kind not in _KINDS_OF_NUMBERS:
             raise DataError(f"'{name}' must be numeric and one-dimensional over '{TIME}'")
         if variable.is_virtual or variable.external:
-            raise DataError(f"the numbers of '{name}' are in another file; a recording must contain its numbers itself")
+            raise DataError(f"the numbers of '{name}' are in another file; save them in the file itself")
     for name, variable in variables.items():
         if variable.size != variables[TIME].size:
             raise DataError(f"'{name}' has {variable.size} values for {variables[TIME].size} times")
@@ -103,9 +103,7 @@ def _own_variables(file: Any) -> dict[str, Any]:
         filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
         behind_gzip = filters[filters.index(_GZIP) + 1 :] if _GZIP in filters else []
         if not set(filters) <= _SUPPORTED_FILTERS or not set(behind_gzip) <= {_FLETCHER}:
-            raise DataError(
-                f"'{name}' is compressed in a way that is not supported; save it with gzip, or uncompressed"
-            )
+            raise DataError(f"'{name}' has an unsupported compression; save it with gzip, or uncompressed")
     return variables
 
 

@@ -113,8 +113,8 @@ def _check_earlier_result(folder: Path, kind: FolderKind, present: Collection[st
     hashes = kind.document_of(folder).get(HASHES)
     if not isinstance(hashes, dict):
         raise DataError(
-            f"{folder / kind.mark}: states no hashes of its files, as earlier versions of ppafo did not; remove the "
-            "folder yourself, or choose another one"
+            f"{folder / kind.mark}: has no hashes of its files, because an earlier version of ppafo wrote it; "
+            "remove the folder, or choose another one"
         )
     # Before hashes are compared: a file of somebody else's is the likelier and the clearer reason.
     foreign = sorted(_foreign_names(folder, {*hashes, kind.mark}))

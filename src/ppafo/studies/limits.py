@@ -59,8 +59,8 @@ def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> flo
     level = levels.pop() if len(levels) == 1 else None
     if level is None:
         raise StudyError(
-            f"{what}: a gauge pressure counts from {ATMOSPHERE_PATH}, which varies here; give an absolute pressure, "
-            "for example '446 kPa_a'"
+            f"{what}: is a gauge pressure, but {ATMOSPHERE_PATH} varies; give an absolute pressure, for example "
+            "'446 kPa_a'"
         )
     return level
 

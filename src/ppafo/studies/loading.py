@@ -129,10 +129,7 @@ def _load(
         if given and parsed.sample is None:
             if any(not isinstance(entry, declared.NOT_RANDOM) for entry in parsed.vary):
                 raise StudyError(NO_SAMPLE)
-            raise StudyError(
-                "has no [sample], so the number of runs follows from its grid and nothing is random: it takes neither "
-                "draws nor a seed"
-            )
+            raise StudyError("has no [sample], so its runs are not random; omit draws and seed")
         if given:
             document["sample"] |= given
     parsed = validate(declared.StudyFile, document, source.file, StudyError)
@@ -308,7 +305,8 @@ def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, Varie
         unit, other = varied_paths[entry.path].quantity.unit, varied_paths[entry.same_as].quantity.unit
         if unit != other:
             raise StudyError(
-                f"vary '{entry.path}': same_as = '{entry.same_as}' is in '{other or '-'}', this path in '{unit or '-'}'"
+                f"vary '{entry.path}': same_as = '{entry.same_as}' has the unit '{other or '-'}', but this path "
+                f"has '{unit or '-'}'; both need the same unit"
             )
         followed[entry.path] = entry.same_as
     return followed

@@ -252,11 +252,15 @@ def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
         return scenario
     of_object = [text for text in changes if scenario.controller.custom is not None and _SETTING.match(text)]
     if of_object:
-        raise StudyError(f"override '{of_object[0]}': scenario '{scenario.name}' is controlled by a Python object")
+        raise StudyError(
+            f"override '{of_object[0]}': scenario '{scenario.name}' has a Python controller; set the "
+            "value in the Python object"
+        )
     # Overrides begin at what the file said, so what was replaced in Python would silently come back.
     if reloaded(scenario, ()) != scenario:
         raise StudyError(
-            f"scenario '{scenario.name}' was changed in Python; overrides need the scenario as it is in its file"
+            f"scenario '{scenario.name}' was changed in Python; overrides would undo this change, so load the "
+            "scenario with the overrides"
         )
     return reloaded(scenario, changes)
 

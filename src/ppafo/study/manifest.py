@@ -159,7 +159,9 @@ class _StoredGiven(_StoredUnit):
     def _fits(self) -> Self:
         """Raise ValueError for a display unit of another dimension."""
         if self.given and not fits(self.given, self.unit):
-            raise ValueError(f"given: '{one_line(self.given)}' is no unit of what is in '{one_line(self.unit)}'")
+            raise ValueError(
+                f"given: the unit '{one_line(self.given)}' cannot express a value in '{one_line(self.unit)}'"
+            )
         return self
 
 

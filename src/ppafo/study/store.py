@@ -162,7 +162,10 @@ def check_types(table: "pa.Table", name: str) -> None:
         else:
             fits = pa.types.is_floating(kind) or pa.types.is_integer(kind)
         if not fits:
-            raise DataError(f"{name}: column '{one_line(field.name)}' is of type {kind}")
+            raise DataError(
+                f"{name}: column '{one_line(field.name)}' has the type {kind}, which a study never "
+                "writes; run the study again"
+            )
 
 
 def compute_chunk(study: Study, number: int, threads: int | None) -> tuple[FinishedChunk, bytes]:

@@ -148,7 +148,7 @@ def unit_by_pint(unit: str) -> ParsedUnit:
             raise UnitError(f"'{name}': {_KIND_BELONGS}") from error
         raise UnknownUnitError(name, bare) from error
     except pint.OffsetUnitCalculusError as error:  # milli of a temperature that has another zero
-        raise UnitError(f"'{unit}': degC takes no prefix, nor does degF; give degC, degF or K") from error
+        raise UnitError(f"'{unit}': degC and degF take no prefix; give degC, degF or K") from error
     # Units are affine: their values at 0 and 1 give scale and offset.
     with decimal.localcontext(DECIMALS):
         zero, one = (_registry().Quantity(Decimal(number), parsed).to_base_units().magnitude for number in (0, 1))

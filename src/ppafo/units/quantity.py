@@ -222,7 +222,7 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     if is_pressure and not kind:
         suffixes = f"{unit}_g for gauge or {unit}_a for absolute"
         suffixes = f"{unit}_d for a difference" if si_unit == DIFFERENCE else suffixes
-        raise UnitError(f"'{unit}' does not say which pressure: write {suffixes}")
+        raise UnitError(f"'{unit}' needs the kind of pressure: write {suffixes}")
     if is_pressure and (kind == "d") != (si_unit == DIFFERENCE):
         raise UnitError(f"'{unit}' is a {KINDS[kind]}, {_describe_unit(si_unit)}")
     counts_from_atmosphere = kind == "g" and si_unit == LEVEL

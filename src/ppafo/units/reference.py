@@ -173,7 +173,7 @@ def condition_of(text: str, unit: str) -> Condition:
             return Condition(temperature, pressure)
     names = ", ".join(CONDITIONS)
     raise UnitError(
-        f"'{unit}': '{text}' is not a reference condition{nearest_name(name, CONDITIONS)}; it is one of {names}, or a "
+        f"'{unit}': '{text}' is not a reference condition{nearest_name(name, CONDITIONS)}; use {names}, or a "
         f"temperature and an absolute pressure, such as '{_EXAMPLE}'"
     )
 

@@ -148,8 +148,8 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     fractions = [lasting_change(recording[name]) / COMPARED[name].full_range(device, gauge) for name in compared]
     if max(fractions) < _MINIMUM_CHANGE:
         raise DataError(
-            f"{file}: nothing happens in it: {', '.join(compared)} change by less than {_MINIMUM_CHANGE:.0%} of full "
-            "range, so it cannot tell a good model from a bad one"
+            f"{file}: {', '.join(compared)} change by less than {_MINIMUM_CHANGE:.0%} of full range, which is too "
+            "little to judge a model; give a recording with larger changes"
         )
     intervals = np.diff(recording.time)
     wide = np.flatnonzero(intervals > _REMARKED_GAP * np.median(intervals))

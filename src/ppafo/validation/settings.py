@@ -56,7 +56,7 @@ def replay_settings(
     chosen = next((known for known in MOTIONS if known == motion), None)
     if chosen is None:
         hint = nearest_name(motion, MOTIONS)
-        raise DataError(f"motion '{one_line(motion)}' is not one of {', '.join(MOTIONS)}{hint}")
+        raise DataError(f"motion '{one_line(motion)}': must be {', '.join(MOTIONS)}{hint}")
     if volume is not None and chosen != "free":
         raise DataError(
             f"motion '{chosen}': a fixed volume has no vane that could move; give motion or volume, not both"

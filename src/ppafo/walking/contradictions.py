@@ -128,8 +128,8 @@ def check_no_bottle(scenario: Scenario) -> None:
     """Raise ScenarioError if the walk is on a bottle, which is supported by ``ppafo walk`` alone."""
     if walk_of(scenario).bottle is not None:
         raise ScenarioError(
-            f"{scenario.name}: a walk on a bottle goes by 'ppafo walk' alone, as bottle and device are advanced in "
-            "alternation; leave the bottle out, or give the device lines with [supply_line]"
+            f"{scenario.name}: a walk with a bottle runs in 'ppafo walk' only, which steps bottle and device in "
+            "turn; omit the bottle, or add [supply_line]"
         )
 
 

@@ -138,7 +138,8 @@ def walk_population(
         )
     if walk_of(configuration).person:
         raise ScenarioError(
-            "several wearers are drawn at random around one: omit wearer.person, or the number of wearers"
+            "several wearers are drawn at random, so wearer.person cannot be given; omit wearer.person, or the "
+            "number of wearers"
         )
     motion = walk_of(configuration)
     people = draw_people(motion.gait, wearers, np.random.default_rng(seed))

@@ -238,8 +238,10 @@ def _ratio(sequence: TaskSequence, index: int, gait: Gait) -> float:
     if "cadence" in values and recorded is not None and not SLOWEST <= speed <= FASTEST:
         raise sequence.refusal(
             index,
-            f"cadence: with the walk ratio of gait '{gait.name}' that is {speed:.3g} m/s; a task sequence goes at "
-            f"{SLOWEST:g} to {FASTEST:g} m/s",
+            (
+                f"cadence: gives {speed:.3g} m/s with the walk ratio of gait '{gait.name}'; a task sequence needs "
+                f"{SLOWEST:g} to {FASTEST:g} m/s"
+            ),
         )
     return ratio
 

@@ -89,8 +89,8 @@ def walk(
     if isinstance(scenario, Scenario):
         if any(choice is not None for choice in (gait, task_sequence, bottle)) or tuple(overrides):
             raise ScenarioError(
-                "overrides, a gait, a task sequence and a bottle go with a name or a file; a Scenario takes them in "
-                "load_walk"
+                "overrides, gait, task sequence and bottle apply to the name or file of a walk; for a Scenario "
+                "give them to load_walk"
             )
         check_parts(scenario)
         chosen = scenario

@@ -117,8 +117,11 @@ def test_the_ankle_moment_that_the_torque_is_a_share_of_is_that_of_the_gait() ->
         (("90 psi_g", "90 kg"), "claims.held.arguments.pressure: unit 'kg' does not fit"),
         (('unit = "N m"', 'unit = "kg"'), "claims.held.unit: unit 'kg' does not fit"),
         (("at_least = 8.5\nat_most = 9.5", ""), "give at_least, at_most or both"),
-        (("published = 9.0\n", ""), "give what is published: a number with its unit, words, or own arithmetic"),
-        (("at_most = 9.5", 'direction = "less"'), "direction = 'less' needs a size: give at_most"),
+        (
+            ("published = 9.0\n", ""),
+            "give the published result as a number with its unit, as words, or as own arithmetic",
+        ),
+        (("at_most = 9.5", 'direction = "less"'), "direction = 'less' also needs at_most"),
         (("at_least = 8.5", 'not_testable = "no"'), "give either computation, or not_testable"),
         (("where = ", "were = "), "did you mean 'where'?"),
         (("at_least = 8.5", "at_least = 9.8"), "at_least = 9.8 must not exceed at_most = 9.5"),

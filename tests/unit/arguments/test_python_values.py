@@ -155,5 +155,5 @@ def test_an_adiabatic_gas_needs_no_area_of_walls() -> None:
     content["gas_model"] = {"kind": "thermal", "heat_transfer_coefficient": "5 W/(m^2 K)"}
     with pytest.raises(ScenarioError, match=r"'gas_model\.wall_area_per_volume' is missing"):
         scenario_from_dict(content)
-    with pytest.raises(ScenarioError, match=r"its heat transfer varies, and 'gas_model\.wall_area_per_volume' is 0"):
+    with pytest.raises(ScenarioError, match=r"the heat transfer varies, but 'gas_model\.wall_area_per_volume' is 0"):
         run_ensemble(adiabatic, {"gas_model.heat_transfer_coefficient": np.array([0.0, 5.0])}, [])

@@ -70,7 +70,7 @@ def test_the_option_of_other_commands_is_answered_with_the_list_of_a_group(capsy
     [
         (
             ["import", "WALK", "--body-mass", "62 kg", "--stature", "180"],
-            "--stature 180: a length needs its unit",
+            "--stature 180: a length needs a unit",
         ),
         (["import", "WALK", "--body-mass", "62 kg", "--stature", "180 m"], "a stature of 180 m is not plausible"),
         (

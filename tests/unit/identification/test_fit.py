@@ -202,7 +202,7 @@ def test_a_law_that_fits_exactly_leaves_numbers_and_a_channel_of_small_units_kee
 
 
 def test_as_many_samples_as_numbers_are_refused() -> None:
-    with pytest.raises(IdentificationError, match="1 samples for 1 numbers"):
+    with pytest.raises(IdentificationError, match="1 samples cannot determine 1 parameters"):
         fit(
             lambda points: 2.5 - points[:1],
             (FitVariable("a", 1.0, -9.0, 9.0, 1.0),),
@@ -301,5 +301,5 @@ def test_a_number_beside_whose_start_no_run_succeeds_is_refused_by_name() -> Non
 
     numbers = (FitVariable("slope", 1.0, 0.0, 9.0, 1.0), FitVariable("level", 1.0, 0.0, 9.0, 1.0))
     for is_motion in (False, True):
-        with pytest.raises(IdentificationError, match="level: no run succeeds near 1; give other bounds"):
+        with pytest.raises(IdentificationError, match="level: every run fails near 1; give other bounds"):
             fit(residuals, numbers, (ResidualBlock("line", "only", slice(0, _COUNT)),), is_motion=is_motion)

@@ -214,7 +214,7 @@ def test_the_interval_of_the_bench_can_be_the_prior_of_the_fit(solve: Solve) -> 
     given = next(one for one in outcome.trajectory.fit.numbers if one.path == "friction.static_torque").free
     assert given.start == known.value
     assert given.deviation == pytest.approx(known.half_width / 1.96, rel=1e-3)
-    with pytest.raises(PpafoError, match="prior = 'bench': no procedure of this problem identified it"):
+    with pytest.raises(PpafoError, match="prior = 'bench' needs a value that a procedure of this problem identifies"):
         solve(FIT + prior)
 
 
@@ -285,7 +285,7 @@ def test_the_published_schema_has_the_section() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "problem.toml: has nothing to do: neither a [[procedure]] nor a [trajectory]"),
+        ("", "problem.toml: give a [[procedure]] or a [trajectory]; it has neither"),
         (FIT.replace("scenario =", "scenaro ="), "did you mean 'scenario'"),
         (FIT.replace('"step-response"', '"step-respons"'), "step-respons"),
         (FIT.replace("step.csv", "nowhere.csv"), "nowhere.csv"),
@@ -300,7 +300,10 @@ def test_the_published_schema_has_the_section() -> None:
         (f"{FIT}inputs = ['comand']\n", "experiment 'step': 'comand' is not a measured input, did you mean 'command'"),
         (f"{FIT}inputs = ['external_torque']\n", "has no channel 'external_torque' to follow"),
         (f"{FIT}channels = ['torque']\n", "channel 'torque' cannot be fitted"),
-        (f"{FIT}noise = {{ angel = '1 deg' }}\n", "noise of 'angel', did you mean 'angle'"),
+        (
+            f"{FIT}noise = {{ angel = '1 deg' }}\n",
+            "noise.angel: channel 'angel' cannot be fitted, did you mean 'angle'",
+        ),
         (f"{FIT}time_offset = '0 s'\n", "experiment 'step': time_offset = '0 s' must be above zero"),
         (f"{FIT}time_offset = '5 mm'\n", "time_offset = '5 mm': unit 'mm' does not fit"),
         (f"{FIT}step = '1 min'\n", "step = '1 min' must be from"),
@@ -323,7 +326,7 @@ def test_the_published_schema_has_the_section() -> None:
         (FIT.replace("[trajectory]", "[trajectory]\nloss = 'huber'"), "loss: the first pass is always robust; omit"),
         (FIT.replace("low =", "scale = 'log'\nlow ="), "scale: numbers are scaled automatically; omit it"),
         (f"{FIT}{REPLAYED}held = '75 deg'\n", "trajectory: held: is renamed to locked; write locked = '75 deg'"),
-        (f"{FIT}[bench.can]\nsupply_pressure = ['20 psi_g', '90 psi_g']\n", "write [[trajectory.candidates]]"),
+        (f"{FIT}[bench.can]\nsupply_pressure = ['20 psi_g', '90 psi_g']\n", "to rank in [[trajectory.candidates]]"),
     ],
 )
 def test_a_mistake_is_one_line_that_says_where(solve: Solve, text: str, message: str) -> None:
@@ -411,7 +414,7 @@ def test_a_held_vane_is_fitted_in_its_pressures(solve: Solve, laboratory: Path) 
         (TANK.replace("60 cm^3", "0 cm^3"), "volume = '0 cm^3' must be above zero"),
         (TANK.replace("60 cm^3", "60 psi"), "volume"),
         (f"{TANK}inputs = ['command', 'angle']\n", "the vane is locked or absent, but inputs has 'angle'"),
-        (f"{TANK}scenario = 'step-response'\n", "volume and a scenario"),
+        (f"{TANK}scenario = 'step-response'\n", "volume cannot be combined with a scenario"),
         (f"{STEP}inputs = ['angel']\n", "did you mean 'angle'"),
     ],
 )

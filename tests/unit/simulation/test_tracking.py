@@ -431,3 +431,9 @@ def test_valves_whose_set_limits_nothing_are_told_how_often_they_switch() -> Non
         told = simulate("torque-task-solenoid", [*changes[1:], limited])
         assert not any("a second, and no number" in said for said in told.warnings)
     assert simulate(TASK, ["reference.level=4 N m"]).warnings == ()
+
+
+def test_a_reference_just_beyond_reach_that_is_followed_within_the_limit_is_told_the_reach() -> None:
+    told = simulate(TASK, ["reference.level=5.1 N m", "run.duration=6 s"]).following
+    assert told.endswith("N m allowed; at 75 deg and 50 psi_g the actuator gives 5 N m at most")
+    assert "at most" not in simulate(TASK, ["reference.level=4 N m"]).following

@@ -105,7 +105,7 @@ def test_a_mark_that_stands_between_no_groups_is_refused(
 ) -> None:
     torque = {"column": 2, "unit": "N m", "thousands": thousands}
     columns = mapped(delimiter="semicolon", decimal=decimal, channels={"torque": torque})
-    with pytest.raises(DataError, match=f"line 2, column '2': '{cell}' does not have groups of three digits"):
+    with pytest.raises(DataError, match=f"line 2, column '2': '{cell}' must have groups of three digits"):
         read_foreign(written(tmp_path, f"0;1\n10;{cell}\n"), columns)
 
 
@@ -200,10 +200,10 @@ def test_a_map_that_does_not_fit_is_explained(tmp_path: Path, channel: dict[str,
 
 def test_a_unit_that_does_not_fit_is_said_of_the_map_and_its_key(tmp_path: Path) -> None:
     columns = mapped(channels={"pressure_1": {"column": 2, "unit": "bar"}})
-    wanted = r"raw.csv: column map rig.toml:a: channels.pressure_1.unit = 'bar': 'bar' does not say which pressure"
+    wanted = r"raw.csv: column map rig.toml:a: channels.pressure_1.unit = 'bar': 'bar' needs the kind of pressure"
     with pytest.raises(DataError, match=wanted):
         read_foreign(written(tmp_path, "0,1\n10,2\n"), columns, map_name="rig.toml:a")
-    with pytest.raises(DataError, match=r"raw.csv: channels.pressure_1.unit = 'bar': 'bar' does not say"):
+    with pytest.raises(DataError, match=r"raw.csv: channels.pressure_1.unit = 'bar': 'bar' needs the kind"):
         read_foreign(written(tmp_path, "0,1\n10,2\n"), columns)
 
 
@@ -394,7 +394,7 @@ def test_some_trials_or_all_are_a_recording_each(tmp_path: Path) -> None:
     assert [one["torque"][0] for one in every] == [100.0, 200.0, 300.0]
     some = read_trials(path, mapped(channels=channels, trial=[3, 1]))
     assert [one["torque"][0] for one in some] == [300.0, 100.0]
-    with pytest.raises(DataError, match=r"raw.csv: trial: 3 recordings, where one is needed: name one"):
+    with pytest.raises(DataError, match=r"raw.csv: trial: the file has 3 recordings; name one"):
         read_foreign(path, mapped(channels=channels, trial="all"))
     with pytest.raises(
         DataError, match=r"raw.csv: trial = 7: the clock restarts 2 times, so the file has trials 1 to 3"

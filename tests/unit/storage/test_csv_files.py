@@ -97,7 +97,7 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
         ("Zeit [s],angle [rad]\n0,1\n", "it is 'Zeit'; other columns are read through a column map"),
         ("time [s],angle [rad],angle [deg]\n0,1,1\n", "two columns 'angle'"),
         ("time [s],angle [m]\n0,1\n", "column 'angle \\[m\\]': unit 'm' does not fit: an angle is needed"),
-        ("time [s],pressure_1 [psi]\n0,1\n", "column 'pressure_1 \\[psi\\]': 'psi' does not say which pressure"),
+        ("time [s],pressure_1 [psi]\n0,1\n", "column 'pressure_1 \\[psi\\]': 'psi' needs the kind of pressure"),
         ("time [s],pressure_1 [psi_d]\n0,1\n", "a pressure level is needed"),
         ("time [s],residual [N)]\n0,1\n", "column 'residual \\[N\\)\\]'"),
         ("# sythetic: by hand\ntime [s]\n0\n", "'# sythetic:' names no kind of recording, did you mean 'synthetic'\\?"),

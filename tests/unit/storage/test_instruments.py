@@ -135,7 +135,7 @@ def test_a_volume_flow_without_its_condition_asks_for_it(tmp_path: Path, unit: s
 def test_a_condition_of_no_flow_is_named_with_its_key(tmp_path: Path) -> None:
     path = written(tmp_path, "flow.csv", "t,Q\n0,60\n1,120\n")
     chosen = columns({"time": {"column": "t", "unit": "s"}, "torque": {"column": "Q", "unit": "N m", "at": "ANR"}})
-    with pytest.raises(DataError, match=r"channels\.torque\.unit .*belong to a volume flow"):
+    with pytest.raises(DataError, match=r"channels\.torque\.unit .*apply only to a volume flow"):
         read_foreign(path, chosen)
 
 

@@ -76,7 +76,7 @@ def test_it_is_compared_over_an_uncertain_device_with_progress_and_overrides() -
     assert better is not None
     assert better.value == 1.0
     assert {case.scenario.reference.level for case in task.cases} == {2.0}
-    with pytest.raises(StudyError, match=r"gain=1': scenario '.*' is controlled by a Python object"):
+    with pytest.raises(StudyError, match=r"gain=1': scenario '.*' has a Python controller"):
         ppafo.compare(pair, overrides=["controller.proportional_gain=1"])
 
 

@@ -73,7 +73,7 @@ def test_path_follows_only_where_it_is_to() -> None:
         ),
         ({"same_as": "actuator.dead_volume_2"}, "does not vary independently"),
         ({"same_as": 3}, "same_as"),
-        ({"path": "supply.pressure"}, "is in 'm\\^3', this path in 'Pa_a'"),
+        ({"path": "supply.pressure"}, "has the unit 'm\\^3', but this path has 'Pa_a'"),
         ({"path": "actuator.dead_volume_1"}, "varied twice"),
         ({"path": "actuator.dead_volume_4"}, "has no number 'actuator.dead_volume_4'"),
         ({"median": "2 cm^3"}, "unknown key"),

@@ -212,9 +212,9 @@ def test_distributions_need_a_sample_and_a_grid_has_none(varying: Callable[..., 
     document = varying({"path": "valve.area", "kind": "list", "values": ["10 mm^2"]})
     assert "[sample] is given, but nothing has a distribution" in refused(document)
     del document["sample"]
-    with pytest.raises(StudyError, match=r"has no \[sample\], so the number of runs follows from its grid"):
+    with pytest.raises(StudyError, match=r"has no \[sample\], so its runs are not random"):
         load_study(document, draws=4)
-    with pytest.raises(StudyError, match="takes neither draws nor a seed"):
+    with pytest.raises(StudyError, match="omit draws and seed"):
         load_study(document, seed=4)
 
 

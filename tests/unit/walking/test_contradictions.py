@@ -173,7 +173,7 @@ def test_what_is_no_number_of_minutes_is_refused(minutes: float) -> None:
 
 def test_overrides_beside_a_configuration_are_refused() -> None:
     configuration = load_walk("off")
-    with pytest.raises(ScenarioError, match="a Scenario takes them in load_walk"):
+    with pytest.raises(ScenarioError, match="for a Scenario give them to load_walk"):
         walk(configuration, minutes=0.1, overrides=["wearer.body_mass=80 kg"])
 
 

@@ -188,9 +188,9 @@ MISTAKES = {
     "bottle.regulator.area=0 mm^2": "must be more than 0",
     "bottle.regulator.are=3 mm^2": "bottle.regulator.area",
     "supply.relieving=true": "no gas goes back into a bottle",
-    "supply_line.plantarflexion.droop=3 Pa s/kg": "the bottle's regulator has its own",
+    "supply_line.plantarflexion.droop=3 Pa s/kg": "must be omitted for a walk with a bottle",
     "bottle.regulator.pressure_margin=8 MPa_d": "its regulator needs",
-    "bottle.regulator.set_pressure=30 psi_g": "the bottle's regulator is set to supply.pressure; set that",
+    "bottle.regulator.set_pressure=30 psi_g": "which uses supply.pressure for the regulator of the bottle",
     "bottle.hose.heat_capacity=0.001 J/K": r"its hose follows within 0\.0\d+ ms, and a walk follows what takes 1 ms",
     "bottle.wall_heat_capacity=0.001 J/K": r"its wall .*set bottle\.wall_heat_capacity higher",
 }

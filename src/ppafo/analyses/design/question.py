@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import FileOrName, Length, Mass, Minutes, Pressure, Threads, Torque, Word, checked
+from ppafo.arguments.door import argument_text
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
 from ppafo.units.shown import shown_in
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from ppafo.analyses.design.wearer.requirements import WearerSizing
     from ppafo.report.finding import Finding
 
-FOR_A_WEARER = "--mass '72.5 kg' --torque '2.5 N m' --pressure '50 psi_g' --minutes 5"
+FOR_A_WEARER = {"mass": "72.5 kg", "torque": "2.5 N m", "pressure": "50 psi_g", "minutes": "5"}
 DesignLike = Annotated["SizingProblem | str | Path", Word("DESIGN")]
 
 
@@ -84,15 +85,16 @@ def design(
 
     wished = {"mass": mass, "torque": torque, "pressure": pressure, "minutes": minutes}
     report = progress or report_nothing
+    example = " ".join(argument_text(*pair) for pair in FOR_A_WEARER.items())
     if problem is None:
         # Stature, toes and catalogue may be left out, so they are not among them.
-        missing = [f"--{name}" for name, value in wished.items() if value is None]
+        missing = [argument_text(name) for name, value in wished.items() if value is None]
         if len(missing) == len(wished) and stature is None:
             raise StudyError(
-                f"no design was given; name a design, give a .toml file, or describe the wearer: {FOR_A_WEARER}"
+                f"no design was given; name a design, give a .toml file, or describe the wearer: {example}"
             )
         if mass is None or torque is None or pressure is None or minutes is None:
-            raise StudyError(f"a design for a wearer also needs {', '.join(missing)}, for example {FOR_A_WEARER}")
+            raise StudyError(f"a design for a wearer also needs {', '.join(missing)}, for example {example}")
         seconds = 60.0 * minutes
         requirements = DesignRequirements(mass, stature, float(torque), float(pressure), seconds, toes, gait=gait)
         with shown_in(units_given({"Pa_a": pressure, "N m": torque})):
@@ -100,7 +102,7 @@ def design(
             return wearer.finding_of(size_for_wearer(requirements, report, parts, bottle))
     of_a_wearer = {**wished, "stature": stature, "toes": toes, "catalogue": catalogue}
     of_a_wearer |= {"bottle": bottle, "gait": gait}
-    named = [f"--{name}" for name, value in of_a_wearer.items() if value is not None]
+    named = [argument_text(name) for name, value in of_a_wearer.items() if value is not None]
     if named:
         raise StudyError(
             f"{', '.join(named)} cannot be combined with a design file, which states the requirements; omit one of them"

@@ -247,18 +247,16 @@ def _loop(model: LinearModel) -> Section:
         reason = "its command is clipped, or has no effect" if is_pid else f"controller '{controller.kind}' is no PID"
         return Section(remarks=[f"no margins of the loop: {reason}"])
     frequency, angle = Kind(quantity="frequency", form=".3g"), Kind(quantity="angle", form=".3g")
-
-    def at(text: str, crossover: float | None) -> str:
-        return "none below half the sample rate" if crossover is None else f"{text} at {frequency.text(crossover)}"
-
     gain = margins.gain_margin or 1.0
-    rows = [
-        ("closed loop", "stable" if margins.is_stable else "unstable"),
-        ("gain margin", at(f"{gain:.3g} ({20.0 * np.log10(gain):.3g} dB)", margins.phase_crossover)),
-        ("phase margin", at(angle.text(margins.phase_margin or 0.0), margins.gain_crossover)),
-        ("bandwidth (-3 dB)", at("", margins.bandwidth).removeprefix(" at ")),
-        ("peak sensitivity", f"{margins.peak_sensitivity:.3g}"),
-    ]
+    values = (
+        ("gain margin", f"{gain:.3g} ({20.0 * np.log10(gain):.3g} dB) at ", margins.phase_crossover),
+        ("phase margin", f"{angle.text(margins.phase_margin or 0.0)} at ", margins.gain_crossover),
+        ("bandwidth (-3 dB)", "", margins.bandwidth),
+    )
+    none = "none below half the sample rate"
+    rows = [("closed loop", "stable" if margins.is_stable else "unstable")]
+    rows += [(name, none if at is None else text + frequency.text(at)) for name, text, at in values]
+    rows.append(("peak sensitivity", f"{margins.peak_sensitivity:.3g}"))
     return Section("Loop with the PID of the scenario, sampled and with its delays", facts(rows))
 
 

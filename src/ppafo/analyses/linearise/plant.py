@@ -174,12 +174,12 @@ def opens_in_proportion(run: Run) -> bool:
     limitless = without_slew_limit(run)
     start = dict(zip(valve_states(run.program), numbers(run.program.valve.initial()), strict=True))
     functions = functions_in(limitless)
-
-    def opening(command: float) -> Floats:
-        valve = valve_at(limitless, functions, start | {"command": command})
-        return np.array([*valve.openings, *valve.rates.values()])
-
-    return any(bool(np.any(one_sided_slopes(opening, value, 1.0, 1.0)[0])) for value in (-0.5, 0.5))
+    for half in (-0.5, 0.5):
+        valves = [valve_at(limitless, functions, start | {"command": half + change}) for change in (1.0e-4, 2.0e-4)]
+        first, second = ([*valve.openings, *valve.rates.values()] for valve in valves)
+        if first != second:
+            return True
+    return False
 
 
 # Slopes by differences: towards one side of a point, where the model may have a kink.

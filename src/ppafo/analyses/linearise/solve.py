@@ -1,6 +1,5 @@
 """Linear model of a scenario's plant, at an instant of its run or at its steady state."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from numbers import Real
 
@@ -11,7 +10,6 @@ from ppafo.analyses.linearise.model import LinearModel, LinearSignal, OmittedDel
 from ppafo.analyses.linearise.plant import (
     UNITS,
     VALVE,
-    LinearisedPlant,
     functions_in,
     one_sided_slopes,
     opens_in_proportion,
@@ -119,7 +117,18 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     """Return the linear model at an operating point, with one-sided slopes on the sides given by ``side_of``."""
     values, plant = dict(point.values), plant_of(run, point.direction, point.values, point.time or 0.0)
     here = plant.at(values)
-    slopes = {name: _both_slopes(plant, values, name) for name in (*here.rates, *plant.inputs)}
+    # Slopes of rates and outputs on the side of ``side_of`` and on the other side, and estimates of their errors.
+    slopes: dict[str, tuple[Floats, Floats, Floats]] = {}
+    for name in (*here.rates, *plant.inputs):
+
+        def rates_and_outputs(value: float, name: str = name) -> Floats:
+            state = plant.at({**values, name: value})
+            return np.array([*state.rates.values(), *state.outputs.values()])
+
+        side, size = side_of(name, values, plant.direction), size_of(name)
+        near_name, error = one_sided_slopes(rates_and_outputs, values[name], side, size)
+        far_name, far_error = one_sided_slopes(rates_and_outputs, values[name], -side, size)
+        slopes[name] = near_name, far_name, error + far_error
     # What the valve takes from its command at once is no state: nothing but the output that shows it asks for it.
     rows = [*(f"rate of {state}" for state in here.rates), *here.outputs]
     # A second chamber that the actuator lacks stays at the atmosphere, without any slope.
@@ -160,19 +169,3 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
         delays=OmittedDelays(run.command_delay, run.signal_delay, run.period),
     )
     return replace(model, margins=loop_margins(model))
-
-
-def _both_slopes(plant: LinearisedPlant, values: Mapping[str, float], name: str) -> tuple[Floats, Floats, Floats]:
-    """Return slopes (rates and outputs,) with respect to a state or an input on both sides of the operating point.
-
-    The first are the slopes on the side of ``side_of``, the second on the other side, the third the error estimates.
-    """
-
-    def rates_and_outputs(value: float) -> Floats:
-        state = plant.at({**values, name: value})
-        return np.array([*state.rates.values(), *state.outputs.values()])
-
-    side, size = side_of(name, values, plant.direction), size_of(name)
-    slopes, error = one_sided_slopes(rates_and_outputs, values[name], side, size)
-    slopes_beyond, error_beyond = one_sided_slopes(rates_and_outputs, values[name], -side, size)
-    return slopes, slopes_beyond, error + error_beyond

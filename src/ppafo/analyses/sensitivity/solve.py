@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.analyses.sensitivity.methods import EvaluatedBlocks, Indices, Method, changes
+from ppafo.arguments.door import argument_text
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.simulation.gains import remark_on_following_gains
@@ -134,7 +135,7 @@ def analyse(
     if uncertainty.scores is not None and not method.takes_dependent:
         raise StudyError(
             f"sensitivity: {method.name} assumes independent values, but the study has [[correlations]]; use "
-            "'--method shapley', or ignore the correlations with --independent"
+            f"{argument_text('method', 'shapley')}, or ignore the correlations with {argument_text('independent')}"
         )
     if len(uncertainty.drawn) < 2:
         raise StudyError("sensitivity: the study has only one uncertain value; vary two or more")

@@ -66,7 +66,8 @@ def knee_signals(
         if -height > _HIP_HEIGHT:
             raise DataError(
                 f"{found.table.file}: the hip is {height:.2f} m high ({', '.join(mapped.up)}), which is below the "
-                "ground; its sign is reversed: correct the file, or change the sign of knee.up in a gait map"
+                "ground, so its sign is reversed; correct it in the file, or change the sign of knee.up in a "
+                "gait map"
             )
         # The file has the hip: the knee follows by the lean of the thigh.
         forward, up = knee_position(forward, up, lean, _thigh_length(mapped, stature))

@@ -152,8 +152,8 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
     before = recording.time <= experiment.start + _FITS
     if not before.any():
         raise IdentificationError(
-            f"{where}: {recording.label} has no sample up to {experiment.start:g} s, from which the initial state "
-            f"could be taken"
+            f"{where}: {recording.label} has no sample up to {experiment.start:g} s to take the initial state "
+            "from; give a later start"
         )
     time = recording.time[before]
     rest = {name: value_at_rest(time, recording[name][before], at_end=True) for name in recording.names}

@@ -106,7 +106,7 @@ def refuse_removed(document: Mapping[str, Any], file: str) -> None:
     section, bench = document.get("trajectory"), document.get("bench")
     if isinstance(bench, dict) and "can" in bench:
         raise IdentificationError(
-            f"{file}: bench.can: experiments are not proposed; write [[trajectory.candidates]], which are ranked"
+            f"{file}: bench.can is not supported; list the experiments to rank in [[trajectory.candidates]]"
         )
     lists = [section.get(name) for name in ("parameters", "experiments")] if isinstance(section, dict) else []
     tables = [section, *(table for tables in lists if isinstance(tables, list) for table in tables)]

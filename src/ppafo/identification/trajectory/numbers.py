@@ -166,8 +166,8 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
     paths = {full_path(parameter.path, scenario) for scenario in scenarios}
     if len(paths) > 1:
         raise IdentificationError(
-            f"{parameter.path} means {' and '.join(sorted(paths))} in these experiments; give one of these paths, "
-            f"with its recordings"
+            f"{parameter.path} refers to {' and '.join(sorted(paths))} in these experiments; give one of these "
+            "paths, with its recordings"
         )
     path = paths.pop()
     quantity = [declaration_of(path, scenario) for scenario in scenarios][-1]

@@ -277,13 +277,13 @@ def run_with(prepared: _PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
             switched = [name for name in values if name in fitted and 0.0 in (values[name], planned_settings[name])]
             moved = " or ".join(f"valve.{name}" for name in switched)
             raise IdentificationError(
-                f"{where}: {moved} changed to or from 0, which is another model of the valve; give a start and a "
-                f"lower bound above 0"
+                f"{where}: the fit changed {moved} to or from 0, which changes the valve model; give a start and "
+                "a lower bound above 0"
             )
     if any(np.any(is_on != (effect in base.program.effects)) for effect, is_on in switches_of(device).items()):
         raise IdentificationError(
-            f"{where}: an effect was switched on or off by the fit, which is another model; give a start and a lower "
-            f"bound above 0"
+            f"{where}: the fit switched an effect on or off, which changes the model; give a start and a lower "
+            "bound above 0"
         )
     planned, _ = scenario.motion.motion_kind.plan(scenario)
     # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.

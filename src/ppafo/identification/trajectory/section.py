@@ -73,7 +73,9 @@ def noise_of_channels(texts: Mapping[str, str], where: str) -> dict[str, float]:
     for name, text in texts.items():
         if name not in _NOISE_UNITS:
             hint = nearest_name(name, _NOISE_UNITS)
-            raise IdentificationError(f"{where}: noise of '{name}'{hint}: only {', '.join(_NOISE_UNITS)} have one here")
+            raise IdentificationError(
+                f"{where}: noise.{name}: channel '{name}' cannot be fitted{hint}; available: {', '.join(_NOISE_UNITS)}"
+            )
         deviations[name] = quantity_of(f"{where}: noise.{name}", text, _NOISE_UNITS[name])
     return deviations
 
@@ -116,7 +118,8 @@ def _experiment(entry: ExperimentSection, context: SectionContext) -> FittedExpe
         for name in ("locked", "volume"):
             if getattr(entry, name) is not None:
                 raise IdentificationError(
-                    f"{where}: {name} and a scenario: the scenario prescribes how the vane moves; omit one of them"
+                    f"{where}: {name} cannot be combined with a scenario, which prescribes the motion of the "
+                    "vane; omit one of them"
                 )
         scenario = _scenario(entry.scenario, entry.overrides, context)
         start, inputs = quantity_in(entry, "start", "s", where) or 0.0, entry.inputs or ()
@@ -169,7 +172,8 @@ def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], conte
         if estimate is None or not estimate.is_usable:
             identified = ", ".join(path for path, known in context.bench.items() if known.is_usable) or "none"
             raise IdentificationError(
-                f"{where}: prior = 'bench': no procedure of this problem identified it; identified: {identified}"
+                f"{where}: prior = 'bench' needs a value that a procedure of this problem identifies; identified: "
+                f"{identified}"
             )
         start, deviation = estimate.value, estimate.wider_half_width / interval_factor(estimate.confidence)
     elif entry.prior is not None:

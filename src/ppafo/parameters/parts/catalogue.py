@@ -274,7 +274,7 @@ def _part(file: str, group: str, name: str, parsed: Any) -> Part:
             hint = nearest_name(key, declared)
             raise ParameterError(f"{where}.unknown: there is no figure '{key}'{hint}; available: {', '.join(declared)}")
         if key in figures:
-            raise ParameterError(f"{where}.unknown: '{key}' is given in the same part")
+            raise ParameterError(f"{where}.unknown: '{key}' has a value in this part; omit it from unknown")
     forms_given = [[quantity.name for quantity in form if quantity.name in figures] for form in (AREA_FORM, SONIC_FORM)]
     # Half a form of an orifice is as unusable as two forms at once.
     if group == "valves" and sorted(map(len, forms_given)) != [0, 2]:
@@ -287,7 +287,7 @@ def _part(file: str, group: str, name: str, parsed: Any) -> Part:
         shown = f"{where}.{key} = {figure.value:g} {figure.unit}"
         # A guess without its reason cannot be checked by the next reader.
         if figure.origin in _NEEDS_A_REASON and not figure.note.strip():
-            raise ParameterError(f"{where}.{key}.note is missing: a figure that is {figure.origin} needs its reason")
+            raise ParameterError(f"{where}.{key}.note is missing; a figure that is {figure.origin} needs a reason")
         # Data sheets give gauge pressures at sea level.
         values[key] = allowed_number(shown, figure, declared[key])
     if "torque_constant" in values:

@@ -75,11 +75,13 @@ def read_publication(name_or_path: str | Path) -> tuple[PublicationFile, str]:
     for entry in read.claims:
         where = f"{file}: claims.{entry.id}"
         if entry.published is None and not entry.words and not entry.own:
-            raise ScenarioError(f"{where}: give what is published: a number with its unit, words, or own arithmetic")
+            raise ScenarioError(
+                f"{where}: give the published result as a number with its unit, as words, or as own arithmetic"
+            )
         limit = {"maximum": entry.at_most, "less": entry.at_most, "more": entry.at_least}.get(entry.direction, 0.0)
         if limit is None and not entry.not_testable:
             name = "at_least" if entry.direction == "more" else "at_most"
-            raise ScenarioError(f"{where}: direction = '{entry.direction}' needs a size: give {name}")
+            raise ScenarioError(f"{where}: direction = '{entry.direction}' also needs {name}")
     return read, file
 
 

@@ -82,12 +82,13 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
         missing = [path for path in form if path not in values]
         if missing and len(missing) < len(form):
             raise ScenarioError(
-                f"{base.name}: {section} is given in the other form; to vary {' or '.join(form)} give a column for both"
+                f"{base.name}: {section} is given in the other orifice form; to vary {' or '.join(form)} give a "
+                "column for both"
             )
     # An adiabatic scenario need not say its area, and runs that take up heat would go on as if they had none.
     gas, heat_varies = base.gas_model, "gas_model.heat_transfer_coefficient" in values
     if heat_varies and WALL_AREA not in values and gas is not None and gas.wall_area_per_volume == 0.0:
-        raise ScenarioError(f"{base.name}: its heat transfer varies, and '{WALL_AREA}' is 0: give the area")
+        raise ScenarioError(f"{base.name}: the heat transfer varies, but '{WALL_AREA}' is 0; give the area")
     varied = moving_together(base, absolute(base, values, gauge))
     # A number of a second chamber that the actuator does not have may follow, and nothing declares it.
     in_force = {path: declared[path] for path in varied if path in declared}

@@ -163,7 +163,10 @@ def following_text(result: "RecordedResult") -> str:
     largest = float(largest_error(settled, case.only_switches)) if is_task else LARGEST_SHARE_OF_WAVE * settled.wanted
     error, allowed = (change_text(controlled.name, each) for each in (settled.error, largest))
     since = time_text(settled.start)
-    return f"the {controlled.words} follows its reference: RMS error {error}{since}, {allowed} allowed"
+    # A reference just beyond reach is missed by no more than is allowed.
+    beyond = torque_beyond_reach(case) if is_task else None
+    short = "" if beyond is None else f"; {beyond.text}"
+    return f"the {controlled.words} follows its reference: RMS error {error}{since}, {allowed} allowed{short}"
 
 
 def time_text(since: float) -> str:

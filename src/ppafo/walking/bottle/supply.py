@@ -140,8 +140,8 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
     own = section.get("overrides", ())
     if any(text.partition("=")[0].strip() == _SET_PRESSURE for text in own):
         raise ScenarioError(
-            f"{reading.file}: {BOTTLE}.{_SET_PRESSURE}: in a walk the bottle's regulator is set to supply.pressure; "
-            f"set that"
+            f"{reading.file}: {BOTTLE}.{_SET_PRESSURE}: must be omitted in a walk, which uses supply.pressure for "
+            "the regulator of the bottle; set supply.pressure"
         )
     with refused_as(ParameterError, f"{reading.file}: [{BOTTLE}]", ParameterError):
         name = section["name"]
@@ -219,7 +219,9 @@ def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> Non
         raise reading.refusal("gas_model.kind", "assumes supply gas at room temperature; omit it, or the bottle")
     for path in _OWN:
         if value_at(reading.document, path) is not None:
-            raise reading.refusal(path, f"the bottle's regulator has its own: set {BOTTLE}.regulator.droop or .area")
+            raise reading.refusal(
+                path, (f"must be omitted for a walk with a bottle; set {BOTTLE}.regulator.droop or .area")
+            )
     # Refuse a bottle of so little gas, or parts of so little heat capacity, that they follow within no time.
     flow = supply.offers_first().largest_flow
     rates = following_rates(supply.bottle.fluid.table, supply.line, supply.bottle.supply, supply.mass, flow)

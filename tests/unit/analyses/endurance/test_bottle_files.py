@@ -58,7 +58,7 @@ def test_a_value_is_replaced_and_a_pressure_replaces_a_mass() -> None:
         ("bottle.volume=0.3 L", "g; set bottle.gas_mass or room.temperature lower, or bottle.volume higher"),
         ("room.temperature=40 degC", "known above 216.592 K and up to 303.9 K"),
         ("regulator.set_pressure=70 bar_g", "its regulator needs 7"),
-        ("regulator.set_pressure=50 psi", "does not say which pressure"),
+        ("regulator.set_pressure=50 psi", "needs the kind of pressure"),
     ],
 )
 def test_overrides_that_cannot_be_are_refused_in_one_line(override: str, words: str) -> None:

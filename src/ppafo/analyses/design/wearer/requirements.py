@@ -10,6 +10,7 @@ from typing import Any
 from ppafo.analyses.design.wearer.electrical import Electrical
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.parts.sections import doubts_data
+from ppafo.arguments.door import argument_text
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
@@ -99,27 +100,36 @@ def check_requirements(requirements: DesignRequirements) -> None:
     mass, tallest = (next(each for each in WEARER if each.name == name) for name in ("body_mass", "stature"))
     weight, height, toes = requirements.mass, requirements.height, requirements.toes
     if not mass.minimum <= weight <= mass.maximum:
-        raise StudyError(f"--mass: {weight:g} kg: must be at least {mass.minimum:g} kg and at most {mass.maximum:g} kg")
+        raise StudyError(
+            f"{argument_text('mass')}: {weight:g} kg: must be at least {mass.minimum:g} kg and "
+            f"at most {mass.maximum:g} kg"
+        )
     if requirements.stature is None and not low <= height <= high:
         lightest, heaviest = (BODY_MASS_INDEX * tall * tall for tall in STATURES)
         raise StudyError(
-            f"--mass: {weight:g} kg: give --stature too; it is derived from body mass only for {lightest:.1f} to "
+            f"{argument_text('mass')}: {weight:g} kg: give {argument_text('stature')} too; it is "
+            f"derived from body mass only for {lightest:.1f} to "
             f"{heaviest:.0f} kg"
         )
     if not requirements.pressure > STANDARD_ATMOSPHERE:
-        raise StudyError("--pressure: must be above the atmosphere, for example '50 psi_g'")
+        raise StudyError(f"{argument_text('pressure')}: must be above the atmosphere, for example '50 psi_g'")
     if not 0.0 < requirements.torque < _STRONGEST:
         text, most = TORQUE.text(requirements.torque), TORQUE.text(_STRONGEST)
-        raise StudyError(f"--torque: {text}: must be above 0 and below {most}")
+        raise StudyError(f"{argument_text('torque')}: {text}: must be above 0 and below {most}")
     if not SHORTEST <= requirements.seconds <= 60.0 * LONGEST_MINUTES:
         minutes = requirements.seconds / 60.0
-        raise StudyError(f"--minutes: {minutes:g} min: must be at least 0.1 min and at most {LONGEST_MINUTES:g} min")
+        raise StudyError(
+            f"{argument_text('minutes')}: {minutes:g} min: must be at least 0.1 min and at most {LONGEST_MINUTES:g} min"
+        )
     if toes is not None and not 0.0 <= toes <= _HIGHEST_TOES:
         highest = 1000.0 * _HIGHEST_TOES
-        raise StudyError(f"--toes: {1000.0 * toes:g} mm: must be at least 0 mm and at most {highest:g} mm")
+        raise StudyError(
+            f"{argument_text('toes')}: {1000.0 * toes:g} mm: must be at least 0 mm and at most {highest:g} mm"
+        )
     if not _SHORTEST_WEARER <= height <= tallest.maximum:
         raise StudyError(
-            f"--stature: {height:g} m: must be at least {_SHORTEST_WEARER:g} m and at most {tallest.maximum:g} m"
+            f"{argument_text('stature')}: {height:g} m: must be at least {_SHORTEST_WEARER:g} m and "
+            f"at most {tallest.maximum:g} m"
         )
 
 

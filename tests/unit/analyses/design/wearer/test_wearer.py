@@ -199,7 +199,7 @@ def test_a_stature_that_no_adult_has_is_asked_for_and_not_clamped(mass: float) -
     with pytest.raises(ppafo.StudyError) as caught:
         ppafo.design(mass=mass, torque=2.5, pressure=4.5e5, minutes=1.0)
     assert str(caught.value) == (
-        f"--mass: {mass:g} kg: give --stature too; it is derived from body mass only for 46.3 to 88 kg"
+        f"mass: {mass:g} kg: give stature too; it is derived from body mass only for 46.3 to 88 kg"
     )
 
 
@@ -208,7 +208,7 @@ def test_a_stature_that_no_adult_has_is_asked_for_and_not_clamped(mass: float) -
 @pytest.mark.parametrize(("mass", "stature"), [(25.0, 1.25), (30.0, 1.33), (35.0, 1.4), (45.0, 1.5)])
 def test_a_device_for_a_child_is_found_once_the_stature_that_is_asked_for_is_given(mass: float, stature: float) -> None:
     wanted = {"mass": mass, "torque": 1.0, "pressure": 4.5e5, "minutes": 0.5}
-    with pytest.raises(StudyError, match="give --stature too"):
+    with pytest.raises(StudyError, match="give stature too"):
         ppafo.design(**wanted)
     finding = ppafo.design(**wanted, stature=stature)
     assert isinstance(finding.found, WearerSizing)
@@ -319,7 +319,7 @@ def test_a_catalogue_whose_valves_have_no_walk_is_refused(tmp_path: Path) -> Non
     file.write_text(PARTS.replace('"proportional"', '"solenoid_recycling"'))
     with pytest.raises(StudyError, match="has no valve that a walk supports"):
         ppafo.design(mass=72.5, torque=2.5, pressure=4.5e5, minutes=1.0, catalogue=str(file))
-    with pytest.raises(StudyError, match="--catalogue cannot be combined with a design file"):
+    with pytest.raises(StudyError, match="catalogue cannot be combined with a design file"):
         ppafo.design("push-off", catalogue=str(file))
 
 
@@ -336,7 +336,7 @@ def test_a_catalogue_whose_valves_have_no_walk_is_refused(tmp_path: Path) -> Non
 )
 def test_what_no_walk_can_be_asked_is_refused(change: dict[str, float]) -> None:
     wanted = {"mass": 70.0, "stature": 1.7, "torque": 2.0, "pressure": 4.5e5, "minutes": 5.0}
-    with pytest.raises(StudyError, match=f"--{next(iter(change))}"):
+    with pytest.raises(StudyError, match=next(iter(change))):
         ppafo.design(**{**wanted, **change})
 
 
