@@ -32,6 +32,11 @@ def _from_zero(name: str, unit: str, summary: str, maximum: float = math.inf) ->
     return Quantity(name, unit, summary, minimum=0.0, maximum=maximum)
 
 
+def _warmer(part: str, text: str) -> Quantity:
+    name = f"{part}_temperature_difference"
+    return Quantity(name, "K", f"{text} above the set's temperature", minimum=-80.0, maximum=80.0)
+
+
 def _sensor(unit: str, name: str) -> tuple[Quantity, ...]:
     return (
         _from_zero("noise", unit, f"standard deviation of the noise of the {name}"),
@@ -44,20 +49,8 @@ SECTIONS: dict[str, tuple[Quantity, ...]] = {
     "gas": (
         _from_zero("heat_transfer_coefficient", "W/(m^2 K)", "heat transfer between gas and wall", 1e9),
         _from_zero("wall_area_per_volume", "1/m", "inner surface of chamber or line over its volume", 1e5),
-        Quantity(
-            "wall_temperature_difference",
-            "K",
-            "wall and room above the set's temperature",
-            minimum=-80.0,
-            maximum=80.0,
-        ),
-        Quantity(
-            "supply_temperature_difference",
-            "K",
-            "supplied gas above the set's temperature",
-            minimum=-80.0,
-            maximum=80.0,
-        ),
+        _warmer("wall", "wall and room"),
+        _warmer("supply", "supplied gas"),
         _from_zero("real_gas_share", "", "fraction of the gas's second virial coefficient, 0: ideal", 1.0),
     ),
     "supply": (
