@@ -57,7 +57,7 @@ def unlimited_switching(result: "RecordedResult") -> str:
     missing = ", ".join(f"`valve.{name}`" for name in limits)
     return (
         f"its valves are reversed {often:.3g} times a second, and no number of the set limits that ({missing} are 0): "
-        f"give those of the valve, or a lower `controller.rate`"
+        f"give the values of the valve, or a lower `controller.rate`"
     )
 
 
