@@ -17,7 +17,7 @@ from ppafo.page.motions import is_walk, tab_title, usual_changes
 from ppafo.page.opening import computed_opening, first_settings, opening_like, opening_of
 from ppafo.page.still import still_of
 from ppafo.page.wasm import module_of
-from ppafo.parameters.joint import ANKLE
+from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.finding import LivePart
 from ppafo.simulation.scenario import Scenario
@@ -112,7 +112,9 @@ def _content(
         with shown_in(scenario.device.shown):
             module = module_of(scenario)
         # A name of one's own stays as it is.
-        simulated.append(PageSimulation(scenario, module, _LABELS.get(scenario.name, scenario.name)))
+        label = _LABELS.get(scenario.name)
+        label = scenario.name if label is None else scenario.device.joint.said(label)
+        simulated.append(PageSimulation(scenario, module, label))
     intervals = known_intervals()
     names: dict[str, str] = {}
     programs = []
@@ -209,11 +211,11 @@ def _question(question: Mapping[str, Any], atmosphere: float) -> dict[str, Any]:
 
 
 def _tabs(simulated: Sequence[PageSimulation]) -> list[dict[str, Any]]:
-    groups: dict[str, list[PageSimulation]] = {}
+    groups: dict[tuple[str, JointNames], list[PageSimulation]] = {}
     for program in simulated:
-        groups.setdefault(tab_title(program.scenario), []).append(program)
+        groups.setdefault((tab_title(program.scenario), program.scenario.device.joint), []).append(program)
     tabs = []
-    for title, group in groups.items():
+    for (title, _), group in groups.items():
         alone = " ".join(group[0].scenario.description.split()).replace("psi_g", "psi") if len(group) == 1 else ""
         starts = [program.scenario for program in group[:_OPEN]]
         device = group[0].scenario.device
@@ -229,7 +231,7 @@ def _tabs(simulated: Sequence[PageSimulation]) -> list[dict[str, Any]]:
             ]
         tabs.append(
             {
-                "title": title,
+                "title": device.joint.said(title),
                 "summary": alone or _SUMMARIES.get(title, ""),
                 "programs": [program.scenario.name for program in group],
                 "start": [{"program": scenario.name, "changes": usual_changes(scenario)} for scenario in starts],
