@@ -111,9 +111,7 @@ def program_content(simulated: PageSimulation, module: str, intervals: Mapping[s
         "settings": settings,
         "relations": [
             {
-                "key": relation["key"],
-                "relation": relation["relation"],
-                "other": relation["other"],
+                **{name: relation[name] for name in ("key", "relation", "other")},
                 "factor": 1.0 + relation["tolerance"] * relation["is_share"],
                 "slack": 0.0 if relation["is_share"] else relation["tolerance"],
             }
@@ -278,12 +276,13 @@ def _gauge_texts(scenario: Scenario, settings: Iterable[Mapping[str, Any]]) -> d
     """Return texts of the gauge pressures that follow the atmosphere, as in Python."""
     following = {entry["key"] for entry in settings if entry["follows"]}
     gaps = {
-        path: link.gap for path, links in scenario.graph.items() for link in links if link.sources == (ATMOSPHERE_PATH,)
+        path: link.gap
+        for path, links in scenario.graph.items()
+        for link in links
+        if link.sources == (ATMOSPHERE_PATH,) and path not in following
     }
     texts = {}
     for path, gap in gaps.items():
-        if path in following:
-            continue
         # As a file may write it: the shortest text that gives the same number.
         written = (
             f"{number!r} {unit}"

@@ -1,5 +1,6 @@
 """Workbench page of scenarios and walks: tabs, labels and content."""
 
+import contextlib
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -112,8 +113,8 @@ def _content(
         with shown_in(scenario.device.shown):
             module = module_of(scenario)
         # A name of one's own stays as it is.
-        label = _LABELS.get(scenario.name)
-        label = scenario.name if label is None else scenario.device.joint.said(label)
+        known = scenario.name in _LABELS
+        label = scenario.device.joint.said(_LABELS[scenario.name]) if known else scenario.name
         simulated.append(PageSimulation(scenario, module, label))
     intervals = known_intervals()
     names: dict[str, str] = {}
@@ -123,8 +124,11 @@ def _content(
         with shown_in(program.scenario.device.shown):
             programs.append(program_content(program, name, intervals))
     joints = {program.scenario.device.joint.name for program in simulated}
-    joint = joints.pop() if len(joints) == 1 else "joint"
-    content = page_content(_title(joint), form, _tabs(simulated), programs, joint)
+    joint = joints.pop() if len(joints) == 1 else ""
+    title = (
+        TITLE if joint == ANKLE.name else f"The powered {joint} orthosis, live" if joint else "Powered orthoses, live"
+    )
+    content = page_content(title, form, _tabs(simulated), programs, joint or "joint")
     by_name = {program.scenario.name: program for program in simulated}
     described = {program["name"]: program for program in programs}
     stills = []
@@ -177,23 +181,13 @@ def known_intervals() -> Mapping[str, Interval]:
     return {path: (low, high) for path, (low, high) in described.items()}
 
 
-def _title(joint: str) -> str:
-    """Return the title of a page for a joint by name; "joint" stands for devices of several joints."""
-    if joint == ANKLE.name:
-        return TITLE
-    return "Powered orthoses, live" if joint == "joint" else f"The powered {joint} orthosis, live"
-
-
 def _fits(changes: Mapping[str, str], units: Mapping[str, str]) -> bool:
     """Return True if all changed settings are among ``units`` [SI], and the changes are in units of these."""
-    if not changes.keys() <= units.keys():
-        return False
-    try:
+    with contextlib.suppress(KeyError, UnitError):
         for key, text in changes.items():
             parse_quantity(text, units[key] or "1")
-    except UnitError:
-        return False
-    return True
+        return True
+    return False
 
 
 def _question(question: Mapping[str, Any], atmosphere: float) -> dict[str, Any]:

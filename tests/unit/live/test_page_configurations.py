@@ -234,7 +234,7 @@ def test_a_page_shows_units_digits_and_names_of_its_own_device(chromium: Any, tm
     )
     page = opened(chromium, made, viewport=LARGE)
     # All digits of the atmosphere, which somebody wrote, and four of a pressure that was given in another unit.
-    page.locator(".control[data-key='supply.pressure'] input[type=text]").fill("50 psi gauge")
+    page.locator(".control[data-key='supply.pressure'] input[type=text]").fill("50 psi_g")
     page.keyboard.press("Enter")
     assert shown_by(page, "supply.pressure") == "3.447 bar gauge"
     page.locator("summary", has_text="Supply").first.click()
@@ -242,8 +242,8 @@ def test_a_page_shows_units_digits_and_names_of_its_own_device(chromium: Any, tm
     # As the file has it.
     assert shown_by(page, "sensors.delay") == "2 ms"
     page.locator(".control[data-key='sensors.delay'] input[type=range]").fill("200")
-    assert shown_by(page, "sensors.delay") == "25 ms"
-    assert page.evaluate("workbench.values(0)")["sensors.delay"] == 0.025
+    assert shown_by(page, "sensors.delay") == "25.3 ms"
+    assert page.evaluate("workbench.values(0)")["sensors.delay"] == 0.0253
     assert page.evaluate("workbench.content.tabs.map(tab => tab.title)") == ["Free motion", "Moving elbow"]
     assert page.locator(".drawing title").first.text_content() == "cylinder-servo: cylinder, valve and elbow"
     assert page.locator(".drawing .hub").count() == 0
