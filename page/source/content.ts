@@ -68,6 +68,8 @@ export interface Relation {
 export interface Program {
   readonly name: string;
   readonly kind: "scenario" | "walk";
+  /** The kind of its actuator, as `vane` or `cylinder`. */
+  readonly actuator: string;
   readonly label: string;
   /** The number of the colour that its valve has in every figure, 0 where it has none. */
   readonly look: number;

@@ -1,4 +1,4 @@
-/** A moving drawing of the device: vane, chambers coloured by pressure, valve, and the leg with its foot. */
+/** A moving drawing of the device: actuator, chambers coloured by pressure, valve, and the joint with its two limbs. */
 
 import { colour, shade } from "./colours";
 import { say, shape } from "./dom";
@@ -8,6 +8,10 @@ const RADIUS = 62;
 const CENTRE = [92, 92] as const;
 const ANKLE = [292, 118] as const;
 const SHANK = 84;
+
+/** The box of an actuator that is no vane: its ends, and its upper and lower edge. */
+const [LEFT, RIGHT, TOP, BOTTOM] = [44, 140, 60, 110];
+const [LEAST, STROKE, ROD] = [68, 48, 78];
 
 /** What does not move: stops of the vane [rad], and pressures [Pa absolute]. */
 export interface Frame {
@@ -32,15 +36,16 @@ export class Drawing {
   private readonly arc = shape("path", { class: "effort" });
   private readonly words = shape("text", { class: "words", x: ANKLE[0], y: 196, "text-anchor": "middle" });
 
-  constructor(name: string) {
+  /** `actuator` is its kind; all but a vane and a cylinder are drawn as bladders. */
+  constructor(name: string, private readonly actuator: string, joint: string) {
     this.root = shape(
       "svg",
       { viewBox: "0 0 384 204", role: "img", class: "drawing" },
-      shape("title", {}, `${name}: actuator, chambers, valve, leg and foot`),
+      shape("title", {}, `${name}: ${actuator === "table" ? "actuator" : actuator.replace(/_/g, " ")}, valve and ${joint}`),
       ...this.chambers,
       ...this.ways,
       this.vane,
-      shape("circle", { class: "hub", cx: CENTRE[0], cy: CENTRE[1], r: 7 }),
+      ...(actuator === "vane" ? [shape("circle", { class: "hub", cx: CENTRE[0], cy: CENTRE[1], r: 7 })] : []),
       ...this.texts,
       shape("rect", { class: "valve", x: 46, y: 164, width: 92, height: 20, rx: 4 }),
       this.spool,
@@ -55,7 +60,8 @@ export class Drawing {
       this.foot,
       shape("circle", { class: "joint", r: 6 }),
     );
-    this.foot.append(shape("path", { class: "limb", d: "M-16 22Q-20 24 -14 25L52 25Q58 24 52 20L8 2L-8 2Z" }));
+    this.vane.toggleAttribute("hidden", actuator !== "vane" && actuator !== "cylinder");
+    this.foot.append(shape("path", { class: "limb", d: joint !== "ankle" ? `M0 0H${SHANK}` : "M-16 22Q-20 24 -14 25L52 25Q58 24 52 20L8 2L-8 2Z" }));
   }
 
   /** Show a run as it is at a sample. */
@@ -73,25 +79,25 @@ export class Drawing {
     const middle = (frame.lowest + frame.highest) / 2;
     const edge = 0.17;
     const at = (given: number) => given - middle - Math.PI / 2;
-    const ends: readonly (readonly [number, number])[] = [
-      [at(frame.lowest - edge), at(angle)],
-      [at(angle), at(frame.highest + edge)],
-    ];
-    ends.forEach(([from, to], place) => {
+    const way = Math.min(1, Math.max(0, (angle - frame.lowest) / (frame.highest - frame.lowest)));
+    const piston = LEAST + STROKE * way;
+    const paths = this.actuator === "vane"
+      ? [sector(at(frame.lowest - edge), at(angle)), sector(at(angle), at(frame.highest + edge))]
+      : [boxed(LEFT, piston, this.actuator === "cylinder"), boxed(piston, RIGHT, this.actuator === "cylinder")];
+    paths.forEach((path, place) => {
       const pressure = pressures[place] ?? null;
       for (const drawn of [this.chambers[place], this.ways[place], this.texts[place]]) drawn?.toggleAttribute("hidden", pressure === null);
       // A device of one chamber has no other one.
       if (pressure === null) return;
       const share = (pressure - frame.atmosphere) / Math.max(1, frame.supply - frame.atmosphere);
-      this.chambers[place]?.setAttribute("d", sector(from, to));
+      this.chambers[place]?.setAttribute("d", path);
       this.chambers[place]?.setAttribute("fill", `rgb(${shade(0.12 + 0.8 * share).join()})`);
       const text = this.texts[place];
       if (text !== undefined) say(text, `${place + 1}: ${frame.text(`pressure_${place + 1}`, pressure).replace(/\u00a0gauge$| gauge$/, "")}`);
     });
-    const [x, y] = onCircle(at(angle), RADIUS + 3);
-    for (const [name, given] of [["x1", CENTRE[0]], ["y1", CENTRE[1]], ["x2", x], ["y2", y]] as const) {
-      this.vane.setAttribute(name, given.toFixed(1));
-    }
+    const rod = (TOP + BOTTOM) / 2;
+    const ends = this.actuator === "vane" ? [...CENTRE, ...onCircle(at(angle), RADIUS + 3)] : [piston, rod, piston + ROD, rod];
+    ["x1", "y1", "x2", "y2"].forEach((name, place) => this.vane.setAttribute(name, (ends[place] ?? 0).toFixed(1)));
   }
 
   /** The spool goes with the command; the way to a chamber is open to the supply, or to the outside. */
@@ -99,7 +105,8 @@ export class Drawing {
     const isVenting = command > 1.5;
     const share = isVenting ? 0 : Math.min(1, Math.max(-1, command));
     this.spool.setAttribute("x", (79 + 30 * share).toFixed(1));
-    ["M62 164C62 138 10 150 10 112S22 76 34 72", "M122 164C122 138 174 150 174 112S162 76 150 72"].forEach((line, place) => {
+    const lines = this.actuator === "vane" ? ["M62 164C62 138 10 150 10 112S22 76 34 72", "M122 164C122 138 174 150 174 112S162 76 150 72"] : [62, 122].map((x) => `M${x} 164V${BOTTOM}`);
+    lines.forEach((line, place) => {
       const towards = place === 0 ? share : -share;
       const way = this.ways[place];
       way?.setAttribute("d", line);
@@ -134,6 +141,14 @@ function sector(from: number, to: number): string {
   const isLarge = to - from > Math.PI ? 1 : 0;
   const ends = [x0, y0, x1, y1].map((number) => number.toFixed(1));
   return `M${CENTRE[0]} ${CENTRE[1]}L${ends[0]} ${ends[1]}A${RADIUS} ${RADIUS} 0 ${isLarge} 1 ${ends[2]} ${ends[3]}Z`;
+}
+
+/** A chamber from left to right: square in a cylinder, else a bladder. */
+function boxed(from: number, to: number, isSquare: boolean): string {
+  const [left, right] = [from.toFixed(1), to.toFixed(1)];
+  if (isSquare) return `M${left} ${TOP}H${right}V${BOTTOM}H${left}Z`;
+  const [middle, high, low] = [(TOP + BOTTOM) / 2, TOP - 8, BOTTOM + 8];
+  return `M${left} ${middle}C${left} ${high} ${right} ${high} ${right} ${middle}C${right} ${low} ${left} ${low} ${left} ${middle}Z`;
 }
 
 function degrees(angle: number): number {

@@ -8,6 +8,8 @@ import { fromSi, InputError, readableUnit, scaleOf, short, splitQuantity, toSi }
 export const ATMOSPHERE = "supply.atmospheric_pressure";
 const RELATIVE = 1e-9;
 const MOST_PARTS = 50;
+/** Digits of a number that is written by hand. */
+const MOST_WRITTEN = 8;
 /** Below this an end of a range is none that anybody has in mind, in the unit that is shown. */
 const LEAST_NAMED = 1e-9;
 const RAISED: Readonly<Record<string, string>> = { ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((sign, digit) => [String(digit), sign])), "−": "⁻" };
@@ -172,10 +174,11 @@ function written(value: number, isLow: boolean): string {
     .replace(/\B(?=(\d{3})+(?!\d)(?<!\.\d*))/g, ",");
 }
 
-/** A value as a control shows it, without its unit: what nobody has written, as a share of the stature, has no more digits than are read. */
+/** A value as a control shows it, without its unit: all digits where somebody may have written so many, else four. */
 export function shownNumber(content: Content, setting: Setting, value: number, atmosphere: number): string {
-  const isWritten = setting.origin !== "default" || value !== setting.value;
-  return plain(shownValue(content, setting, value, atmosphere), isWritten ? 6 : 4);
+  const shown = shownValue(content, setting, value, atmosphere);
+  const isWritten = Math.abs(Number(shown.toPrecision(MOST_WRITTEN)) - shown) <= RELATIVE * 1e-3 * Math.abs(shown);
+  return plain(shown, isWritten ? MOST_WRITTEN : 4);
 }
 
 /** The first pair of settings that contradict each other, as one line; empty where there is none. */

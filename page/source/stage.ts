@@ -1,7 +1,7 @@
 /** The moving part: a drawing for each configuration, the gait phases where there are any, and the time they show. */
 
 import { colour } from "./colours";
-import { channelNamed, type Content } from "./content";
+import { channelNamed, type Content, programNamed } from "./content";
 import { Drawing } from "./drawing";
 import { element, say } from "./dom";
 import type { Run } from "./engine";
@@ -10,6 +10,7 @@ import { plain, shownText } from "./shown";
 
 export interface Acted {
   readonly name: string;
+  readonly program: string;
   readonly look: number;
   readonly run: Run;
   readonly values: Values;
@@ -46,11 +47,11 @@ export class Stage {
 
   show(acted: readonly Acted[]): void {
     this.acted = acted;
-    const layout = JSON.stringify(acted.map(({ name, look }) => [name, look]));
+    const layout = JSON.stringify(acted.map(({ name, look, program }) => [name, look, program]));
     if (layout !== this.layout) {
       this.layout = layout;
-      this.drawn = acted.map(({ name, look }) => ({
-        drawing: new Drawing(name),
+      this.drawn = acted.map(({ name, look, program }) => ({
+        drawing: new Drawing(name, programNamed(this.content, program).actuator, this.content.joint),
         caption: element("figcaption", { class: `run-${look}` }, name),
       }));
       this.drawings.replaceChildren(...this.drawn.map(({ drawing, caption }) => element("figure", {}, caption, drawing.root)));

@@ -1,6 +1,5 @@
 """``ppafo new KIND NAME``: a new input file from a template or a bundled file, or the files of an example."""
 
-import json
 import os
 import re
 import shlex
@@ -138,20 +137,14 @@ def new(
 
 def _bottle_text(part: str, name: str) -> str:
     """Return the file of a bottle of the catalogue of parts, under a new name."""
+    from ppafo.documents.toml_text import assignments, table_lines
     from ppafo.parameters.bottles.bottle import load_bottle
 
     bottle = load_bottle(part)
     gas = {"value": bottle.fluid.name, "origin": "derived", "source": f"bottle {part} of the catalogue of parts"}
     tables = {"gas": gas, **{path: entry.model_dump(exclude_defaults=True) for path, entry in bottle.entries.items()}}
-    lines = ["schema_version = 1", f'name = "{name}"', f"title = {json.dumps(bottle.title, ensure_ascii=False)}"]
-    for path, table in tables.items():
-        # A text or a number in JSON is one in TOML too.
-        lines += [
-            "",
-            f"[{path}]",
-            *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in table.items()),
-        ]
-    return "\n".join(lines) + "\n"
+    head = assignments({"schema_version": 1, "name": name, "title": bottle.title})
+    return "\n".join([*head, *(line for item in tables.items() for line in table_lines(*item)), ""])
 
 
 def list_kinds() -> list[dict[str, str]]:
@@ -170,7 +163,7 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     """Return the text of the new file: the template or the source, under the new name."""
     from importlib import resources
 
-    from ppafo.documents.toml_text import TomlKind
+    from ppafo.documents.toml_text import TomlKind, value_text
     from ppafo.parameters.bottles.bottle import bottle_parts
 
     if kind == "bottle" and source is not None and source in bottle_parts():
@@ -190,8 +183,7 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     if kind == "set" and source is not None:
         # What the copy changes is shown by 'ppafo sets audit'; what the source changed is not its matter.
         parent = source if source in files.names() else os.path.relpath(source, path.parent)
-        # A text in JSON is one in TOML too.
-        rest = f"\nparent = {json.dumps(parent, ensure_ascii=False)}{_PARENT_LINE.sub('', rest, count=1)}"
+        rest = f"\nparent = {value_text(parent)}{_PARENT_LINE.sub('', rest, count=1)}"
     text = f'{head}name = "{name}"{rest}'
     # A file of the package shows in its first lines how it is run.
     shown = [line.replace(named[2], str(path)) if line.startswith("#   ppafo ") else line for line in text.split("\n")]

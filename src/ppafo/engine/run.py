@@ -164,13 +164,12 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     )
     own_groups = program.groups
     declared_at = partial(place_of_group, program)
-    given = _parameters_of(run, timing)
-    parameters = filled(rows_of(own_groups, Role.PARAMETER), given, runs, Role.PARAMETER, declared_at)
+    parameters = filled(
+        rows_of(own_groups, Role.PARAMETER), _parameters_of(run, timing), runs, Role.PARAMETER, declared_at
+    )
     states = filled(rows_of(own_groups, Role.STATE), _states_of(run), runs, Role.STATE, declared_at)
-    counts = np.empty((runs, 6))
     numbers = (run.needs_parts, run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
-    for column, count in enumerate(numbers):
-        counts[:, column] = count
+    counts = np.column_stack([np.full(runs, number, dtype=np.float64) for number in numbers])
     if runs == 1 or (counts == counts[0]).all():
         clocks, groups = counts[:1], [np.arange(runs)]
     else:

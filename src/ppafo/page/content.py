@@ -22,10 +22,12 @@ from ppafo.report.display_units import metric_quantity
 from ppafo.report.setting_names import REFERENCE_LEVELS, label_of
 from ppafo.report.style import PAGE_LOOKS
 from ppafo.simulation.declaration import PRESSURE_WORDS
+from ppafo.simulation.document import value_at
 from ppafo.simulation.overrides import apply_overrides, is_of_device
 from ppafo.simulation.profiles import limits_of
 from ppafo.simulation.scenario import Scenario
-from ppafo.units import conversion, from_si, parse_quantity, to_si
+from ppafo.units import conversion, from_si, parse_quantity, split_quantity, to_si
+from ppafo.units.quantity import SI
 from ppafo.units.shown import QUANTITIES, shown_in
 from ppafo.version import __version__
 
@@ -78,7 +80,10 @@ def program_content(simulated: PageSimulation, module: str, intervals: Mapping[s
     keys = {setting["key"] for setting in described["settings"]}
     # The file of a scenario or walk with the overrides in it; overrides of the device stay overrides.
     scenario, settings = simulated.scenario, []
-    for entry in described["settings"]:
+    overridden = read_overrides(described["overrides"], ScenarioError)
+    changed = apply_overrides(described["document"], overridden, described["name"], declared_content(scenario))
+    for stated in described["settings"]:
+        entry = _in_given_unit(stated, value_at(changed.document, stated["key"]))
         display = entry["display"]
         # Pressures of a controller are absolute, and the file of a walk has limits that its program has not.
         if entry["group"] == "controller" and display["unit"].endswith("_g"):
@@ -86,8 +91,6 @@ def program_content(simulated: PageSimulation, module: str, intervals: Mapping[s
         else:
             known = with_limits(entry, scenario)
         settings.append(_setting(known, gauge, intervals, scenario))
-    overridden = read_overrides(described["overrides"], ScenarioError)
-    changed = apply_overrides(described["document"], overridden, described["name"], declared_content(scenario))
     document, own = changed.document, changed.device
     of_file = document.get("device", {}).get("overrides", ())
     overrides = list(over(of_file, map(str, own), valve=scenario.device.valve_name))
@@ -95,6 +98,7 @@ def program_content(simulated: PageSimulation, module: str, intervals: Mapping[s
     return {
         "name": described["name"],
         "kind": described["kind"],
+        "actuator": simulated.scenario.device.actuator.kind,
         "label": simulated.label,
         # Walks, with and without the device, have colours in order.
         "look": 0 if is_walk(scenario) else PAGE_LOOKS.get(scenario.device.valve.kind, 0),
@@ -107,9 +111,7 @@ def program_content(simulated: PageSimulation, module: str, intervals: Mapping[s
         "settings": settings,
         "relations": [
             {
-                "key": relation["key"],
-                "relation": relation["relation"],
-                "other": relation["other"],
+                **{name: relation[name] for name in ("key", "relation", "other")},
                 "factor": 1.0 + relation["tolerance"] * relation["is_share"],
                 "slack": 0.0 if relation["is_share"] else relation["tolerance"],
             }
@@ -179,6 +181,17 @@ def page_content(
     }
 
 
+def _in_given_unit(entry: Mapping[str, Any], given: Any) -> Mapping[str, Any]:
+    """Return a setting in the unit of its file, for example ``2 ms``; pressures keep the unit of the set."""
+    si = entry["unit"]
+    with contextlib.suppress(UnitError):
+        unit = split_quantity(given)[1] if isinstance(given, str) and si not in (_LEVEL, _DIFFERENCE) else ""
+        if unit not in ("", SI, si):
+            zero = to_si(0.0, unit, si)
+            return {**entry, "display": {"unit": unit, "factor": to_si(1.0, unit, si) - zero, "zero": zero}}
+    return entry
+
+
 def _setting(
     entry: Mapping[str, Any], gauge: Mapping[str, str], intervals: Mapping[str, Interval], scenario: Scenario
 ) -> dict[str, Any]:
@@ -194,7 +207,7 @@ def _setting(
     factor, zero = display["factor"], display["zero"]
     value = (entry["value"] - zero) / factor
     low, high = ((end - zero) / factor if end is not None else None for end in (entry["minimum"], entry["maximum"]))
-    slider = words()["sliders"].get(entry["key"])
+    slider, begin, end = words()["sliders"].get(entry["key"]), math.inf, -math.inf
     if key in REFERENCE_LEVELS and followed.reach is not None:
         limits = limits_of(device, followed)
         begin, end = (float(f"{(limit - zero) / factor:.2g}") for limit in (limits.lowest, limits.highest))
@@ -206,7 +219,7 @@ def _setting(
             # The file has its ends in the package's own units.
             sizes = [(usual["zero"] + usual["factor"] * each - zero) / factor for each in (begin, end)]
             begin, end = (float(f"{size:.2g}") for size in sizes)
-    else:
+    if not begin <= value <= end:
         end = high if high is not None and high <= 1.0 else 1.0
         if value:
             # The next round number that is not smaller.
@@ -263,12 +276,13 @@ def _gauge_texts(scenario: Scenario, settings: Iterable[Mapping[str, Any]]) -> d
     """Return texts of the gauge pressures that follow the atmosphere, as in Python."""
     following = {entry["key"] for entry in settings if entry["follows"]}
     gaps = {
-        path: link.gap for path, links in scenario.graph.items() for link in links if link.sources == (ATMOSPHERE_PATH,)
+        path: link.gap
+        for path, links in scenario.graph.items()
+        for link in links
+        if link.sources == (ATMOSPHERE_PATH,) and path not in following
     }
     texts = {}
     for path, gap in gaps.items():
-        if path in following:
-            continue
         # As a file may write it: the shortest text that gives the same number.
         written = (
             f"{number!r} {unit}"

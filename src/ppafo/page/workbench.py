@@ -1,5 +1,6 @@
 """Workbench page of scenarios and walks: tabs, labels and content."""
 
+import contextlib
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,7 +18,7 @@ from ppafo.page.motions import is_walk, tab_title, usual_changes
 from ppafo.page.opening import computed_opening, first_settings, opening_like, opening_of
 from ppafo.page.still import still_of
 from ppafo.page.wasm import module_of
-from ppafo.parameters.joint import ANKLE
+from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.finding import LivePart
 from ppafo.simulation.scenario import Scenario
@@ -112,7 +113,9 @@ def _content(
         with shown_in(scenario.device.shown):
             module = module_of(scenario)
         # A name of one's own stays as it is.
-        simulated.append(PageSimulation(scenario, module, _LABELS.get(scenario.name, scenario.name)))
+        known = scenario.name in _LABELS
+        label = scenario.device.joint.said(_LABELS[scenario.name]) if known else scenario.name
+        simulated.append(PageSimulation(scenario, module, label))
     intervals = known_intervals()
     names: dict[str, str] = {}
     programs = []
@@ -121,8 +124,11 @@ def _content(
         with shown_in(program.scenario.device.shown):
             programs.append(program_content(program, name, intervals))
     joints = {program.scenario.device.joint.name for program in simulated}
-    joint = joints.pop() if len(joints) == 1 else "joint"
-    content = page_content(_title(joint), form, _tabs(simulated), programs, joint)
+    joint = joints.pop() if len(joints) == 1 else ""
+    title = (
+        TITLE if joint == ANKLE.name else f"The powered {joint} orthosis, live" if joint else "Powered orthoses, live"
+    )
+    content = page_content(title, form, _tabs(simulated), programs, joint or "joint")
     by_name = {program.scenario.name: program for program in simulated}
     described = {program["name"]: program for program in programs}
     stills = []
@@ -175,23 +181,13 @@ def known_intervals() -> Mapping[str, Interval]:
     return {path: (low, high) for path, (low, high) in described.items()}
 
 
-def _title(joint: str) -> str:
-    """Return the title of a page for a joint by name; "joint" stands for devices of several joints."""
-    if joint == ANKLE.name:
-        return TITLE
-    return "Powered orthoses, live" if joint == "joint" else f"The powered {joint} orthosis, live"
-
-
 def _fits(changes: Mapping[str, str], units: Mapping[str, str]) -> bool:
     """Return True if all changed settings are among ``units`` [SI], and the changes are in units of these."""
-    if not changes.keys() <= units.keys():
-        return False
-    try:
+    with contextlib.suppress(KeyError, UnitError):
         for key, text in changes.items():
             parse_quantity(text, units[key] or "1")
-    except UnitError:
-        return False
-    return True
+        return True
+    return False
 
 
 def _question(question: Mapping[str, Any], atmosphere: float) -> dict[str, Any]:
@@ -209,11 +205,11 @@ def _question(question: Mapping[str, Any], atmosphere: float) -> dict[str, Any]:
 
 
 def _tabs(simulated: Sequence[PageSimulation]) -> list[dict[str, Any]]:
-    groups: dict[str, list[PageSimulation]] = {}
+    groups: dict[tuple[str, JointNames], list[PageSimulation]] = {}
     for program in simulated:
-        groups.setdefault(tab_title(program.scenario), []).append(program)
+        groups.setdefault((tab_title(program.scenario), program.scenario.device.joint), []).append(program)
     tabs = []
-    for title, group in groups.items():
+    for (title, _), group in groups.items():
         alone = " ".join(group[0].scenario.description.split()).replace("psi_g", "psi") if len(group) == 1 else ""
         starts = [program.scenario for program in group[:_OPEN]]
         device = group[0].scenario.device
@@ -229,7 +225,7 @@ def _tabs(simulated: Sequence[PageSimulation]) -> list[dict[str, Any]]:
             ]
         tabs.append(
             {
-                "title": title,
+                "title": device.joint.said(title),
                 "summary": alone or _SUMMARIES.get(title, ""),
                 "programs": [program.scenario.name for program in group],
                 "start": [{"program": scenario.name, "changes": usual_changes(scenario)} for scenario in starts],

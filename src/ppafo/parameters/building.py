@@ -147,8 +147,7 @@ def contradictions(parameter_set: ParameterSet, device: Device) -> Iterator[tupl
             allowed = f"{relation} {other} = {shown_text(limit, si_unit, atmosphere=room, unit=unit)}"
             why = _BESIDE_ANOTHER if path in SUPPLIES else ""
             yield (path, other), f"{path} = {number_text(entry)} must be {allowed}{why}"
-    relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
-    if device.supply.is_vacuum and relieving is not None and not relieving.value:
+    if device.supply.is_vacuum and declaration.RELIEVING_PATH in parameter_set.flags and not device.supply.relieving:
         yield (
             (declaration.RELIEVING_PATH, *SUPPLIES),
             f"{declaration.RELIEVING_PATH} = false: gas goes from the chambers into a supply below the atmosphere; set "

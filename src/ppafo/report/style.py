@@ -158,9 +158,7 @@ def house_style() -> Iterator[None]:
     with matplotlib.rc_context():
         # Settings of the user's own file would change figures from computer to computer.
         matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_SETTINGS)
-        sizes: Any = {name: font_size(size) for name, size in _FONT_SIZES.items()}
-        matplotlib.rcParams.update(sizes)
+        matplotlib.rcParams.update(_SETTINGS | {name: font_size(size) for name, size in _FONT_SIZES.items()})
         yield
 
 

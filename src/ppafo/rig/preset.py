@@ -28,6 +28,10 @@ PREFIX = "rig."
 _FILE = TomlKind("preset of the rig", "rig", resources.files("ppafo.rig") / "presets", ParameterError)
 
 
+_DIFFERENCE: Any = {"minimum": -80.0, "maximum": 80.0}
+"""Range of the temperature differences of the bench [K]."""
+
+
 def _from_zero(name: str, unit: str, summary: str, maximum: float = math.inf) -> Quantity:
     return Quantity(name, unit, summary, minimum=0.0, maximum=maximum)
 
@@ -44,20 +48,8 @@ SECTIONS: dict[str, tuple[Quantity, ...]] = {
     "gas": (
         _from_zero("heat_transfer_coefficient", "W/(m^2 K)", "heat transfer between gas and wall", 1e9),
         _from_zero("wall_area_per_volume", "1/m", "inner surface of chamber or line over its volume", 1e5),
-        Quantity(
-            "wall_temperature_difference",
-            "K",
-            "wall and room above the set's temperature",
-            minimum=-80.0,
-            maximum=80.0,
-        ),
-        Quantity(
-            "supply_temperature_difference",
-            "K",
-            "supplied gas above the set's temperature",
-            minimum=-80.0,
-            maximum=80.0,
-        ),
+        Quantity("wall_temperature_difference", "K", "wall and room above the set's temperature", **_DIFFERENCE),
+        Quantity("supply_temperature_difference", "K", "supplied gas above the set's temperature", **_DIFFERENCE),
         _from_zero("real_gas_share", "", "fraction of the gas's second virial coefficient, 0: ideal", 1.0),
     ),
     "supply": (

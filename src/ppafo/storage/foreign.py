@@ -198,18 +198,14 @@ def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
     with refused_as(DataError, f"direction.window = {wanted.window!r}", UnitError):
         window = parse_quantity(wanted.window, TIME_UNIT)
     # The slope [1/s] between the means of the half windows [s] before and after each sample.
-    sum_of_values = np.concatenate(([0.0], np.cumsum(recording[wanted.of])))
-    sum_of_times = np.concatenate(([0.0], np.cumsum(recording.time)))
+    sums = np.pad(np.cumsum([recording[wanted.of], recording.time], axis=1), ((0, 0), (1, 0)))
     here = np.arange(recording.time.size)
     # At least the sample itself on either side, where the window is shorter than a sample.
     first = np.minimum(np.searchsorted(recording.time, recording.time - 0.5 * window), here)
     end = np.maximum(np.searchsorted(recording.time, recording.time + 0.5 * window, side="right"), here + 1)
-    count_before, count_after = here - first + 1, end - here
-    mean_before = (sum_of_values[here + 1] - sum_of_values[first]) / count_before
-    mean_after = (sum_of_values[end] - sum_of_values[here]) / count_after
-    time_before = (sum_of_times[here + 1] - sum_of_times[first]) / count_before
-    time_after = (sum_of_times[end] - sum_of_times[here]) / count_after
-    rate = wanted.sign * np.asarray((mean_after - mean_before) / np.maximum(time_after - time_before, _SHORTEST))
+    before = (sums[:, here + 1] - sums[:, first]) / (here - first + 1)
+    change, elapsed = (sums[:, end] - sums[:, here]) / (end - here) - before
+    rate = wanted.sign * (change / np.maximum(elapsed, _SHORTEST))
     direction = np.where(rate > threshold, 1.0, np.where(rate < -threshold, -1.0, 0.0))
     moving = np.flatnonzero(direction)
     if moving.size == 0:

@@ -15,7 +15,8 @@ from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import read_overrides
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.document import ScenarioRequest
-from ppafo.simulation.loading import Layout, request_again, scenario_of
+from ppafo.simulation.loading import FILE as SCENARIO_FILE
+from ppafo.simulation.loading import Layout, list_scenarios, request_again, scenario_of
 from ppafo.simulation.overrides import over_layer
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME
@@ -98,7 +99,7 @@ def load_walk(
                 "already; give it once"
             )
     with at_fault("scenario"):
-        content = FILE.read(scenario)
+        content = (SCENARIO_FILE if str(scenario) in list_scenarios() else FILE).read(scenario)
     document, folder = FILE.parse(content, file), Path(scenario).parent
     request = ScenarioRequest(file, str(scenario), folder, document, changes, set_or_load(parameter_set), instead)
     return scenario_of(request, WALKING)

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from ppafo import parameters
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.loading import load_scenario
 from ppafo.page.motions import tab_title
@@ -13,6 +14,7 @@ from ppafo.page.workbench import workbench
 from scripts.live_page import missing, opened
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing() or "there is a browser")
+SHIPPED_SET = Path(parameters.__file__).parent / "sets" / "cylinder-lever.toml"
 BLADDER = Path(__file__).parents[2] / "actuators" / "torque-task-measured-bladder.toml"
 RECORDING = "time [s],torque [N m]\n0,0\n1,1\n2,1\n3,0\n"
 LARGE = {"width": 1400, "height": 1000}
@@ -218,3 +220,46 @@ def test_a_tab_is_called_after_what_is_controlled() -> None:
     assert tab_title(load_scenario("torque-task-proportional")) == "Torque task"
     assert tab_title(load_scenario("pressure-loop")) == "Pressure task"
     assert tab_title(load_scenario("cylinder-servo")) == "Free motion"
+
+
+def test_a_page_shows_units_digits_and_names_of_its_own_device(chromium: Any, tmp_path: Path) -> None:
+    joint = '\n[joint]\nname = "elbow"\npositive = "flexion"\n'
+    (tmp_path / "elbow.toml").write_bytes(SHIPPED_SET.read_bytes() + joint.encode())
+    made = tmp_path / "elbow.html"
+    made.write_bytes(
+        workbench(
+            ["cylinder-servo", "torque-task-moving-ankle"],
+            overrides=[f"device.set={tmp_path / 'elbow.toml'}"],
+        )
+    )
+    page = opened(chromium, made, viewport=LARGE)
+    # All digits of the atmosphere, which somebody wrote, and four of a pressure that was given in another unit.
+    page.locator(".control[data-key='supply.pressure'] input[type=text]").fill("50 psi_g")
+    page.keyboard.press("Enter")
+    assert shown_by(page, "supply.pressure") == "3.447 bar gauge"
+    page.locator("summary", has_text="Supply").first.click()
+    assert shown_by(page, "supply.atmospheric_pressure") == "1.01325 bar abs"
+    # As the file has it.
+    assert shown_by(page, "sensors.delay") == "2 ms"
+    page.locator(".control[data-key='sensors.delay'] input[type=range]").fill("200")
+    assert shown_by(page, "sensors.delay") == "25.3 ms"
+    assert page.evaluate("workbench.values(0)")["sensors.delay"] == 0.0253
+    assert page.evaluate("workbench.content.tabs.map(tab => tab.title)") == ["Free motion", "Moving elbow"]
+    assert page.locator(".drawing title").first.text_content() == "cylinder-servo: cylinder, valve and elbow"
+    assert page.locator(".drawing .hub").count() == 0
+    assert page.said == []
+
+
+def shown_by(page: Any, key: str) -> str:
+    """Return the text in the box of a setting, once the page has drawn what was changed."""
+    page.wait_for_timeout(300)
+    box = page.locator(f".control[data-key='{key}'] input[type=text]")
+    return str(box.input_value()).replace("\u00a0", " ")
+
+
+def test_the_slider_of_a_low_supply_has_room_on_both_sides(chromium: Any, tmp_path: Path) -> None:
+    made = tmp_path / "bladder.html"
+    made.write_bytes(workbench([str(BLADDER)]))
+    page = opened(chromium, made)
+    place = int(page.locator(".control[data-key='supply.pressure'] input[type=range]").input_value())
+    assert 100 < place < 300

@@ -242,7 +242,7 @@ def test_ranges_are_written_as_people_write_them(chromium: Any, file: Path) -> N
         "friction.static_torque": "0 to 10,000 N m. friction.static_torque",
         "actuator.dead_volume_1": "More than 0 cm³. actuator.dead_volume_1",
         "actuator.angle_max": "\u2212572 to 572 deg. actuator.angle_max",
-        "run.step": "10⁻⁸ to 1,000 s. run.step",
+        "run.step": "10⁻⁵ to 1,000,000 ms. run.step",
         "motion.angle": "\u2212572 to 572 deg. motion.angle",
     }
 

@@ -179,8 +179,7 @@ def _finish(
     all_remarks += knee_remarks(knee, walk, settings.stature)
     all_remarks += sign_remarks(means["shank_angle"], means["ankle_angle"])
     all_remarks += moment_remarks(means["ankle_moment"]) if "ankle_moment" in means else []
-    all_remarks += turning_remarks(mean_stride)
-    all_remarks += delay_remarks(mean_stride) + size_remarks(mean_stride)
+    all_remarks += turning_remarks(mean_stride) + delay_remarks(mean_stride) + size_remarks(mean_stride)
     all_remarks += _sampling_remarks(walk, taken)
     tilt = standing_tilt(means["shank_angle"], means["ankle_angle"])
     sign, taken_off = source.columns.ankle_angle.sign_and_neutral()
@@ -189,17 +188,9 @@ def _finish(
     given = setting_text("ankle_neutral", math.radians(neutral), f"{neutral:.1f} deg")
     all_remarks += zero_remarks(tilt, f"{given}, or ankle_angle.neutral in a gait map, corrects it")
     all_remarks += scatter_remarks(curves, errors)
-    names = tuple(table.file for table in source.tables)
-    return ImportedGait(
-        gait,
-        taken,
-        tuple(stride for stride, _ in strides.left_out),
-        curves,
-        errors,
-        footfalls.events,
-        names,
-        tuple(dict.fromkeys(all_remarks)),
-    )
+    left_out, names = (stride for stride, _ in strides.left_out), (table.file for table in source.tables)
+    unique = tuple(dict.fromkeys(all_remarks))
+    return ImportedGait(gait, taken, tuple(left_out), curves, errors, footfalls.events, tuple(names), unique)
 
 
 def _check_enough(strides: StrideSelection, usable: list[Stride], walk: Mapping[str, Signal]) -> None:

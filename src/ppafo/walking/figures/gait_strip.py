@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,6 +118,7 @@ def _shares(result: WalkResult, channel: str, states: tuple[_StateBand, ...]) ->
 
 def _draw_band(axes: "Axes", label: str, fractions: Floats, states: tuple[_StateBand, ...]) -> None:
     below = np.zeros(PHASES.size)
+    centred: dict[str, Any] = {"ha": "center", "va": "center"}
     for state, fraction in zip(states, fractions, strict=True):
         axes.fill_between(_PERCENT, below, below + fraction, color=state.colour, linewidth=0.0, step="mid")
         # Write the name into every block that holds for most strides, as it fits: whole, short, upright, or not.
@@ -127,22 +128,14 @@ def _draw_band(axes: "Axes", label: str, fractions: Floats, states: tuple[_State
             left, right = _PERCENT[first], _PERCENT[last - 1]
             x, y = 0.5 * (left + right), float(np.mean(middle[first:last]))
             space = 0.01 * (right - left) * (printed_width(_SIZE[0]) / print_scale() - _MARGINS.left - _MARGINS.right)
-            name = next((name for name in (state.name, state.short) if _LETTER * len(name) <= space), state.short)
-            if _LETTER * len(name) <= space:
-                axes.text(x, y, name, ha="center", va="center", fontsize=font_size(9.0))
+            fitting = [name for name in (state.name, state.short) if _LETTER * len(name) <= space]
+            if fitting:
+                axes.text(x, y, fitting[0], fontsize=font_size(9.0), **centred)
             elif space >= _LINE:
-                axes.text(x, y, name, ha="center", va="center", fontsize=font_size(8.0), rotation=90)
+                axes.text(x, y, state.short, fontsize=font_size(8.0), rotation=90, **centred)
         below = below + fraction
     if not below.any():
-        axes.text(
-            50.0,
-            0.5,
-            "no gait phases in this controller",
-            ha="center",
-            va="center",
-            fontsize=font_size(9.0),
-            color=GREY,
-        )
+        axes.text(50.0, 0.5, "no gait phases in this controller", fontsize=font_size(9.0), color=GREY, **centred)
     axes.set_ylim(0.0, 1.0)
     axes.set_yticks([])
     axes.grid(visible=False)
