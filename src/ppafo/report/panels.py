@@ -180,6 +180,8 @@ def draw_panels(
     width = printed_width(min(scale * (size[0] * across + _EDGES), FULL_WIDTH)) / scale
     fitting = max(1, int((width - _EDGES) / _NARROWEST))
     if fitting < across:
+        if fitting == 1:
+            panels = _in_one_column(panels, across)
         across = fitting
         # What only kept a place beside another has none to keep.
         panels = [panel for panel in panels if panel.marks or across > 1]
@@ -243,6 +245,15 @@ def draw_panels(
         mark_kind(figure, kind)
         lay_out(figure)
         return figure
+
+
+def _in_one_column(panels: Sequence[Panel], across: int) -> list[Panel]:
+    """Return panels of ``across`` columns in the order for one: a lower one over the same axis follows its owner."""
+    owners = [
+        number - across if number >= across and panel.shares_x and panel.tall < panels[number - across].tall else number
+        for number, panel in enumerate(panels)
+    ]
+    return [panels[number] for number in sorted(range(len(panels)), key=lambda number: (owners[number], number))]
 
 
 def _widened(panels: Sequence[Panel], across: int) -> set[int]:

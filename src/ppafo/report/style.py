@@ -222,17 +222,6 @@ def figure_of_panels(
     heights: Sequence[float] | None = None,
 ) -> "tuple[Figure, list[list[Axes]]]":
     """Return a figure of a width and height [inches] at full width, and its panels by row over a shared axis."""
-    figure, panel_width = figure_with_margins(size, margins, rows, columns)
-    grid = figure.subplots(rows, columns, sharex=True, squeeze=False, height_ratios=heights).tolist()
-    for axes in figure.axes:
-        axes.yaxis.set_label_coords(-margins.label / panel_width, 0.5)
-    return figure, grid
-
-
-def figure_with_margins(
-    size: tuple[float, float], margins: FigureMargins, rows: int, columns: int
-) -> "tuple[Figure, float]":
-    """Return an empty figure with margins, and the width of a panel [inches], both at full width."""
     from matplotlib.figure import Figure
 
     scale, height = print_scale(), size[1]
@@ -249,7 +238,10 @@ def figure_with_margins(
         wspace=margins.column_gap / panel_width,
         hspace=margins.row_gap / panel_height,
     )
-    return figure, panel_width
+    grid = figure.subplots(rows, columns, sharex=True, squeeze=False, height_ratios=heights).tolist()
+    for axes in figure.axes:
+        axes.yaxis.set_label_coords(-margins.label / panel_width, 0.5)
+    return figure, grid
 
 
 def write_head(figure: "Figure", title: str, remark: str, kind: RecordingKind) -> None:

@@ -21,7 +21,9 @@ from ppafo.analyses.reproduce.step_response import SupplyLevels
 from ppafo.identification.bench.result import figure_3
 from ppafo.page.html import bundled, digest
 from ppafo.report.finding import text_of
+from ppafo.report.style import drawn_at
 from ppafo.report.writing import typeset
+from tests.unit.report.test_width_of_figures import texts_of
 
 LEVELS = SupplyLevels(480536.0, 101325.0)
 
@@ -89,7 +91,7 @@ def test_figure_8_shows_torque_and_reference_of_both_valves_on_one_scale(reprodu
     assert top.get_ylim() == bottom.get_ylim()
     for axes, recording in ((top, solenoid), (bottom, proportional)):
         drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
-        assert list(drawn["torque, simulated"]) == list(recording["torque"])
+        assert list(drawn["simulated"]) == list(recording["torque"])
         assert list(drawn["reference"]) == list(recording["reference"])
 
 
@@ -214,4 +216,15 @@ def test_figure_8_shows_the_synthetic_experiment_with_both_valves(reproduction: 
     runs = (reproduction.solenoid.recording, reproduction.proportional.recording)
     figure = torque_task_figure(*runs, 5.0, (1.1, 0.4), (evidence.solenoid, evidence.proportional))
     for axes in (figure.axes[0], figure.axes[2]):
-        assert "torque, synthetic experiment" in {line.get_label() for line in axes.lines}
+        assert "synthetic experiment" in {line.get_label() for line in axes.lines}
+
+
+@pytest.mark.parametrize("width", ["84 mm", "145 mm"])
+def test_no_text_of_figure_8_is_cut(reproduction: Reproduction, width: str) -> None:
+    evidence = reproduction.synthetic
+    assert isinstance(evidence, SyntheticEvidence)
+    runs = (reproduction.solenoid.recording, reproduction.proportional.recording)
+    with drawn_at(width):
+        figure = torque_task_figure(*runs, 5.0, (1.1, 0.4), (evidence.solenoid, evidence.proportional))
+    for text in texts_of(figure):
+        assert text.get_window_extent().x1 <= figure.bbox.x1 + 1 or not text.axes, text.get_text()

@@ -1,9 +1,11 @@
 """Figures at the width of a column: readable, with nothing cut, in every form that the package draws."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -14,6 +16,7 @@ from ppafo.errors import ArgumentError
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import drawn_at
+from ppafo.walking.figures.mean_stride import OPACITY, WITH, WITHOUT
 
 INCHES = 84.0 / 25.4
 """Width of a column [inches]."""
@@ -68,7 +71,10 @@ def tick_labels_that_touch(figure: Figure) -> list[tuple[str, str]]:
 @pytest.mark.long
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_a_figure_at_the_width_of_a_column_can_be_read_and_is_whole(name: str) -> None:
-    figure = CATALOGUE[name]()
+    assert_readable(CATALOGUE[name]())
+
+
+def assert_readable(figure: Figure) -> None:
     assert figure.get_figwidth() == pytest.approx(INCHES)
     ticks = {
         id(label)
@@ -96,6 +102,24 @@ def test_panels_beside_each_other_are_stacked_in_a_column() -> None:
     left, right = (axes.get_position() for axes in narrow.axes)
     assert left.y0 > right.y1
     assert draw_panels(panels(2), across=2, size=(2.7, 2.0)).get_figwidth() == pytest.approx(5.7)
+
+
+def test_the_panel_of_a_difference_stays_below_its_curve_in_a_column() -> None:
+    curves = [replace(panel, title=name) for panel, name in zip(panels(2), "AB", strict=True)]
+    differences = [replace(panel, title=f"{panel.title} less model", tall=0.5) for panel in curves]
+    with drawn_at("84 mm"):
+        narrow = draw_panels([*curves, *differences], across=2, size=(2.7, 1.0))
+    assert [axes.get_title(loc="left") for axes in narrow.axes] == ["A", "A less model", "B", "B less model"]
+    wide = draw_panels([*curves, *differences], across=2, size=(2.7, 1.0))
+    assert [axes.get_title(loc="left") for axes in wide.axes] == ["A", "B", "A less model", "B less model"]
+
+
+def test_lines_without_the_device_are_paler_than_those_with_it_in_grey() -> None:
+    with_it, without = (
+        1.0 - OPACITY[colour] * (1.0 - float(np.dot(to_rgb(colour), (0.299, 0.587, 0.114))))
+        for colour in (WITH, WITHOUT)
+    )
+    assert without - with_it > 0.3
 
 
 @pytest.mark.filterwarnings("error")

@@ -42,7 +42,7 @@ _ENLARGED = 40.0
 _BIN = 3.0
 """Interval [ms] over which the band of a measurement reaches from the smallest to the largest reading."""
 _CURVES = (
-    ("Vane angle", "Angle", "deg", ACTUAL.colour, (0.66, 0.26, 0.31, 0.34)),
+    ("Vane angle", "Angle", "deg", ACTUAL.colour, (0.66, 0.36, 0.31, 0.34)),
     ("Pressure difference, $P_1 - P_2$", "Difference", "psi", ACTUAL.colour, (0.69, 0.14, 0.29, 0.34)),
     ("Chamber 1 (plantarflexion), $P_1$", "Pressure", "psig", CHAMBER_1.colour, (0.22, 0.12, 0.3, 0.34)),
     ("Chamber 2 (dorsiflexion), $P_2$", "Pressure", "psig", CHAMBER_2.colour, (0.69, 0.3, 0.29, 0.4)),
@@ -69,7 +69,7 @@ def step_response_figure(
         end = min(end, stop * (1.0 + _SHOWN_AFTER_STOP))
         marked = [Mark("at", x=time, colour=GREY, style=_EVENT) for time in (breakaway, stop)]
         # Angles at which nothing else is drawn there.
-        for time, angle, words in ((breakaway, 120.0, "vane breaks away"), (stop, 25.0, "vane at rest")):
+        for time, angle, words in ((breakaway, 120.0, "breaks away"), (stop, 25.0, "at rest")):
             named.append(Mark("text", time + 0.01 * end, angle, label=words, colour=GREY, style=_SMALL_WORDS))
     ends = -_SHOWN_BEFORE_STEP * end, end
     upper: list[Panel] = []
@@ -156,10 +156,10 @@ def torque_task_figure(
         torques.append(_torque_marks(run, style, ceiling, bench))
         errors.append(Mark("line", run.time, run["reference"] - run["torque"], colour=style.colour))
         supplied = run["supplied_mass"]
-        gas_label = f"{name}: {GRAMS_PER_KILOGRAM * supplied[-1]:.2f} g simulated, {stated:g} g in the paper (dotted)"
+        gas_label = f"{name}: {GRAMS_PER_KILOGRAM * supplied[-1]:.2f} g, in the paper {stated:g} g"
         gas.append(Mark("line", run.time, supplied, label=gas_label, colour=style.colour))
         gas.append(Mark("level", y=stated / GRAMS_PER_KILOGRAM, colour=style.colour, style=_LEVEL))
-        at_end += _end_marks(1.0 if run is solenoid else 0.0, run, style)
+        at_end += _end_marks(name, run, style)
     most = GRAMS_PER_KILOGRAM * max(float(run["supplied_mass"][-1]) for run, _, _ in runs)
     drawn = [mark.y for marks in torques for mark in marks]
     low, high = min(float(np.min(values)) for values in drawn), max(float(np.max(values)) for values in drawn)
@@ -167,8 +167,7 @@ def torque_task_figure(
     opening = Mark("line", proportional.time, proportional["command"], colour=PROPORTIONAL.colour)
     torque_limits = {"ylim": (low - air, high + air)}
     chambers = {"ylim": (0.0, 2.0), "yticks": (0.5, 1.5), "yticklabels": ("2", "1")}
-    # Room above for the names, which say the amounts.
-    gas_limits = {"ylim": (0.0, 1.9 * max(most, *gas_in_paper))}
+    gas_limits = {"ylim": (0.0, 1.1 * max(most, *gas_in_paper))}
     panels = [
         Panel(
             TIME,
@@ -181,16 +180,16 @@ def torque_task_figure(
             shares_x=True,
         )
         for kind, marks, title, legend, tall, limits in (
-            (_TORQUE, torques[0], "Torque with solenoid valves, on or off", "inside", 2.3, torque_limits),
+            (_TORQUE, torques[0], "Torque with solenoid valves, on or off", "above", 2.3, torque_limits),
             (Kind(), _filling_marks(solenoid), "Chamber that the solenoid valves fill", "", 0.7, chambers),
-            (_TORQUE, torques[1], "Torque with the proportional valve", "inside", 2.3, torque_limits),
+            (_TORQUE, torques[1], "Torque with the proportional valve", "above", 2.3, torque_limits),
             (Kind(), [opening], "Opening of the proportional valve", "", 0.7, {"ylim": (least, 1.08)}),
             (replace(_TORQUE, words="Error"), errors, "Error: reference less torque, both valves", "", 1.3, {}),
-            (_GAS, gas, "CO$_2$ taken from the supply", "inside", 1.7, gas_limits),
+            (_GAS, gas, "CO$_2$ from the supply (dotted: the paper)", "above", 1.3, gas_limits),
         )
     ]
     # Room to the right of the longer bar for the amounts.
-    ends = {"xlim": (0.0, 4.0 * most), "yticks": (1.0, 0.0), "yticklabels": [name for _, _, name in runs]}
+    ends = {"xlim": (0.0, 1.8 * most), "yticks": (1.0, 0.0), "yticklabels": [name for _, _, name in runs]}
     then = methodcaller("set", **ends)
     panels.append(Panel(_GAS, Kind(), at_end, "Where that gas is at the end", then=then, tall=0.75))
     return draw_panels(panels, 1, (6.3, 1.0), kind=solenoid.kind)
@@ -199,14 +198,14 @@ def torque_task_figure(
 def _torque_marks(recording: Recording, style: DrawingStyle, ceiling: float, synthetic: Recording | None) -> list[Mark]:
     """Return marks of reference, torque and largest torque, over the broad line of a synthetic experiment."""
     time, dashed = recording.time, {"linestyle": REFERENCE.line, "linewidth": 1.3}
-    ceiling_label = f"maximum that the supply can hold: {ceiling:.1f} N m"
+    ceiling_label = f"largest for the supply: {ceiling:.1f} N m"
     marks = [
         Mark("line", time, recording["reference"], label="reference", colour=REFERENCE.colour, style=dashed),
         Mark("level", y=ceiling, label=ceiling_label, colour=GREY, style=_LEVEL),
-        Mark("line", time, recording["torque"], label="torque, simulated", colour=style.colour),
+        Mark("line", time, recording["torque"], label="simulated", colour=style.colour),
     ]
     if synthetic is not None:
-        named: dict[str, Any] = {"label": "torque, synthetic experiment", "colour": EXPERIMENT.colour}
+        named: dict[str, Any] = {"label": "synthetic experiment", "colour": EXPERIMENT.colour}
         # Broader than what is simulated and darker than the grid: seen where both agree, too.
         broad = {"linestyle": "-", "linewidth": 4.5, "alpha": 0.75}
         marks.insert(2, Mark("line", synthetic.time, synthetic["torque"], style=broad, **named))
@@ -227,20 +226,28 @@ def _filling_marks(recording: Recording) -> list[Mark]:
     return marks
 
 
-def _end_marks(height: float, run: Recording, style: DrawingStyle) -> list[Mark]:
+def _end_marks(name: str, run: Recording, style: DrawingStyle) -> list[Mark]:
     """Return bars of the supplied gas at the end: in the chambers, vented, and below it leaked past the vane."""
+    is_first = name == "solenoid"
+    height = 1.0 if is_first else 0.0
     supplied, vented, leaked = (float(run[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass"))
     bars = (
-        (0.0, supplied - vented, height, 0.25, style.colour, 1.0),
-        (supplied - vented, supplied, height, 0.25, style.colour, 0.35),
-        (supplied - leaked, supplied, height - 0.36, 0.05, GREY, 1.0),
+        (0.0, supplied - vented, height, 0.25, style.colour, 1.0, "in the chambers"),
+        (supplied - vented, supplied, height, 0.25, style.colour, 0.35, "vented"),
+        (supplied - leaked, supplied, height - 0.36, 0.05, GREY, 1.0, "leaked past the vane"),
     )
-    inside, out, past = (f"{GRAMS_PER_KILOGRAM * mass:.2f} g" for mass in (supplied - vented, vented, leaked))
-    label = f"  {inside} in the chambers, {out} vented (pale); {past} leaked (grey)"
+    inside, out, past = (f"{GRAMS_PER_KILOGRAM * mass:.2f}" for mass in (supplied - vented, vented, leaked))
     return [
-        Mark("text", supplied, height, label=label, colour=BLACK, style=_WORDS),
+        Mark("text", supplied, height, label=f"  {inside}, {out}, {past} g", colour=BLACK, style=_WORDS),
         *(
-            Mark("band", (low, high), ((y - half,) * 2, (y + half,) * 2), colour=colour, style={"alpha": alpha})
-            for low, high, y, half, colour, alpha in bars
+            Mark(
+                "band",
+                (low, high),
+                ((y - half,) * 2, (y + half,) * 2),
+                label=words if is_first else "",
+                colour=colour,
+                style={"alpha": alpha},
+            )
+            for low, high, y, half, colour, alpha, words in bars
         ),
     ]

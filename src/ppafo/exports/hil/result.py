@@ -5,6 +5,7 @@ import io
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import methodcaller
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -13,14 +14,15 @@ from ppafo.documents.json_text import json_text
 from ppafo.exports.hil import wire
 from ppafo.exports.hil.loop import LinkTraffic, LogRow
 from ppafo.exports.hil.plant import CompiledPlant
+from ppafo.report.kind import Kind
+from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.recording_figure import recording_figure
-from ppafo.report.style import ACTUAL, VERMILION, FigureMargins, figure_with_margins, house_style, render_figure
+from ppafo.report.style import ACTUAL, VERMILION, render_figure
 from ppafo.simulation.simulate import Result
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -172,18 +174,13 @@ class HardwareRun:
         period, load = self.plant.period * _PER_THOUSAND, self.machine.load_after
         delays, response_times = self.delays, self.response_times
         beside = "" if load is None else f"; load {load:.2f} on {self.machine.cores} cores"
-        with house_style():
-            figure, _ = figure_with_margins((7.2, 3.3), FigureMargins(0.75, 0.2, 0.8, 0.85, 0.5, 0.7), 1, 2)
-            late, after = figure.subplots(1, 2)
-            figure.text(0.017, 0.97, f"{self.plant.scenario.name}: the link", va="top", fontsize=13, fontweight="bold")
-            missed = f"{len(delays) - len(response_times)} of {len(delays)} samples missed"
-            figure.text(0.017, 0.03, f"Dashed: one sample, {period:g} ms. {missed}{beside}", va="bottom", fontsize=9)
-            _histogram(late, delays, "Samples, after they were due")
-            _histogram(after, response_times, "Answers, after their sample")
-            late.set_ylabel("Samples")
-            for axes in (late, after):
-                axes.axvline(period, color=VERMILION, linewidth=1.0, linestyle="--")
-            return figure
+        missed = f"{len(delays) - len(response_times)} of {len(delays)} samples missed"
+        panels = [
+            _histogram(delays, period, "Samples, after they were due"),
+            _histogram(response_times, period, "Answers, after their sample"),
+        ]
+        note = f"Dashed: one sample, {period:g} ms. {missed}{beside}"
+        return draw_panels(panels, 2, (3.4, 2.4), f"{self.plant.scenario.name}: the link", note, "measured")
 
 
 def spread(values: Sequence[float]) -> dict[str, float] | None:
@@ -206,16 +203,17 @@ def longest_silence(rows: Sequence[LogRow]) -> int:
     return longest
 
 
-def _histogram(axes: "Axes", values: Sequence[float], title: str) -> None:
-    """Draw a histogram of times, in ms on a logarithmic axis; times below 0.01 ms are in the first bin."""
-    axes.set_title(title)
-    axes.set_xlabel("Time (ms)")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+def _histogram(values: Sequence[float], period: float, title: str) -> Panel:
+    """Return a histogram of times [s] over a logarithmic axis in ms; times below 0.01 ms are in the first bin.
+
+    ``period`` is the time between two samples [ms].
+    """
     shown = np.maximum(np.asarray(values) * _PER_THOUSAND, _SHORTEST_SHOWN)
     edges = np.geomspace(_SHORTEST_SHOWN, max(_LONGEST_SHOWN, 1.01 * shown.max(initial=0.0)), _BINS)
-    axes.hist(shown, edges.tolist(), color=ACTUAL.colour)
-    axes.set_xlim(edges[0], edges[-1])
-    axes.set_ylim(0.5, None)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter("{x:g}")
+    counts, _ = np.histogram(shown, edges)
+    marks = [
+        Mark("bars", edges, counts, colour=ACTUAL.colour, style={"linestyle": "-"}),
+        Mark("at", period, colour=VERMILION, style={"linewidth": 1.0, "linestyle": "--"}),
+    ]
+    limits = methodcaller("set", xscale="log", yscale="log", xlim=(edges[0], edges[-1]), ylim=(0.5, None))
+    return Panel(Kind("Time", "ms"), Kind("Samples"), marks, title, legend="", then=limits)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WITH, WITHOUT, HEALTHY = BLUE, VERMILION, BLACK
+OPACITY = MappingProxyType({WITH: 1.0, WITHOUT: 0.5})
+"""Opacity of the lines of both walks: without the device they are paler, in greyscale too."""
 STRIDE = Kind("Stride", "1", "fraction")
 ANGLE = Kind("Ankle angle; 0 neutral, dorsiflexion positive", "rad", "angle")
 PRESSURE = Kind("Gauge pressure; dashed: dorsiflexion chamber", "Pa_d", "pressure change")
@@ -69,7 +72,8 @@ def walk_figure(walks: Mapping[str, Any]) -> "Figure":
                 mean = curves.mean - atmosphere if kind is PRESSURE else curves.mean
                 mean = clinical_angle(mean) if kind is ANGLE else mean
                 marks.append(_band(mean, curves.deviation, colour, 0.2))
-                marks.append(Mark("line", PHASES, mean, label=label, colour=colour, style={"linestyle": dashes}))
+                style = {"linestyle": dashes, "alpha": OPACITY[colour]}
+                marks.append(Mark("line", PHASES, mean, label=label, colour=colour, style=style))
         if kind in healthy:
             mean, deviation = healthy[kind]
             look = {"linewidth": 1.2, "linestyle": (0, (1, 1.2))}

@@ -12,7 +12,7 @@ from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import BLACK, GREY, font_size, print_scale, printed_width
 from ppafo.signals.recording import Floats, Recording
 from ppafo.walking.figures.axes import GAS, GROUND, THIN, TOES
-from ppafo.walking.figures.mean_stride import ANGLE, WITH, WITHOUT
+from ppafo.walking.figures.mean_stride import ANGLE, OPACITY, WITH, WITHOUT
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.safety_events import acting_phase
@@ -45,7 +45,7 @@ def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
     walks = {WITHOUT: bare.recording, WITH: worn.recording}
     names = {WITHOUT: "without the device", WITH: "with it"}
     # Pale and not dashed: in many strides dashes cannot be told apart, and in grey the colours neither.
-    looks = {WITHOUT: {**THIN, "alpha": 0.5, "linestyle": "-"}, WITH: {**THIN, "linestyle": "-"}}
+    looks = {colour: {**THIN, "alpha": opacity, "linestyle": "-"} for colour, opacity in OPACITY.items()}
     angles = [
         Mark("line", walk.time, clinical_angle(walk["angle"]), label=names[colour], colour=colour, style=looks[colour])
         for colour, walk in walks.items()
