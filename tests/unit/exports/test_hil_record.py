@@ -289,7 +289,7 @@ def test_a_recording_whose_file_cannot_be_written_stays_aside(tmp_path: Path) ->
         _fail(keep)
     assert len(read_recording(tmp_path / "bench.recording.csv")) == 1
     with (
-        pytest.raises(DataError, match=r"bench\.recording\.csv: exists, .* rename it to keep them"),
+        pytest.raises(DataError, match=r"bench\.recording\.csv: contains samples .*; rename it to keep them"),
         kept_aside(target),
     ):
         pass
