@@ -21,6 +21,8 @@ from ppafo.wording import nearest_name
 P = ParamSpec("P")
 R = TypeVar("R")
 _EMPTY = inspect.Parameter.empty
+_ANSWERED_BY = {("sweep", "statistic"): "estimate", ("sweep", "metric"): "estimate"}
+"""Functions that take an argument of the command line, where another function has the command's name."""
 
 
 class _Parameter(NamedTuple):
@@ -116,7 +118,8 @@ def _values(
     values = dict(zip(positional_names, positional, strict=False))
     for name, value in by_name.items():
         if name not in parameters:
-            hint = nearest_name(name, parameters)
+            other = _ANSWERED_BY.get((function, name))
+            hint = f": ppafo.{other} has it" if other else nearest_name(name, parameters)
             raise ArgumentError(f"{function}() has no argument '{name}'{hint}; available: {', '.join(parameters)}")
         if name in values:
             raise ArgumentError(f"{function}(): {name} is given twice, by position and by name")

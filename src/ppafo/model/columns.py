@@ -27,9 +27,19 @@ def over_runs(function: Callable[..., Result], *arguments: Any) -> Result:
 
     The function returns a float or a tuple, nested ones and NamedTuples among them, of the same shape for all runs.
     """
+    results, combination_of_run = over_combinations(function, *arguments)
+    gathered: Result = gather(results, combination_of_run)
+    return gathered
+
+
+def over_combinations(function: Callable[..., Result], *arguments: Any) -> tuple[list[Result], NDArray[np.intp] | None]:
+    """Apply a function of floats to each distinct combination of arguments; arrays (runs,) hold one value per run.
+
+    Returns the results, and the index of the combination of each run (runs,), None if no argument is an array.
+    """
     varied = [argument for argument in arguments if isinstance(argument, np.ndarray)]
     if not varied:
-        return function(*arguments)
+        return [function(*arguments)], None
     # A function that branches takes no arrays; one call for each distinct combination gives each run the bits that it
     # has alone.
     combinations, combination_of_run = _distinct(varied)
@@ -39,8 +49,21 @@ def over_runs(function: Callable[..., Result], *arguments: Any) -> Result:
         rest = iter(values)
         single = [next(rest) if isinstance(argument, np.ndarray) else argument for argument in arguments]
         results.append(function(*single))
-    gathered: Result = _gather(results, combination_of_run)
-    return gathered
+    return results, combination_of_run
+
+
+def gather(results: Sequence[Any], combination_of_run: NDArray[np.intp] | None) -> Any:
+    """Result of each run, taken from the results of the combinations: an array (runs,), or a tuple of arrays.
+
+    Without an index of the combination of each run, the single result.
+    """
+    first_result = results[0]
+    if combination_of_run is None:
+        return first_result
+    if not isinstance(first_result, tuple):
+        return np.array(results, dtype=np.float64)[combination_of_run]
+    parts = [gather([result[index] for result in results], combination_of_run) for index in range(len(first_result))]
+    return type(first_result)(*parts) if hasattr(first_result, "_fields") else tuple(parts)
 
 
 def root(number: Numeric) -> Numeric:
@@ -106,12 +129,3 @@ def _distinct(columns: Sequence[NDArray[np.float64]]) -> tuple[Iterable[Sequence
         return np.stack(columns, axis=1).tolist(), np.arange(columns[0].size)
     rows, row_of_run = np.unique(np.stack(columns, axis=1), axis=0, return_inverse=True)
     return rows.tolist(), row_of_run.reshape(-1)
-
-
-def _gather(results: Sequence[Any], combination_of_run: NDArray[np.intp]) -> Any:
-    """Result of each run, taken from the results of the combinations: an array (runs,), or a tuple of arrays."""
-    first_result = results[0]
-    if not isinstance(first_result, tuple):
-        return np.array(results, dtype=np.float64)[combination_of_run]
-    parts = [_gather([result[index] for result in results], combination_of_run) for index in range(len(first_result))]
-    return type(first_result)(*parts) if hasattr(first_result, "_fields") else tuple(parts)

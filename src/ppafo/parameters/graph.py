@@ -12,7 +12,7 @@ import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.model.binding import by_recipe, recipe_of
-from ppafo.model.columns import over_runs
+from ppafo.model.columns import gather, over_combinations, over_runs
 from ppafo.model.declaration import PlainFunction, quantities_of
 from ppafo.units import to_si
 
@@ -41,7 +41,8 @@ class LinkFunction:
 
     The first sources fill ``rows``, NamedTuple classes that declare their numbers, and each row is one argument. The
     remaining sources are arguments one by one. ``orifice`` is the section of an orifice whose form selects the sources;
-    ``in_other_form`` is the function for its other form.
+    ``in_other_form`` is the function for its other form. ``stages``, if any, are two functions that give the same
+    number: the first takes the same arguments and is common to several links, its results are arguments of the second.
     """
 
     sources: tuple[str, ...]
@@ -49,17 +50,31 @@ class LinkFunction:
     rows: tuple[type, ...] = ()
     orifice: str = ""
     in_other_form: "LinkFunction | None" = None
+    stages: tuple[PlainFunction, PlainFunction] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the recipe of the function, which need not be defined in a module."""
-        return _term, (self.sources, recipe_of(self.function), self.rows, self.orifice, self.in_other_form)
+        return _term, (
+            *(self.sources, recipe_of(self.function), self.rows, self.orifice, self.in_other_form),
+            recipe_of(self.stages),
+        )
 
-    def number(self, present: Callable[[str], Any]) -> Any:
-        """Return the value of the function, with its sources read by ``present``."""
+    def number(self, present: Callable[[str], Any], computed: dict[Any, Any] | None = None) -> Any:
+        """Return the value of the function, with its sources read by ``present``.
+
+        ``computed`` keeps results of first stages, which links with the same sources use again.
+        """
         numbers = [present(source) for source in self.sources]
         if self.function is itself:
             return numbers[0]
-        return over_runs(lambda *numbers: self.function(*self.arguments(numbers)), *numbers)
+        if self.stages is None:
+            return over_runs(lambda *numbers: self.function(*self.arguments(numbers)), *numbers)
+        first, second = self.stages
+        computed, key = {} if computed is None else computed, (first, self.sources)
+        if key not in computed:
+            computed[key] = over_combinations(lambda *numbers: first(*self.arguments(numbers)), *numbers)
+        results, combination_of_run = computed[key]
+        return gather([float(second(*result)) for result in results], combination_of_run)
 
     def arguments(self, numbers: Sequence[Any], filled: Callable[[type, Sequence[Any]], Any] = fill) -> list[Any]:
         """Return the arguments of the function from the source numbers; ``filled`` builds a row from its numbers."""
@@ -72,8 +87,8 @@ class LinkFunction:
         return arguments + rest
 
 
-def _term(sources: tuple[str, ...], recipe: Any, *others: Any) -> LinkFunction:
-    return LinkFunction(sources, by_recipe(recipe), *others)
+def _term(sources: tuple[str, ...], recipe: Any, rows: Any, orifice: str, other: Any, stages: Any) -> LinkFunction:
+    return LinkFunction(sources, by_recipe(recipe), rows, orifice, other, by_recipe(stages))
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,9 +113,9 @@ class LinkedDefault:
         """True if the number equals its single source."""
         return not self.gap and [term.function for term in self.terms] == [itself]
 
-    def number(self, present: Callable[[str], Any]) -> Any:
-        """Return the number that follows from its sources, read by ``present``."""
-        first, *others = (term.number(present) for term in self.terms)
+    def number(self, present: Callable[[str], Any], computed: dict[Any, Any] | None = None) -> Any:
+        """Return the number that follows from its sources, read by ``present``; ``computed`` as of LinkFunction."""
+        first, *others = (term.number(present, computed) for term in self.terms)
         total = sum(others, first)
         return total + self.gap if self.gap else total
 
@@ -166,8 +181,10 @@ def resolved(
     links = in_other_forms(held, orifices)
     turned = [path for path in held if links[path] != held[path]]
     numbers, moved = {**present, **replaced}, dict(replaced)
+    # Sources precede their followers: a number that was a source of a first stage does not change after it.
+    computed: dict[Any, Any] = {}
     for path, link in acting(links, replaced, turned).items():
-        numbers[path] = moved[path] = link.number(numbers.__getitem__)
+        numbers[path] = moved[path] = link.number(numbers.__getitem__, computed)
     return moved
 
 
@@ -211,9 +228,10 @@ def outside(graph: Graph, *sections: str) -> dict[str, tuple[LinkedDefault, ...]
 def holding(graph: Graph, present: Mapping[str, Any]) -> dict[str, tuple[LinkedDefault, ...]]:
     """Return the links that still hold for the numbers ``present``, which may have been changed independently."""
     links_held: dict[str, tuple[LinkedDefault, ...]] = {}
+    computed: dict[Any, Any] = {}
     for path, links in graph.items():
         for link in links:
-            number, followed = present[path], link.number(present.__getitem__)
+            number, followed = present[path], link.number(present.__getitem__, computed)
             # Exactly, unless two pressures were given: what follows was computed by this same link.
             is_held = (
                 np.isclose(number, followed, rtol=SAME_PRESSURE, atol=0.0) if link.when_set else number == followed

@@ -66,6 +66,13 @@ class _GainParts(NamedTuple):
     rule: Callable[..., float]
 
 
+class _LoopAndJoint(NamedTuple):
+    """Functions for the torque loop and the joint of a device."""
+
+    torque_loop_of: Callable[..., TorqueLoop]
+    joint_of: Callable[..., Joint]
+
+
 def gain_of_device(
     settings: Any,
     stops: Range,
@@ -127,6 +134,22 @@ def gain_of_joint(
     return float(parts.rule(loop, parts.joint_of(settings, stops, around, signals, travel)))
 
 
+def loop_and_joint(
+    settings: Any,
+    stops: Range,
+    around: Surroundings,
+    numbers: FlowNumbers,
+    valve: Any,
+    signals: Any,
+    travel: float,
+    *,
+    parts: _LoopAndJoint,
+) -> tuple[TorqueLoop, Joint]:
+    """Torque loop and joint of a device, from which ``gain_of_joint`` computes each gain."""
+    loop = parts.torque_loop_of(settings, stops, around, numbers, valve, signals)
+    return loop, parts.joint_of(settings, stops, around, signals, travel)
+
+
 def loop_terms(
     device: Device, law: ControllerKind, seen: LawSignals, controlled: str = TORQUE
 ) -> dict[str, LinkFunction]:
@@ -141,16 +164,22 @@ def loop_terms(
         links = []
         for loops in loops_in_forms:
             parts: _GainParts | JointGainParts
+            stages = None
             if gain is gain_of_joint:
                 assert loops.joint is not None, "a law of the angle knows its joint"
                 parts = JointGainParts(loops.torque_loop, loops.joint, rule)
+                # In a study the loop costs more than the run: all gains of the joint have one.
+                shared = made_of(
+                    loop_and_joint, "loop_and_joint_of_device", _LoopAndJoint(loops.torque_loop, loops.joint)
+                )
+                stages = (shared, rule)
             elif rule in _OF_REACH.values():
                 parts = _GainParts(loops.reach, rule)
             else:
                 # A law of the angle alone has the torque loop inside it.
                 parts = _GainParts(loops.loop if controls_torque else loops.torque_loop, rule)
             function = made_of(gain, f"{rule.__name__}_of_device", parts)
-            links.append(LinkFunction((*loops.sources, *settings), function, loops.rows))
+            links.append(LinkFunction((*loops.sources, *settings), function, loops.rows, stages=stages))
         return in_its_form(device, VALVE, *links)
 
     terms = {name: term(gain_of_device, rule) for name, rule in _OF_LOOP.items()}

@@ -7,7 +7,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import ScenarioError, StudyError, refused_as
+from ppafo.errors import ScenarioError, StudyError
 from ppafo.metrics import metric_kind
 from ppafo.metrics.settled import SETTLED_METRICS
 from ppafo.metrics.tracking import ONE_INSTANT, settled_error
@@ -133,8 +133,10 @@ def scenario_runs(
     check_metrics([name for name in metrics if name not in SETTLED_METRICS], scenario)
 
     def evaluate(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
-        with refused_as(StudyError, f"scenario '{scenario.name}'", ScenarioError):
+        try:
             result = run_ensemble(scenario, columns, metrics, threads=threads, gauge=gauge)
+        except ScenarioError as error:  # its message names the scenario
+            raise StudyError(str(error)) from error
         unknown = np.full(result.status.size, np.nan)
         values: Rows = {name: result.metrics.get(name, unknown) for name in metrics}
         reason = result.reasons[min(result.reasons)] if result.reasons else ""

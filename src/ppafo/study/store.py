@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ppafo.arguments.door import argument_text
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, ScenarioError, StudyError, refused_as
 from ppafo.metrics import METRICS
@@ -302,7 +303,7 @@ def check_room(study: Study, folder: StudyFolder, agreed: bool) -> None:
             f"{folder.path}: {size}, but only {_bytes_text(free)} are free: use fewer runs, metrics or trajectories"
         )
     if needed > ASKED_ABOVE and not agreed:
-        raise StudyError(f"{folder.path}: {size}; give --yes to start it anyway")
+        raise StudyError(f"{folder.path}: {size}; give {argument_text('agreed', option='--yes')} to start it anyway")
 
 
 def _bytes_text(size: int) -> str:

@@ -110,3 +110,13 @@ def test_gains_follow_a_valve_whose_size_is_given_in_the_other_form(name: str, o
     back = with_numbers(moved, {"valve.area": 2e-5, "valve.discharge_coefficient": 0.4})
     area = ("valve.area=2e-5 m^2", "valve.discharge_coefficient=0.4")
     assert back.controller == load_scenario(name, over(overrides, area)).controller
+
+
+def test_the_gains_of_a_cascade_share_one_torque_loop_and_keep_their_bits() -> None:
+    scenario = load_scenario("swing-foot-angle")
+    terms = [term for links in scenario.graph.values() for link in links for term in link.terms if term.stages]
+    assert len(terms) > 5
+    assert len({term.stages[0] for term in terms}) == 1
+    for term in terms:
+        whole = term.function(*term.arguments([number_at(scenario, source) for source in term.sources]))
+        assert term.number(lambda path: number_at(scenario, path)) == whole

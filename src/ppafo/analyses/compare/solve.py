@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from ppafo.analyses.compare.answer import ComparisonResult, ConfigurationResult, TaskComparison, front_of, remarks_of
 from ppafo.analyses.compare.pairs import COMPARED, PairedMetric, best_probabilities, compare_pairs
+from ppafo.arguments.door import argument_text
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
@@ -165,7 +166,7 @@ def compared(
     if study is not None and study.drawn and draws.requested is None and study.sample.runs != draws.count:
         remarks.append(
             f"the {study.sample.runs:,} runs of study '{study.name}' are for 'ppafo sweep'; 'compare' takes "
-            f"{draws.count:,} draws, or as many as --draws says"
+            f"{draws.count:,} draws, or as many as {argument_text('draws')} says"
         )
     return replace(comparison, remarks=remarks)
 

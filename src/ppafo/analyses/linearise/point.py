@@ -81,7 +81,7 @@ def _after(scenario: Scenario, run: Run, steps: int) -> tuple[dict[str, float], 
     if rows["result.failure_time"] < NEVER_FAILED or not all(map(np.isfinite, rows.values())):
         raise SimulationError(
             f"{scenario.name}: the run diverges before {steps * run.step:g} s; give an earlier "
-            "--at, and see 'ppafo simulate'"
+            f"{argument_text('at')}, and see 'ppafo simulate'"
         )
     angle, rate = rows["state.angle"], rows["state.angular_velocity"]
     if run.program.angle is not None:

@@ -26,6 +26,7 @@ from ppafo.analyses.reproduce.result import (
     result_on_u,
 )
 from ppafo.analyses.reproduce.step_response import SupplyLevels
+from ppafo.arguments.door import override_text
 from ppafo.identification.bench.result import figure_3
 from ppafo.report.finding import Cell, Finding, Section, columns_of
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -107,7 +108,7 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
     """
     sentences, missed, rows = [NOTHING_CONFIRMED], reproduction.missed, reproduction.readings_of_u
     if reproduction.overrides:
-        words = f"not the paper's device: values changed with --set {', '.join(reproduction.overrides)}"
+        words = f"not the paper's device: values changed with {override_text(reproduction.overrides)}"
         sentences.append(f"{words}; the verdicts compare it with the paper all the same")
     # On the page a claim has its window in its note; at the command line only what misses it is said.
     remarks = [

@@ -11,6 +11,7 @@ import numpy as np
 
 from ppafo.analyses.reproduce.claim import Verdict
 from ppafo.analyses.reproduce.event_times import WEARERS, event_error, uneven_task_sequence
+from ppafo.arguments.door import argument_text
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.toml_text import label
 from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
@@ -285,7 +286,8 @@ def check_study(study: str, overrides: Sequence[str]) -> None:
         hint = nearest_name(study, study_names())
         raise ScenarioError(f"there is no study '{label(study)}'{hint}; available: {known}, or give a .toml file")
     if overrides and study != SEED:
-        raise ScenarioError(f"--set {overrides[0]}: applies to the study '{SEED}' only; omit --set or --study")
+        option, name = argument_text("overrides", option="--set"), argument_text("study")
+        raise ScenarioError(f"{option} {overrides[0]}: applies to the study '{SEED}' only; omit {option} or {name}")
 
 
 def run_studies(study: str, report: Report) -> tuple[tuple[Publication, tuple[JudgedClaim, ...]], ...]:

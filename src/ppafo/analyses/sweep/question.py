@@ -65,6 +65,7 @@ def sweep_into_folder(
     """
     from dataclasses import replace
 
+    from ppafo.arguments.door import argument_text
     from ppafo.errors import StudyError
     from ppafo.report.drawing import load_drawing
     from ppafo.studies.draws import study_of
@@ -84,7 +85,8 @@ def sweep_into_folder(
     if statistic is None:
         unused = [*(["metric"] if metric is not None else []), *options]
         if unused:
-            raise StudyError(f"{unused[0]}: needs a statistic, for example --statistic mean --metric rms_error")
+            example = f"{argument_text('statistic', 'mean')} {argument_text('metric', 'rms_error')}"
+            raise StudyError(f"{unused[0]}: needs a statistic, for example {example}")
         from ppafo.analyses.sweep.answer import write_report
         from ppafo.analyses.sweep.solve import INTERRUPTED, INTERRUPTED_AT_ONCE, is_begun, sweep
 
@@ -97,7 +99,7 @@ def sweep_into_folder(
             raise KeyboardInterrupt(INTERRUPTED if is_begun(chosen, target) else INTERRUPTED_AT_ONCE) from None
         return swept
     if metric is None:
-        raise StudyError(f"statistic '{statistic}': needs a metric, for example --metric rms_error")
+        raise StudyError(f"statistic '{statistic}': needs a metric, for example {argument_text('metric', 'rms_error')}")
     from ppafo.analyses.sweep.statistic import estimate
     from ppafo.storage.owned_folder import check_owned_folder, marked_folder
 

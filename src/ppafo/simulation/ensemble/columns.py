@@ -10,7 +10,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import OF_SECOND_CHAMBER, WHY_ONE_CHAMBER
+from ppafo.parameters.declaration import OF_SECOND_CHAMBER, ORIFICE, WHY_ONE_CHAMBER
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import either, in_two_forms
 from ppafo.simulation.declaration import TEXTS, WALL_AREA
@@ -81,9 +81,12 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
         form = [f"{section}.{name}" for name in other_form(base.device, section)]
         missing = [path for path in form if path not in values]
         if missing and len(missing) < len(form):
+            # Declared are the numbers of both forms: those of the device's own are left.
+            own = [f"{section}.{quantity.name}" for quantity in ORIFICE]
             raise ScenarioError(
-                f"{base.name}: {section} is given in the other orifice form; to vary {' or '.join(form)} give a "
-                "column for both"
+                f"{base.name}: the device has {' and '.join(path for path in own if path not in form)}; to vary "
+                f"{' or '.join(path for path in form if path in values)} instead, vary {' and '.join(missing)} too, or "
+                f"set {' and '.join(form)} first"
             )
     # An adiabatic scenario need not say its area, and runs that take up heat would go on as if they had none.
     gas, heat_varies = base.gas_model, "gas_model.heat_transfer_coefficient" in values

@@ -226,3 +226,14 @@ def test_one_instant_of_a_loop_that_settles_is_its_error() -> None:
     alone = ppafo.simulate(TASK, ["supply.pressure=60 psi_g"]).metrics
     assert found.unsettled == 0
     assert found.tried[0].metric == pytest.approx(alone["final_error"].value)
+
+
+def test_a_number_of_the_other_form_of_an_orifice_names_the_form_and_the_scenario_once() -> None:
+    """The cylinder's valve is given by a sonic conductance."""
+    message = (
+        r"^cylinder-servo: the device has valve\.sonic_conductance and valve\.critical_ratio; "
+        r"to vary valve\.area instead, "
+        r"vary valve\.discharge_coefficient too, or set valve\.area and valve\.discharge_coefficient first$"
+    )
+    with pytest.raises(StudyError, match=message):
+        find("cylinder-servo", vary="valve.area=1..5 mm^2", such_that="rms_angle_error <= 3 deg", grid=3)

@@ -12,9 +12,10 @@ import pytest
 import ppafo
 from ppafo.analyses.sweep import solve
 from ppafo.analyses.sweep.answer import load_study_results
+from ppafo.analyses.sweep.question import sweep_into_folder
 from ppafo.analyses.sweep.results import StudyResults
 from ppafo.analyses.sweep.solve import LOG, sweep
-from ppafo.errors import DataError, StudyError
+from ppafo.errors import ArgumentError, DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.progress import Progress
 from ppafo.signals.recording import CHANNELS
@@ -299,7 +300,7 @@ def test_more_disk_than_there_is_is_refused_before_anything_is_written(
 
 def test_a_large_study_asks_for_consent(small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(store, "ASKED_ABOVE", 1000)
-    with pytest.raises(StudyError, match="give --yes to start it anyway"):
+    with pytest.raises(StudyError, match="give agreed to start it anyway"):
         sweep(small, out=tmp_path / "out")
     assert sweep(small, out=tmp_path / "out", agreed=True).found.summary["completed"] == 32
 
@@ -375,3 +376,10 @@ def test_a_seed_takes_the_place_of_that_of_the_file(varying: Callable[..., Any])
 def test_a_loaded_study_is_not_changed_by_what_stands_beside_it(small: Any) -> None:
     with pytest.raises(StudyError, match="a loaded Study takes no overrides, draws or seed; give them to load_study"):
         sweep(load_study(small), draws=3)
+
+
+def test_a_statistic_in_python_is_asked_of_estimate() -> None:
+    with pytest.raises(ArgumentError, match=r"sweep\(\) has no argument 'statistic': ppafo\.estimate has it"):
+        sweep("torque-task-uncertainty", statistic="mean")  # type: ignore[call-arg]
+    with pytest.raises(StudyError, match="for example statistic='mean' metric='rms_error'"):
+        sweep_into_folder("torque-task-uncertainty", metric="rms_error")

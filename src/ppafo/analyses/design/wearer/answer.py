@@ -15,6 +15,7 @@ from ppafo.analyses.design.wearer.requirements import (
     WearerSizing,
 )
 from ppafo.analyses.parts.sections import part_titles, parts_to_check
+from ppafo.arguments.door import argument_text
 from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
 from ppafo.report.kind import Kind
@@ -61,7 +62,7 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
     )
     stature = f"{requirements.height:.4g} m"
     if requirements.stature is None:
-        stature += f" (assumed: a body mass index of {BODY_MASS_INDEX:g} kg/m^2; give --stature)"
+        stature += f" (assumed: a body mass index of {BODY_MASS_INDEX:g} kg/m^2; give {argument_text('stature')})"
     sentences = [f"a wearer of {requirements.mass:.4g} kg and {stature}; {requirements.text()}"]
     if requirements.toes is None and requirements.clearance < TOES:
         sentences.append(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ppafo.analyses.design.wearer.requirements import WALKS
+from ppafo.arguments.door import argument_text
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part, load_catalogue
 
@@ -51,7 +52,8 @@ def shelf_of(catalogue: str | Path) -> AvailableParts:
     groups["valves"] = {name: part for name, part in groups["valves"].items() if part.kind in WALKS}
     if not groups["valves"]:
         raise StudyError(
-            f"--catalogue {catalogue}: has no valve that a walk supports; supported kinds: {', '.join(WALKS)}"
+            f"{argument_text('catalogue', str(catalogue))}: has no valve that a walk supports; "
+            f"supported kinds: {', '.join(WALKS)}"
         )
     is_own = Path(catalogue).suffix == ".toml"
     return AvailableParts(

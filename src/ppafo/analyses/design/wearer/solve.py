@@ -27,6 +27,7 @@ from ppafo.analyses.design.wearer.requirements import (
 )
 from ppafo.analyses.design.wearer.strides import SHUT_OFF_PARTS, few_strides, of_wearer
 from ppafo.analyses.endurance.solve import endurance_of_walk
+from ppafo.arguments.door import argument_text
 from ppafo.parameters.bottles.bottle import bottle_part
 from ppafo.parameters.parts import Part
 from ppafo.parameters.parts.catalogue import DEFAULT, rated_pressure
@@ -89,7 +90,8 @@ def size_for_wearer(
         nearest = max(tried, key=lambda pair: (min(pair.torque, REACHED * torque), pair.toes))
         instead = (
             f"none: of the pairs tried {nearest.valve.name} with {nearest.actuator.name} comes nearest, with "
-            f"{TORQUE.text(nearest.torque)} and toes {CLEARANCE.text(nearest.toes)} over the ground; give --catalogue "
+            f"{TORQUE.text(nearest.torque)} and toes {CLEARANCE.text(nearest.toes)} over the ground; give "
+            f"{argument_text('catalogue')} "
             "with an actuator of more torque per pressure, from 'ppafo new parts my-parts --from parts'",
         )
     return WearerSizing(requirements, healthy, tuple(tried), None, instead)

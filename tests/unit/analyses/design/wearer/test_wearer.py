@@ -191,7 +191,7 @@ def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assu
     assert all(line.endswith(" N cm") for line in torques)
     assert requirements.height == pytest.approx(math.sqrt(60.0 / 22.0))
     said = text_of(finding_of(WearerSizing(requirements, 0.0052, tuple(found), None, ())))
-    assert "1.651 m (assumed: a body mass index of 22 kg/m^2; give --stature)" in said
+    assert "1.651 m (assumed: a body mass index of 22 kg/m^2; give stature)" in said
 
 
 @pytest.mark.parametrize("mass", [35.0, 95.0])
@@ -242,7 +242,7 @@ def test_without_any_alternative_the_nearest_pair_and_what_to_do_are_said(
     finding = ppafo.design(**wanted, catalogue=file)
     assert not finding.passed
     assert "none: of the pairs tried mine with " in text_of(finding)
-    assert "give --catalogue with an actuator of more torque per pressure" in text_of(finding)
+    assert "give catalogue with an actuator of more torque per pressure" in text_of(finding)
 
 
 PARTS = """
