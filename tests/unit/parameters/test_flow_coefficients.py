@@ -4,7 +4,6 @@ import ast
 
 import pytest
 
-from ppafo.arguments.door import read_by
 from ppafo.errors import ParameterError
 from ppafo.parameters.flow_coefficients import conductance_of, conductance_of_nominal_flow, nominal_flow_of_cv
 from ppafo.parameters.loading import load_parameter_set
@@ -48,7 +47,7 @@ def test_what_is_no_flow_coefficient_is_not_converted(text: str) -> None:
 @pytest.mark.parametrize("given", ["valve.cv=0.05", "valve.kv=0.05 m^3/h", "valve.qn=50 L/min", "valve.Cv=0.05"])
 def test_the_answer_to_a_flow_coefficient_is_taken(given: str) -> None:
     before = load_parameter_set("ppafo2011")
-    with read_by("command line"), pytest.raises(ParameterError, match=r"which is 'valve\.sonic_conductance'") as caught:
+    with pytest.raises(ParameterError, match=r"which is 'valve\.sonic_conductance'") as caught:
         apply_overrides(before, [given])
     answers = ast.literal_eval(str(caught.value).partition("overrides=")[2])
     after = apply_overrides(before, answers)
