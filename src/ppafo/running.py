@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ppafo.simulation.tracking import Tracking
     from ppafo.simulation.tracking.remedies import Remedy
 
-MOST_TRIED = 12
+MOST_TRIED = 16
 """Largest number of remedies of a run that are tried."""
 _STRIDES_TRIED = 8.0
 """Number of strides of a walk for trying a remedy."""
@@ -119,7 +119,7 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
             error = change_text(verdict.controlled, best[1])
         left_text = f"an RMS error of {error} is left{time_text(verdict.since)}"
         return replace(verdict, tried=f"with {best[0].text} {left_text}, as a further run shows")
-    names = ", ".join(dict.fromkeys(path for remedy in verdict.remedies for path in remedy.numbers))
+    names = ", ".join(dict.fromkeys(each.partition("=")[0] for remedy in verdict.remedies for each in remedy.overrides))
     if not names:
         return verdict
     advice = f"{verdict.advice}; " if verdict.advice else ""

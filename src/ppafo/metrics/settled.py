@@ -24,11 +24,11 @@ class SettledSums(NamedTuple):
 
     ``squares`` is the sum of squared errors, ``total`` the sum of errors, ``taken`` the number of samples,
     ``reference_squares`` and ``reference_total`` the sums for the reference less ``begun``, ``swing`` the reversal
-    state of the error, ``lowest_error`` and ``highest_error`` the extremes of the error, ``command`` the
-    reversals of the command, and ``lowest_angle`` and ``highest_angle`` the extremes of the angle [rad]. ``begun`` is
-    the initial controlled value, ``lowest`` and ``highest`` its extremes. ``met_upwards`` is 1 once the value has been
-    at or below the reference, and ``top`` the highest value since then; ``met_downwards`` and ``bottom`` are the
-    opposite.
+    state of the error, ``lowest_error`` and ``highest_error`` the extremes of the error, ``command`` the reversals of
+    the command in the last half of the settled part, and ``lowest_angle`` and ``highest_angle`` the extremes of the
+    angle [rad]. ``begun`` is the initial controlled value, ``lowest`` and ``highest`` its extremes. ``met_upwards`` is
+    1 once the value has been at or below the reference, and ``top`` the highest value since then; ``met_downwards`` and
+    ``bottom`` are the opposite.
     """
 
     squares: float
@@ -78,7 +78,10 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
 
 
 def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample) -> SettledSums:
-    """Sums with one more sample; they restart at half of the run and at half of the hold."""
+    """Sums with one more sample; they restart at half of the run and at half of the hold.
+
+    Reversals of the command restart at three quarters, too: a loop that has come to rest by then does not oscillate.
+    """
     value = sample.value
     error = value - sample.reference
     # From the initial value, or the square of a pressure would hide its change.
@@ -90,6 +93,11 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
     half_of_run = twice >= of_run and twice < of_run + 2.0
     half_of_hold = rests and twice >= of_hold and twice < of_hold + 2.0
     anew = half_of_run or half_of_hold
+    last_of_run, last_of_hold = 3.0 * of_run, course.hold_start + 3.0 * of_run
+    fourfold = 4.0 * sample.number
+    in_last_half = (fourfold >= last_of_run and fourfold < last_of_run + 4.0) or (
+        rests and fourfold >= last_of_hold and fourfold < last_of_hold + 4.0
+    )
     swing = next_swing(state.swing, error, OSCILLATION_THRESHOLD * course.largest)
     command = update_reversals(state.command, course, sample)
     met_upwards = 1.0 if state.met_upwards > 0.0 or error <= 0.0 else 0.0
@@ -105,7 +113,7 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
         ),
         lowest_error=error if anew else min(state.lowest_error, error),
         highest_error=error if anew else max(state.highest_error, error),
-        command=Reversals(command.way, command.task, 0.0 if anew else command.turns),
+        command=Reversals(command.way, command.task, 0.0 if anew or in_last_half else command.turns),
         lowest_angle=sample.angle if anew else min(state.lowest_angle, sample.angle),
         highest_angle=sample.angle if anew else max(state.highest_angle, sample.angle),
         begun=state.begun,
@@ -139,9 +147,12 @@ def deviation(squares: Floats, total: Floats, count: Floats) -> Floats:
 
 
 def read_reversals(readings: Readings) -> Floats:
-    """Metric ``settled_reversals`` of the command [1/s]; a duration below a second counts as one second."""
+    """Metric ``settled_reversals`` of the command [1/s], in the last half of the settled part.
+
+    A settled part below a second counts as one second.
+    """
     sums = readings.meters[SETTLED.name]
-    return np.asarray(sums.command.turns / larger((sums.taken - 1.0) * readings.interval, 1.0))
+    return np.asarray(2.0 * sums.command.turns / larger((sums.taken - 1.0) * readings.interval, 1.0))
 
 
 def read_share_of_hold(readings: Readings) -> Floats:

@@ -9,7 +9,9 @@ import pytest
 
 import ppafo
 from ppafo.cli.main import main
+from ppafo.errors import PpafoError
 from ppafo.loading import load_scenario
+from ppafo.metrics.metric import hold_start
 from ppafo.parameters.reach import supply_for, torque_reach
 from ppafo.running import most_reversals, simulate, tried
 from ppafo.simulation.ensemble import run_ensemble
@@ -437,3 +439,88 @@ def test_a_reference_just_beyond_reach_that_is_followed_within_the_limit_is_told
     told = simulate(TASK, ["reference.level=5.1 N m", "run.duration=6 s"]).following
     assert told.endswith("N m allowed; at 75 deg and 50 psi_g the actuator gives 5 N m at most")
     assert "at most" not in simulate(TASK, ["reference.level=4 N m"]).following
+
+
+LEVEL = "reference.level=3 N m"
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "cause", "remedy"),
+    [
+        (
+            TASK,
+            [LEVEL, "supply.pressure=20 psi_g"],
+            "at 75 deg and 20 psi_g the actuator gives 2 N m",
+            "supply.pressure",
+        ),
+        (
+            TASK,
+            [LEVEL, "controller.rate=2 Hz"],
+            "its controller decides every 500 ms, 2 times",
+            "controller.rate=20 Hz",
+        ),
+        ("pressure-loop", ["controller.rate=2 Hz"], "its controller decides every 500 ms", "controller.rate=200 Hz"),
+        (TASK, [LEVEL, "sensors.delay=200 ms"], "(`sensors.delay = 0.2 s`)", "sensors.delay=0.02 s"),
+        (TASK, [LEVEL, "sensors.pressure_noise=5 bar_d"], "`sensors.pressure_noise", "sensors.pressure_noise"),
+        ("cylinder-servo", ["sensors.delay=2 s"], "`sensors.delay = 2 s`", "sensors.delay=0.002 s"),
+        (
+            "cylinder-servo",
+            ["sensors.angle_resolution=10 deg"],
+            "`sensors.angle_resolution = 10 deg`",
+            "angle_resolution",
+        ),
+        (TASK, [LEVEL, "valve.area=0.012 mm^2"], "it is too small for this task", "valve.area=24 mm^2"),
+        (
+            TASK,
+            [LEVEL, "controller.proportional_gain=95 1/(N m)"],
+            "its gains are not this device's",
+            "proportional_gain",
+        ),
+        (
+            TASK,
+            ["reference.level=3000 N m"],
+            "at 75 deg and 50 psi_g the actuator gives 5 N m at most",
+            "reference.level",
+        ),
+    ],
+)
+def test_a_wrong_set_up_is_told_its_cause_and_a_remedy_that_works(
+    name: str, changes: list[str], cause: str, remedy: str
+) -> None:
+    scenario = load_scenario(name, changes)
+    verdict = tried(scenario, simulate(scenario).tracking)
+    assert verdict is not None
+    assert cause in verdict.cause
+    assert remedy in verdict.tried
+    assert verdict.mended
+    given = dict(text.split("=", 1) for text in (*changes, *verdict.mended))
+    assert simulate(name, [f"{path}={text}" for path, text in given.items()]).tracking is None
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "refusal"),
+    [
+        (TASK, "controller.proportional_gain=-0.1 1/(N m)", "must be at least 0 1/(N m)"),
+        ("cylinder-servo", "reference.level=200 deg", "leaves the stops of cylinder-lever, 20 deg to 130 deg"),
+        (TASK, "run.step=0.5 s", "must not be above 0.001 s"),
+    ],
+)
+def test_a_wrong_sign_a_reference_beyond_the_stops_and_a_coarse_step_are_refused(
+    name: str, change: str, refusal: str
+) -> None:
+    with pytest.raises(PpafoError, match=re.escape(refusal)):
+        load_scenario(name, [change])
+
+
+def test_noise_that_turns_the_command_until_the_joint_rests_is_not_counted_as_oscillation() -> None:
+    scenario = load_scenario(TASK, [LEVEL, "sensors.pressure_noise=1 Pa_d"])
+    recording = simulate(scenario).recording
+    command, count = np.array(recording["command"]), len(recording)
+    first = hold_start(recording)
+    assert first is not None
+    half, last = (first + count) // 2, (first + 3 * count) // 4
+    command[half:last] = np.where(np.arange(last - half) % 4 < 2, 1.0, -1.0)
+    command[last:] = 0.0
+    assert settled_task(scenario, recording.with_channel("command", command, "-")).reversals == 0.0
+    command[last:] = np.where(np.arange(count - last) % 4 < 2, 1.0, -1.0)
+    assert settled_task(scenario, recording.with_channel("command", command, "-")).reversals > 100.0

@@ -9,11 +9,13 @@ from ppafo.metrics.switching import SHUT
 from ppafo.model.controlled import ANGLE, TORQUE, error_functions
 from ppafo.simulation.law_signals import anywhere
 from ppafo.simulation.mean_chambers import quicker_at
+from ppafo.simulation.numbers import declared_numbers, number_at
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.load_causes import flung_at_start, load_beyond_reach, stop_of, torque_beyond_reach
 from ppafo.simulation.tracking.pair_step import pair_step
 from ppafo.simulation.tracking.remedies import (
     CASCADE,
+    Remedy,
     change_text,
     dead_band,
     gain_of_device,
@@ -41,8 +43,34 @@ _EDGE = 1.05
 """Command divided by the dead band, up to which the command counts as within the band [-]."""
 _EXPLAINED = 0.6
 """Smallest fraction of the squared error explained by a lag for which the lag is reported [-]."""
+_SLOW, _FEW_DECISIONS = 0.01, 20.0
+"""Period of a controller [s], and decisions in the settled part below which that period makes the loop fail [-]."""
+_SENSOR_FLAWS = tuple(
+    f"sensors.{name}" for name in ("delay", "angle_noise", "pressure_noise", "angle_resolution", "pressure_resolution")
+)
+"""Paths of the imperfections of sensors that a remedy reduces."""
+_LESS = (10.0, 1000.0)
+"""Factors by which an imperfection of a sensor is reduced in a trial; the second one for a unit mistaken [-]."""
+_LARGER_VALVES = (3.0, 10.0, 100.0, 2000.0)
+"""Factors by which a valve is enlarged in a trial; the last one for a unit mistaken by 1000 [-]."""
+_USUAL_RATE = 1000.0
+"""Rate assumed for the paper's controller of a proportional valve [Hz]."""
 _QUICKER = 1.3
 """Loop rate at an angle, divided by the rate used for the gains, above which it causes oscillation [-]."""
+
+
+def _slow_decisions(case: Case) -> TrackingCause | None:
+    """Cause: the controller decides only a few times while the loop settles."""
+    period, settled = case.scenario.controller.period, case.settled.duration
+    if period < _SLOW or settled >= _FEW_DECISIONS * period:
+        return None
+    rates = (10.0 / period, 100.0 / period, _USUAL_RATE)
+    text = (
+        f"its controller decides every {1.0e3 * period:.3g} ms, {settled / period:.2g} times in the settled "
+        f"{settled:.3g} s"
+    )
+    remedies = (Remedy({}, (f"controller.rate={rate:g} Hz",)) for rate in rates if rate <= _USUAL_RATE)
+    return TrackingCause(text, tuple(remedies), "give it a higher `controller.rate`")
 
 
 def _shut_valve(case: Case) -> TrackingCause | None:
@@ -153,7 +181,7 @@ def _fully_open_valve(case: Case) -> TrackingCause | None:
     if share <= _MOSTLY:
         return None
     text = f"its valve is fully open for {100.0 * share:.0f} % of the time: it is too small for this task"
-    return TrackingCause(text, sized_valves(case.scenario, (3.0, 10.0)), "take a larger valve or a slower reference")
+    return TrackingCause(text, sized_valves(case.scenario, _LARGER_VALVES), "take a larger valve or a slower reference")
 
 
 def _opened_away(case: Case) -> TrackingCause | None:
@@ -203,6 +231,18 @@ def gains_of_another_device(case: Case) -> TrackingCause | None:
     return TrackingCause("its gains are not this device's", (default_gain, *others))
 
 
+def _poor_sensors(case: Case) -> TrackingCause | None:
+    """Cause: delay, noise or resolution of the sensors; less certain than a cause within the loop."""
+    scenario, declared = case.scenario, declared_numbers(case.scenario)
+    flaws = {path: number_at(scenario, path) for path in _SENSOR_FLAWS if path in declared}
+    found = {path: number for path, number in flaws.items() if number > 0.0}
+    if not found:
+        return None
+    remedies = [remedy(scenario, {path: number / factor}) for path, number in found.items() for factor in _LESS]
+    told = ", ".join(f"`{path} = {level_text(declared[path].unit, number)}`" for path, number in found.items())
+    return TrackingCause(f"its sensors tell too little of what it controls ({told})", tuple(remedies))
+
+
 def _law_without_torque_loop(case: Case) -> TrackingCause | None:
     """Cause: a law for an angle opens the valve by the angle alone, and is slow wherever the gas swings the joint."""
     law = case.law
@@ -211,7 +251,7 @@ def _law_without_torque_loop(case: Case) -> TrackingCause | None:
     if torque_asked(case.scenario, law, case.settled.error) is not None:
         return None
     text = f"`{law.name}` acts on the angle without a torque loop inside, and is slow against load and friction"
-    return TrackingCause(text, (CASCADE,), f"take {CASCADE.text}")
+    return TrackingCause(text, (CASCADE,))
 
 
 def _is_settling(case: Case) -> bool:
@@ -243,6 +283,7 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     torque_beyond_reach,
     load_beyond_reach,
     flung_at_start,
+    _slow_decisions,
     _static_friction,
     _shut_valve,
     _opened_away,
@@ -250,6 +291,7 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _fully_open_valve,
     gains_of_another_device,
     _lag,
+    _poor_sensors,
     _law_without_torque_loop,
     _not_settled,
 )

@@ -68,9 +68,10 @@ def remedy(scenario: Scenario, numbers: Mapping[str, float]) -> Remedy:
 
 
 def level_text(unit: str, number: float) -> str:
-    """Value with its display unit, from a number in an SI unit; pressures as gauge pressures."""
+    """Value with its display unit, from a number in an SI unit; pressures as gauge pressures, or as differences."""
     value, shown = metric_level(float(number), unit)
-    return f"{value:.3g} {shown}".rstrip()
+    # As it can be pasted: a difference of pressures is told from a level by its unit.
+    return f"{value:.3g} {shown}{'_d' if unit == 'Pa_d' else ''}".rstrip()
 
 
 def change_text(controlled: str, number: float) -> str:

@@ -78,7 +78,8 @@ class SettledPart(NamedTuple):
     ``rests`` is true if reference and joint stand still; ``ends_on_ramp`` if the run ends before a monotone reference
     rests. ``start`` [s] is the start of the settled part, 0 for a walk. ``worst`` is the largest error and ``span`` the
     range of the error. ``way`` is the range of initial value and reference for an angle, 0 for other quantities.
-    ``reversals`` [1/s] is the rate of command reversals; ``wave`` the standard deviation of the reference.
+    ``reversals`` [1/s] is the rate of command reversals in the last half of the part; ``wave`` the standard deviation
+    of the reference.
     """
 
     samples: slice | NDArray[np.bool_]
@@ -139,7 +140,7 @@ def only_switches(scenario: Scenario, law: ControllerKind | None) -> bool:
 
 
 def is_noisy(scenario: Scenario) -> bool:
-    """True if sensor noise reverses the command of a task; reversals then count in the settled part only."""
+    """True if sensor noise reverses the command of a task; reversals then count in its settled part only."""
     sensors = scenario.sensors
     return scenario.follows_reference and bool(sensors.angle_noise or sensors.pressure_noise)
 
@@ -183,7 +184,8 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
     time, count = recording.time, len(recording)
     first = hold_start(recording)
     rests = first is not None and is_long_enough(first, count)
-    samples = slice((first + count) // 2 if rests and first is not None else count // 2, None)
+    begin = first if rests and first is not None else 0
+    samples, last_half = slice((begin + count) // 2, None), slice((begin + 3 * count) // 4, None)
     error = (value - reference)[samples]
     asked = extent(recording)
     wanted = max(asked, smallest_change(scenario))
@@ -211,7 +213,8 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
         worst=float(np.max(np.abs(error))),
         span=float(np.ptp(error)),
         way=max(asked, float(np.ptp(reference))) if is_angle else 0.0,
-        reversals=command_reversals(recording, samples) / max(float(time[-1] - time[samples][0]), 1.0),
+        # Noise that turns the command until the joint rests is no oscillation.
+        reversals=2.0 * command_reversals(recording, last_half) / max(float(time[-1] - time[samples][0]), 1.0),
         wave=float(np.std(reference[samples])),
     )
 
