@@ -149,7 +149,7 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     if max(fractions) < _MINIMUM_CHANGE:
         raise DataError(
             f"{file}: {', '.join(compared)} change by less than {_MINIMUM_CHANGE:.0%} of full range, which is too "
-            "little to judge a model; give a recording with larger changes"
+            "little to assess a model; give a recording with larger changes"
         )
     intervals = np.diff(recording.time)
     wide = np.flatnonzero(intervals > _REMARKED_GAP * np.median(intervals))

@@ -1,5 +1,7 @@
 """Cv, Kv and nominal flow of data sheets in C and b, against numbers that makers print."""
 
+from ast import literal_eval
+
 import pytest
 
 from ppafo.errors import ParameterError
@@ -47,7 +49,7 @@ def test_the_answer_to_a_flow_coefficient_is_taken(given: str) -> None:
     before = load_parameter_set("ppafo2011")
     with pytest.raises(ParameterError, match=r"which is 'valve\.sonic_conductance'") as caught:
         apply_overrides(before, [given])
-    answers = [part.strip(" '") for part in str(caught.value).split("--set")[1:]]
+    answers = literal_eval(str(caught.value).split("overrides=")[1])
     after = apply_overrides(before, answers)
     assert after.numbers["valves.proportional.critical_ratio"].value == 0.3
     assert 0.15 < after.numbers["valves.proportional.sonic_conductance"].value < 0.25

@@ -38,7 +38,7 @@ def test_a_valve_by_name_is_changed_whichever_is_chosen() -> None:
 
 
 def test_a_value_of_another_valve_than_the_one_that_is_named_beside_it_is_refused_with_both() -> None:
-    with pytest.raises(ParameterError, match=r"override 'valves\.solenoid\.area=5mm\^2' and valve = 'proportional'"):
+    with pytest.raises(ParameterError, match=r"solenoid\.area=5mm\^2' has no effect with valve = 'proportional'"):
         load_device("ppafo2011", valve="proportional", overrides=("valves.solenoid.area=5mm^2",))
     assert load_device(
         "ppafo2011", valve="solenoid", overrides=("valves.solenoid.area=5mm^2",)

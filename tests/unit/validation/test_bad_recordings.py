@@ -64,7 +64,7 @@ def written(folder: Path, *lines: str) -> Path:
         ([HEADER, *(row.replace(",1,", ",12,") for row in ROWS)], ["'command' is 12 at 0 s (sample 1)"]),
         (
             [HEADER, *(ROWS[0].replace("0.000", f"{0.001 * n:.3f}") for n in range(60))],
-            ["which is too little to judge a model"],
+            ["which is too little to assess a model"],
         ),
         ([HEADER.replace("psi_g", "psi_a"), *ROWS], ["'pressure_1' is 0 Pa absolute", "gauge"]),
         ([HEADER, ROWS[0], ROWS[1].replace("21", "1e9"), *ROWS[2:]], ["'angle' is", "(sample 2), more than 20 times"]),

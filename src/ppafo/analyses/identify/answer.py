@@ -117,7 +117,7 @@ def trajectory_panels(measurement: Recording, model: Recording) -> list[Panel]:
     Both recordings have the same times.
     """
     if not np.array_equal(measurement.time, model.time):
-        raise DataError(f"{model.label}: its times differ from those of {measurement.label}")
+        raise DataError(f"{model.label} and {measurement.label} have different sample times")
     panels: list[Panel] = []
     for name in (name for name in _CHANNELS if name in measurement):
         kind, style = _CHANNELS[name]

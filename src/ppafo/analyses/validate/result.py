@@ -84,7 +84,7 @@ def verdict(validation: Validation) -> str:
         is_found = validation.causes.found is not None
         is_free = not is_found and any(agreement.motion == "free" for agreement in validation.recordings)
         motion = argument_text("motion", "leg")
-        moved = f"; of a device on a leg, held or driven give {motion}, locked or measured" if is_free else ""
+        moved = f"; if the device was on a leg, locked or driven, give {motion}, locked or measured" if is_free else ""
         return f"{name} does not agree: {failed}; {explanation}{moved}"
     return (
         f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {explanation}"
