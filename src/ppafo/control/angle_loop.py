@@ -34,7 +34,7 @@ INERTIA = "inertia of the joint"
 LOAD_TIME = "time constant of the observed load"
 TORQUE_LAG = "time constant of the torque loop"
 TOLERANCE = "tolerance of the angle"
-REST_DISTANCE = "turn of a joint that shows motion"
+REST_DISTANCE = "angle change that counts as motion of the joint"
 """Names of the parameters of the loop from which a setting may take its default; the functions below compute them."""
 
 OUTER_TIMES_INNER = 8.0

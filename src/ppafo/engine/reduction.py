@@ -377,7 +377,7 @@ class Reduction:
             arguments = self.step_arguments(called, node)
             if self.module.effects_of(called).results:
                 raise self.refuse(
-                    node, f"function '{called.__name__}' sets 'lane' groups, so it returns no value that could be used"
+                    node, f"function '{called.__name__}' sets 'lane' groups and returns nothing: its call is no value"
                 )
             return ast.Call(self.placeholder(called), arguments, [])
         if isinstance(called, FunctionType):

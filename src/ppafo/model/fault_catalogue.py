@@ -21,7 +21,7 @@ class PlantFault:
     fields: Mapping[str, str]
 
 
-TIME = Quantity("time", "s", "when it fails", None, 0.0, 1.0e6)
+TIME = Quantity("time", "s", "start time of the fault", None, 0.0, 1.0e6)
 """Parameter of every fault: its start time."""
 
 
@@ -49,80 +49,90 @@ _FAULTS = (
     *_of_chambers(
         "valve",
         "stuck",
-        "stays at one opening, whatever it is commanded: the valve of chamber",
-        {"opening": Quantity("opening", "1", "1 open to the supply, -1 to the atmosphere, 0 shut", 1.0, -1.0, 1.0)},
+        "valve stuck at a fixed opening, whatever the command: chamber",
+        {
+            "opening": Quantity(
+                "opening", "1", "fixed opening: 1 open to the supply, -1 open to the atmosphere, 0 shut", 1.0, -1.0, 1.0
+            )
+        },
         "stuck_time",
     ),
-    PlantFault("valve", "swapped", "feeds the other chamber", (TIME,), {"time": "swapped_time"}),
+    PlantFault(
+        "valve",
+        "swapped",
+        "valve outputs swapped: each command feeds the other chamber",
+        (TIME,),
+        {"time": "swapped_time"},
+    ),
     PlantFault(
         "valve",
         "slow",
-        "follows late: it takes a command only once in each such time",
-        (TIME, Quantity("delay", "s", "that time", 0.1, 0.0, 10.0)),
+        "slow valve: it accepts a new command only once per delay",
+        (TIME, Quantity("delay", "s", "time between two accepted commands", 0.1, 0.0, 10.0)),
         {"time": "slow_time", "delay": "slow_delay"},
     ),
-    *_of_chambers("hose", "off", "is open to the atmosphere: the hose of chamber", {}, "off_time"),
+    *_of_chambers("hose", "off", "hose disconnected, open to the atmosphere: chamber", {}, "off_time"),
     *_of_chambers(
         "hose",
         "kinked",
-        "is narrow: the hose of chamber",
-        {"kinked_share": Quantity("share", "1", "what is left of its conductance", 0.1, 0.0, 1.0)},
+        "hose kinked, flow restricted: chamber",
+        {"kinked_share": Quantity("share", "1", "remaining fraction of the conductance of the hose", 0.1, 0.0, 1.0)},
         "kinked_time",
     ),
     *_of_chambers(
         "regulator",
         "high",
-        "gives another pressure: the regulator of chamber",
-        {"pressure": Quantity("pressure", "Pa_a", "that pressure", 9.286959e5, 1.0e4, 1.0e8)},
+        "regulator at a wrong constant pressure: chamber",
+        {"pressure": Quantity("pressure", "Pa_a", "outlet pressure of the faulty regulator", 9.286959e5, 1.0e4, 1.0e8)},
         "high_time",
     ),
     *_of_chambers(
         "regulator",
         "creeping",
-        "gives more and more: the regulator of chamber",
-        {"rate": Quantity("rate", "Pa/s", "what it gives more in each second", 6.894757e4, -1.0e7, 1.0e7)},
+        "regulator creep, outlet pressure that rises steadily: chamber",
+        {"rate": Quantity("rate", "Pa/s", "rate of rise of the outlet pressure", 6.894757e4, -1.0e7, 1.0e7)},
         "creep_time",
     ),
     *_of_chambers(
         "regulator",
         "frozen",
-        "lets little through: the regulator of chamber",
-        {"frozen_share": Quantity("share", "1", "what is left of its flow", 0.1, 0.0, 1.0)},
+        "regulator frozen, flow restricted: chamber",
+        {"frozen_share": Quantity("share", "1", "remaining fraction of the flow of the regulator", 0.1, 0.0, 1.0)},
         "frozen_time",
     ),
     PlantFault(
         "bottle",
         "empty",
-        "its pressure falls to atmospheric",
-        (TIME, Quantity("lag", "s", "time in which most of it is gone", 0.2, 1.0e-3, 1.0e3)),
+        "bottle empty: supply pressure falls to atmospheric",
+        (TIME, Quantity("lag", "s", "time constant of the fall in pressure", 0.2, 1.0e-3, 1.0e3)),
         {"time": "empty_time", "lag": "empty_lag"},
     ),
     PlantFault(
         "vane",
         "leaking",
-        "leaks more between the chambers",
-        (TIME, Quantity("factor", "1", "its leak over a sound one's", 50.0, 0.0, 1.0e4)),
+        "larger leak between the chambers",
+        (TIME, Quantity("factor", "1", "leak relative to the leak of an intact vane", 50.0, 0.0, 1.0e4)),
         {"time": "leak_time", "factor": "leak_factor"},
     ),
     PlantFault(
         "controller",
         "late",
-        "runs only once in each such time",
-        (TIME, Quantity("delay", "s", "that time", 0.02, 0.0, 10.0)),
+        "controller runs only once per delay",
+        (TIME, Quantity("delay", "s", "time between two runs of the controller", 0.02, 0.0, 10.0)),
         {"time": "late_time", "delay": "late_delay"},
     ),
     PlantFault(
         "controller",
         "jittering",
-        "misses samples at random",
-        (TIME, Quantity("share", "1", "share of samples that it misses", 0.3, 0.0, 1.0)),
+        "controller misses samples at random",
+        (TIME, Quantity("share", "1", "fraction of samples that the controller misses", 0.3, 0.0, 1.0)),
         {"time": "jitter_time", "share": "jitter_share"},
     ),
     PlantFault(
         "controller",
         "brown_out",
-        "is without power for a time, with all valves, and starts anew",
-        (TIME, Quantity("duration", "s", "for how long", 0.3, 0.0, 1.0e6)),
+        "controller and all valves lose power for a time, then restart",
+        (TIME, Quantity("duration", "s", "duration of the power loss", 0.3, 0.0, 1.0e6)),
         {"time": "brown_out_time", "duration": "brown_out_duration"},
     ),
 )

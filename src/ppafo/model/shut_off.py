@@ -8,19 +8,21 @@ NEVER = 1.0e9
 """Time [s] of an event that does not occur."""
 
 SHUT_OFF = (
-    Quantity("area", "m^2", "area of the shut-off valve, 0 where none is fitted", 0.0, 0.0, 1.0e-3),
-    Quantity("discharge_coefficient", "1", "its discharge coefficient", 0.7, 0.01, 1.0),
-    Quantity("delay", "s", "time from the alarm to a vented line", 0.02, 0.0, 1.0),
+    Quantity("area", "m^2", "flow area of the shut-off valve, 0 for none", 0.0, 0.0, 1.0e-3),
+    Quantity("discharge_coefficient", "1", "discharge coefficient of the shut-off valve", 0.7, 0.01, 1.0),
+    Quantity("delay", "s", "time from the alarm until the line is vented", 0.02, 0.0, 1.0),
     Quantity(
         "silence",
         "s",
-        "its watchdog lets it shut, for good, where the controller is silent for longer",
+        "watchdog: a controller that is silent for longer shuts the valve permanently",
         0.01,
         0.0,
         1.0e9,
     ),
-    Quantity("mass", "kg", "its mass", 0.06, 0.0, 1.0),
-    Quantity("power", "W", "what holds it open, as long as the device helps", 0.5, 0.0, 100.0),
+    Quantity("mass", "kg", "mass of the shut-off valve", 0.06, 0.0, 1.0),
+    Quantity(
+        "power", "W", "electrical power that keeps the shut-off valve open while the device helps", 0.5, 0.0, 100.0
+    ),
 )
 """Settings of a shut-off valve; mass and power of a miniature 3/2 solenoid with a holding circuit, assumed."""
 

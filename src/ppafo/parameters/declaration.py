@@ -81,7 +81,7 @@ OF_SECOND_CHAMBER = frozenset(
     }
 )
 """Paths of the numbers that an actuator with one chamber does not have."""
-WHY_ONE_CHAMBER = "the actuator has one chamber (its file has no column volume_2)"
+WHY_ONE_CHAMBER = "the actuator has one chamber (no column volume_2 in its volume table)"
 
 _ALTERNATIVE_UNITS = {"N m s/rad": ("N m s",)}
 

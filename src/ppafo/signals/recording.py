@@ -41,65 +41,69 @@ class ChannelKind:
 CHANNELS: dict[str, ChannelKind] = {
     "angle": ChannelKind("rad", "ankle angle, growing in plantarflexion"),
     "angular_velocity": ChannelKind("rad/s", "ankle angular velocity"),
-    "pressure_1": ChannelKind("Pa", "absolute pressure in chamber 1, the one that grows with the angle"),
+    "pressure_1": ChannelKind("Pa", "absolute pressure in chamber 1, whose volume grows with the angle"),
     "pressure_2": ChannelKind("Pa", "absolute pressure in chamber 2"),
     "torque": ChannelKind("N m", "actuator torque, positive in plantarflexion"),
-    "reference": ChannelKind("N m", "torque requested of the controller"),
-    "reference_angle": ChannelKind("rad", "angle requested of the controller"),
-    "reference_pressure_1": ChannelKind("Pa", "absolute pressure in chamber 1 requested of the controller"),
-    "reference_pressure_2": ChannelKind("Pa", "absolute pressure in chamber 2 requested of the controller"),
-    "reference_pressure_difference": ChannelKind(
-        "Pa_d", "pressure in chamber 1 minus that in chamber 2, as requested of the controller"
-    ),
+    "reference": ChannelKind("N m", "reference torque of the controller"),
+    "reference_angle": ChannelKind("rad", "reference angle of the controller"),
+    "reference_pressure_1": ChannelKind("Pa", "reference absolute pressure in chamber 1"),
+    "reference_pressure_2": ChannelKind("Pa", "reference absolute pressure in chamber 2"),
+    "reference_pressure_difference": ChannelKind("Pa_d", "reference pressure difference, chamber 1 minus chamber 2"),
     "command": ChannelKind(PLAIN_NUMBER, "command to the valve, from -1 to 1; 2 vents both chambers", is_held=True),
-    "supplied_mass": ChannelKind("kg", "gas taken from the supply since the start, below 0 into a vacuum"),
+    "supplied_mass": ChannelKind(
+        "kg", "gas taken from the supply since the start; negative for flow into a vacuum supply"
+    ),
     "vented_mass": ChannelKind("kg", "gas vented to the atmosphere since the start"),
     "leaked_mass": ChannelKind(
-        "kg", "gas from chamber to chamber, leaked or through a valve, either way, since the start"
+        "kg", "gas exchanged between the chambers since the start, in either direction, by leak or valve"
     ),
     "external_torque": ChannelKind("N m", "torque on the wearer, T_ex of equation (1)"),
-    "shank_angle": ChannelKind("rad", "shank from the vertical, above 0 while the ankle is in front of the knee"),
-    "foot_angle": ChannelKind("rad", "foot over the horizontal, above 0 with the toes up"),
-    "measured_foot_angle": ChannelKind("rad", "foot of the measured gait over the horizontal at the same instant"),
-    "toe_difference": ChannelKind("m", "toes over the measured gait's at the same instant"),
-    "healthy_angle": ChannelKind(
-        "rad", "ankle angle of the gait that the wearer would walk, growing in plantarflexion"
+    "shank_angle": ChannelKind("rad", "shank angle from the vertical, positive with the ankle in front of the knee"),
+    "foot_angle": ChannelKind("rad", "foot angle from the horizontal, positive with the toes up"),
+    "measured_foot_angle": ChannelKind(
+        "rad", "foot angle of the measured gait at the same instant, from the horizontal"
     ),
-    "device_power": ChannelKind("W", "power that the device gives to the wearer, T_ex times the angular velocity"),
+    "toe_difference": ChannelKind("m", "toe height relative to the measured gait at the same instant"),
+    "healthy_angle": ChannelKind("rad", "ankle angle of the prescribed gait, growing in plantarflexion"),
+    "device_power": ChannelKind("W", "power from the device to the wearer, T_ex times angular velocity"),
     "swing_knee_torque": ChannelKind(
-        "N m", "T_1 of equation (11) in the swing, what moves shank and foot; 0 on the ground"
+        "N m", "inertial torque T_1 of shank and foot in swing, equation (11); 0 on the ground"
     ),
-    "walking_speed": ChannelKind("m/s", "speed in a task sequence, from length and time of the strides"),
-    "stride_frequency": ChannelKind("Hz", "strides per second in a task sequence, 0 in standing"),
-    "contact": ChannelKind(PLAIN_NUMBER, "foot and ground: 0 free, 1 on the heel, 2 flat, 3 on the toes", is_held=True),
+    "walking_speed": ChannelKind("m/s", "walking speed in a task sequence, stride length over stride time"),
+    "stride_frequency": ChannelKind("Hz", "stride frequency in a task sequence, 0 while standing"),
+    "contact": ChannelKind(PLAIN_NUMBER, "foot contact: 0 none, 1 heel, 2 flat, 3 toes", is_held=True),
     "controller_phase": ChannelKind(
-        PLAIN_NUMBER, "phase that the controller sees: 0 swing, 1 landing, 2 mid-stance, 3 push-off", is_held=True
+        PLAIN_NUMBER,
+        "gait phase detected by the controller: 0 swing, 1 landing, 2 mid-stance, 3 push-off",
+        is_held=True,
     ),
-    "gait_fraction": ChannelKind(
-        PLAIN_NUMBER, "fraction of the stride that the controller takes it to be, where it predicts"
-    ),
+    "gait_fraction": ChannelKind(PLAIN_NUMBER, "stride fraction estimated by a predicting controller"),
     "gait_event": ChannelKind(
-        PLAIN_NUMBER, "last event that it knows of: 0 heel strike, 1 toes on, 2 heel off, 3 toes off", is_held=True
+        PLAIN_NUMBER,
+        "last gait event known to the controller: 0 heel strike, 1 toes on, 2 heel off, 3 toes off",
+        is_held=True,
     ),
     "safe_state": ChannelKind(
         PLAIN_NUMBER,
-        "0 while the controller helps, 1 lifts the foot only, 2 pauses, 3 has stopped for good",
+        "assistance level: 0 full, 1 foot lifting only, 2 paused, 3 stopped permanently",
         is_held=True,
     ),
-    "heel_force": ChannelKind("N", "force under the heel as its sensor follows it"),
-    "toe_force": ChannelKind("N", "force under the toes as its sensor follows it"),
-    "dorsiflexor_moment": ChannelKind("N m", "moment of the muscles that lift the foot, 0 or more"),
+    "heel_force": ChannelKind("N", "force under the heel, after the lag of the sensor"),
+    "toe_force": ChannelKind("N", "force under the toes, after the lag of the sensor"),
+    "dorsiflexor_moment": ChannelKind("N m", "moment of the dorsiflexor muscles, 0 or more"),
     "toe_height": ChannelKind(
-        "m", "toes over the ground, against the healthy gait with a flat foot at the same instant"
+        "m", "toe height above ground; ground is at the toes of the healthy gait with a flat foot at the same instant"
     ),
     "mass_1": ChannelKind("kg", "gas in chamber 1"),
     "mass_2": ChannelKind("kg", "gas in chamber 2"),
-    "temperature_1": ChannelKind("K", "temperature of the gas in chamber 1, of a gas with an energy balance"),
-    "temperature_2": ChannelKind("K", "temperature of the gas in chamber 2, of a gas with an energy balance"),
-    "gas_energy": ChannelKind("J", "internal energy of the gas in both chambers, of a gas with an energy balance"),
-    "supplied_enthalpy": ChannelKind("J", "enthalpy taken from the supply since the start, less what went back"),
+    "temperature_1": ChannelKind("K", "gas temperature in chamber 1, for gas models with an energy balance"),
+    "temperature_2": ChannelKind("K", "gas temperature in chamber 2, for gas models with an energy balance"),
+    "gas_energy": ChannelKind(
+        "J", "internal energy of the gas in both chambers, for gas models with an energy balance"
+    ),
+    "supplied_enthalpy": ChannelKind("J", "net enthalpy taken from the supply since the start"),
     "vented_enthalpy": ChannelKind("J", "enthalpy vented to the atmosphere since the start"),
-    "wall_heat": ChannelKind("J", "heat that the walls gave to the gas since the start"),
+    "wall_heat": ChannelKind("J", "heat from the walls to the gas since the start"),
     "gas_work": ChannelKind("J", "work of the gas in both chambers since the start, pressure times change of volume"),
     "bottle_mass": ChannelKind("kg", "gas in the bottle, liquid and vapour"),
     "liquid_mass": ChannelKind("kg", "liquid in the bottle"),
@@ -108,16 +112,16 @@ CHANNELS: dict[str, ChannelKind] = {
     "bottle_pressure": ChannelKind("Pa", "absolute pressure in the bottle"),
     "line_pressure_1": ChannelKind("Pa", "absolute pressure in the line behind the bottle's regulator"),
     "line_pressure_2": ChannelKind("Pa", "absolute pressure in the dorsiflexion line, behind the second regulator"),
-    "regulated_mass": ChannelKind("kg", "gas let through by the bottle's regulator since the start"),
+    "regulated_mass": ChannelKind("kg", "gas passed by the bottle's regulator since the start"),
     "supply_pressure": ChannelKind("Pa", "absolute pressure at the inlet of the valve"),
     "dorsiflexion_pressure": ChannelKind("Pa", "absolute pressure at the inlet of the valve for chamber 2"),
-    "pressure_difference": ChannelKind("Pa_d", "pressure in chamber 1 minus that in chamber 2"),
-    "upstream_pressure": ChannelKind("Pa", "absolute pressure on the side that the gas comes from"),
-    "downstream_pressure": ChannelKind("Pa", "absolute pressure on the side that the gas goes to"),
+    "pressure_difference": ChannelKind("Pa_d", "pressure difference, chamber 1 minus chamber 2"),
+    "upstream_pressure": ChannelKind("Pa", "absolute upstream pressure"),
+    "downstream_pressure": ChannelKind("Pa", "absolute downstream pressure"),
     "force": ChannelKind("N", "force of a linear actuator on a scale, positive where chamber 1 pushes"),
-    "mass_flow": ChannelKind("kg/s", "gas through the part on the bench, positive into chamber 1"),
-    "direction": ChannelKind(PLAIN_NUMBER, "1 while the pressure rises, -1 while it falls", is_held=True),
-    "repetition": ChannelKind(PLAIN_NUMBER, "number of the repetition", is_held=True),
+    "mass_flow": ChannelKind("kg/s", "gas flow through the part on the bench, positive into chamber 1"),
+    "direction": ChannelKind(PLAIN_NUMBER, "direction of the pressure: 1 rising, -1 falling", is_held=True),
+    "repetition": ChannelKind(PLAIN_NUMBER, "index of the repetition", is_held=True),
 }
 """Known channels. To add one: one line here. A recording may also have channels that are not listed."""
 OF_SECOND_CHAMBER = frozenset(

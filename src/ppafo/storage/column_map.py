@@ -30,48 +30,53 @@ class MappedChannel(StrictTable):
     column: Annotated[
         Annotated[int, Field(ge=1)] | Text | None, Field(description="number of the column from 1, or its name")
     ] = None
-    constant: Annotated[Text | None, Field(description="instead of a column: one value, such as '1 bar_a'")] = None
+    constant: Annotated[Text | None, Field(description="constant value instead of a column, such as '1 bar_a'")] = None
     unit: Annotated[str, Field(description="unit of the value, such as 'bar_g'; '-' for a plain number")] = "-"
-    sign: Annotated[Literal[1, -1], Field(description="-1 where the file has the opposite sign")] = 1
-    factor: Annotated[float, Field(description="unit per number, for a sensor's volts")] = 1.0
-    offset: Annotated[float, Field(description="added after the factor, in unit")] = 0.0
-    times: Annotated[Text | None, Field(description="a quantity to multiply by, such as a lever arm '0.13 m'")] = None
-    thousands: Annotated[Thousands | None, Field(description="mark between groups of digits")] = None
+    sign: Annotated[Literal[1, -1], Field(description="-1 if the file uses the opposite sign")] = 1
+    factor: Annotated[float, Field(description="conversion factor to the unit, such as bar per volt of a sensor")] = 1.0
+    offset: Annotated[float, Field(description="offset added after the factor, in the unit")] = 0.0
+    times: Annotated[
+        Text | None, Field(description="quantity that multiplies the column, such as a lever arm '0.13 m'")
+    ] = None
+    thousands: Annotated[Thousands | None, Field(description="thousands separator")] = None
     between: Annotated[
         Between | None,
-        Field(description="between two samples: 'hold' the earlier value, or 'linear'; left out, a command holds"),
+        Field(description="value between samples: 'hold' the earlier one, or 'linear'; default: 'hold' for a command"),
     ] = None
     words: Annotated[
         dict[str, float] | None,
-        Field(description="numbers for words in the column; direction knows up, down, auf, ab and others"),
+        Field(
+            description="numbers that replace words in the column; 'direction' also knows up, down, auf, ab and others"
+        ),
     ] = None
     at: Annotated[
         Text | None,
         Field(description="reference condition of a volume flow: 'ANR', 'DIN 1343' or '0 degC, 1.01325 bar_a'"),
     ] = None
     gas: Annotated[
-        Text | None, Field(description="gas of a volume flow, such as 'air' or '0.044 kg/mol'; default: the set's")
+        Text | None,
+        Field(description="gas of a volume flow, such as 'air' or '0.044 kg/mol'; default: gas of the parameter set"),
     ] = None
-    rate: Annotated[
-        Text | None, Field(description="of time alone, instead of a column: rows per second, such as '100 Hz'")
-    ] = None
+    rate: Annotated[Text | None, Field(description="time only: sample rate instead of a column, such as '100 Hz'")] = (
+        None
+    )
     date: Annotated[
         Annotated[int, Field(ge=1)] | Text | None,
-        Field(description="of time alone: column of the date beside a time of day"),
+        Field(description="time only: column of the date that belongs to a time of day"),
     ] = None
     date_order: Annotated[
-        DateOrder | None, Field(description="of time alone: what comes first in a date such as 03/04/2026")
+        DateOrder | None, Field(description="time only: order of day and month in a date such as 03/04/2026")
     ] = None
-    clock: Annotated[ClockForm | None, Field(description="of time alone: what a time of day such as 08:10 is")] = None
+    clock: Annotated[ClockForm | None, Field(description="time only: meaning of a text such as 08:10")] = None
 
 
 class MappedDirection(StrictTable):
     """Direction of motion from the rate of a channel: 1, -1, or 0 if too slow; sweeps are numbered as repetitions."""
 
-    of: Annotated[Text, Field(description="channel whose rate decides")]
-    threshold: Annotated[Text, Field(description="slowest rate that counts, such as '2 mm/s'")]
+    of: Annotated[Text, Field(description="channel whose rate of change gives the direction")]
+    threshold: Annotated[Text, Field(description="smallest rate that counts as motion, such as '2 mm/s'")]
     window: Annotated[Text, Field(description="time over which the channel is smoothed, such as '0.2 s'")]
-    sign: Annotated[Literal[1, -1], Field(description="-1 where a growing channel means falling pressure")] = 1
+    sign: Annotated[Literal[1, -1], Field(description="-1 if a rising channel means falling pressure")] = 1
 
 
 Trials = Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(strict=False, min_length=1)]
@@ -80,19 +85,19 @@ Trials = Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(strict=False, 
 class ColumnMap(StrictTable):
     """Format of a foreign table, and channels of its columns."""
 
-    delimiter: Annotated[
-        Literal["comma", "semicolon", "tab", "whitespace"], Field(description="what separates columns")
-    ] = "comma"
+    delimiter: Annotated[Literal["comma", "semicolon", "tab", "whitespace"], Field(description="column delimiter")] = (
+        "comma"
+    )
     decimal: Annotated[Literal["point", "comma"], Field(description="decimal mark")] = "point"
     encoding: Annotated[Literal["utf-8", "latin-1"], Field(description="encoding of the text")] = "utf-8"
-    header: Annotated[bool, Field(description="whether a line names the columns")] = True
+    header: Annotated[bool, Field(description="true if a header line names the columns")] = True
     skip_lines: Annotated[int, Field(ge=0, description="lines before the header, or before the first row")] = 0
     skip_rows: Annotated[
-        int, Field(ge=0, description="rows below the header to leave out: a line of units, or numbers")
+        int, Field(ge=0, description="number of rows to skip below the header, such as a line of units")
     ] = 0
     trial: Annotated[
         Literal["all"] | Annotated[int, Field(ge=1)] | Trials | None,
-        Field(description="of trials below each other with a clock from 0 each: one, from 1, or some, or 'all'"),
+        Field(description="trials to read, where each trial starts at time 0: a number from 1, a list, or 'all'"),
     ] = None
     channels: Annotated[dict[str, MappedChannel], Field(min_length=1, description="channels by name, with 'time'")]
     direction: Annotated[MappedDirection | None, Field(description="direction from the rate of a channel")] = None

@@ -334,7 +334,7 @@ class Expressions:
         if name in self.definitions:
             function, arguments = self.called(name, node)
             if function.returns is None:
-                raise self.refused(node, f"function '{name}' returns no value that could be used")
+                raise self.refused(node, f"function '{name}' returns nothing, so its call cannot be used as a value")
             return Term("call", function.returns, arguments, function.name)
         return self.built_in(name, node)
 

@@ -176,7 +176,9 @@ class _Ranges:
             known = self.terms.get(id(term), value)
             self.terms[id(term)] = every = IntegerRange(min(known.low, value.low), max(known.high, value.high))
             if term.type == INT and _width(every) is None:
-                raise _refused(function, f"a value from {every.low} to {every.high} exceeds 32 bits")
+                raise _refused(
+                    function, f"a value may range from {every.low} to {every.high}, which does not fit in 32 bits"
+                )
         return value
 
 
@@ -244,7 +246,9 @@ class _Narrowing:
         assert isinstance(value, IntegerRange)
         width = _width(value)
         if kind == INT and width is None:
-            raise _refused(self.item, f"a value from {value.low} to {value.high} exceeds 32 bits")
+            raise _refused(
+                self.item, f"a value may range from {value.low} to {value.high}, which does not fit in 32 bits"
+            )
         return width if kind == INT and width is not None else kind
 
     def of_name(self, name: str, kind: Type) -> Type:

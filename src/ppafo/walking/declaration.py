@@ -87,27 +87,27 @@ class _SensorFault:
 
 def _sensor_faults(sensor: str) -> dict[str, _SensorFault]:
     unit, offset, drift, largest = _FAULTY[sensor]
-    period = "the fault is there in the first half of each such period; always with 0"
+    period = "period of an intermittent fault, present in the first half of each period; 0: permanent"
     times = (
-        Quantity("time", "s", "when the sensor fails", None, 0.0, 1.0e6),
+        Quantity("time", "s", "start time of the fault", None, 0.0, 1.0e6),
         Quantity("period", "s", period, 0.0, 0.0, 1.0e6),
     )
-    mixed = "fraction of the other sensor's reading in it; 1 on both swaps them"
+    mixed = "fraction of the other sensor's reading mixed into this one; 1 on both swaps the sensors"
     distortions = (
-        Quantity("gain", "1", "what it shows over what is there", 1.0, -10.0, 100.0),
-        Quantity("offset", offset, "what is added to it", 0.0, -1.0e9, 1.0e9),
-        Quantity("drift", drift, "what is added in each second", 0.0, -1.0e9, 1.0e9),
+        Quantity("gain", "1", "gain: reading over true value", 1.0, -10.0, 100.0),
+        Quantity("offset", offset, "offset added to the reading", 0.0, -1.0e9, 1.0e9),
+        Quantity("drift", drift, "drift of the reading per second", 0.0, -1.0e9, 1.0e9),
         # There is no other angle that could be mixed with it.
         *(() if sensor == "angle" else (Quantity("crosstalk", "1", mixed, 0.0, 0.0, 1.0),)),
-        Quantity("lag", "s", "time constant with which it follows", 0.0, 0.0, 100.0),
-        Quantity("lost_share", "1", "fraction of its samples that are lost", 0.0, 0.0, 1.0),
-        Quantity("delay", "s", "by how much it is late, to the nearest whole sample", 0.0, 0.0, 1.0),
+        Quantity("lag", "s", "time constant of a first-order lag of the reading", 0.0, 0.0, 100.0),
+        Quantity("lost_share", "1", "fraction of the samples of the sensor that are lost", 0.0, 0.0, 1.0),
+        Quantity("delay", "s", "delay of the reading, rounded to whole samples", 0.0, 0.0, 1.0),
     )
-    reading = Quantity("reading", unit, "its reading from then on", 0.0, -largest, largest)
+    reading = Quantity("reading", unit, "constant reading during the fault", 0.0, -largest, largest)
     return {
-        FROZEN: _SensorFault("keeps its last reading", times),
-        "stuck": _SensorFault("gives one fixed reading", (*times, reading)),
-        DISTORTED: _SensorFault("gives a wrong reading that follows what is there", (*times, *distortions)),
+        FROZEN: _SensorFault("reading frozen at its last value", times),
+        "stuck": _SensorFault("reading stuck at a given value", (*times, reading)),
+        DISTORTED: _SensorFault("reading follows the true value with errors", (*times, *distortions)),
     }
 
 

@@ -146,8 +146,8 @@ def test_a_law_that_would_undo_another_is_refused() -> None:
     with pytest.raises(ProgramError) as caught:
         collected(FIRST, replace(SECOND, laws={place: undoing_law}))
     assert str(caught.value) == (
-        "effects 'first' and 'second' both act on place, and undoing_law of 'second' does not call it: switch one of "
-        "them off"
+        "effects 'first' and 'second' both act on place, but undoing_law of 'second' ignores the first: call place "
+        "in it, or switch one of the two effects off"
     )
 
 

@@ -70,7 +70,10 @@ def test_it_is_compared_over_an_uncertain_device_with_progress_and_overrides() -
     pair = {"mine": base.controlled_by(Integral(0.1)), "stronger": base.controlled_by(Integral(0.4))}
     level = ["reference.level=2 N m"]
     found = ppafo.compare(pair, study="torque-task-uncertainty", overrides=level, draws=64, progress=heard.append)
-    assert [item.done for item in heard] == [32, 64, 96, 128]
+    done = [item.done for item in heard]
+    # A slow machine reports between the blocks too.
+    assert done == sorted(done)
+    assert {32, 64, 96, 128} <= set(done)
     (task,) = found.found.tasks
     (better,) = [item.better for item in task.pairs["stronger"] if item.metric == "rms_error"]
     assert better is not None

@@ -65,7 +65,9 @@ def given(low: int, high: int, most: int) -> dict[str, Any]:
 
 def test_what_may_leave_32_bits_is_refused_and_what_just_does_not_is_not() -> None:
     assert narrowed(module_of(doubled_up), given(0, 2**15 - 1, 16)).returned == IntegerRange(0, (2**15 - 1) * 2**16)
-    with pytest.raises(ProgramError, match=r"doubled_up: .*a value from 0 to 2147483648 exceeds 32 bits"):
+    with pytest.raises(
+        ProgramError, match=r"doubled_up: .*a value may range from 0 to 2147483648, which does not fit in 32 bits"
+    ):
         narrowed(module_of(doubled_up), given(0, 2**15, 16))
 
 

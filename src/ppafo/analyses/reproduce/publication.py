@@ -54,7 +54,7 @@ def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
     result = walk(load_walk(name, overrides), minutes=MINUTES)
     if not (result.status.is_completed and result.is_helped):
         raise SimulationError(
-            f"{name}: {result.status.message}; a claim about walking needs a walk with assistance in most strides"
+            f"walk '{name}' is no evidence for a claim, which needs assistance in most strides: {result.status.message}"
         )
     return result
 

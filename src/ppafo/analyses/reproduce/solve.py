@@ -215,7 +215,7 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
         report(Progress(f"simulating {name}"))
         runs.append(simulate(scenario))
         if not runs[-1].status.is_completed:
-            raise SimulationError(f"{name}: {runs[-1].status.message}")
+            raise SimulationError(f"simulation of scenario '{name}' failed: {runs[-1].status.message}")
     step, solenoid, proportional = runs
     report(Progress("measuring on the simulated test bench (synthetic)"))
     # The rig records with the overrides of the simulations.

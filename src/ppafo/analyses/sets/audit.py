@@ -155,7 +155,7 @@ def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Sect
     hidden = len(findings) - len(listed)
     if hidden:
         concern = "concerns" if hidden == 1 else "concern"
-        summary += f"; {hidden} of them {concern} no changed value: --all"
+        summary += f"; {hidden} of them {concern} no changed value; show them with --all"
     for finding in listed:
         lines = [f"{finding.severity}: {finding.title} [{finding.id}]"]
         for value in finding.values:

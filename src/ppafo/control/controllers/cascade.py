@@ -40,7 +40,14 @@ class CascadeParameters(NamedTuple):
     """
 
     error_limit: Annotated[
-        float, Number("rad", "angle error that the law acts on at most: far away it goes at a speed", 0.1, 1.0e-4, 10.0)
+        float,
+        Number(
+            "rad",
+            "largest angle error that the law acts on; beyond it the joint moves at constant speed",
+            0.1,
+            1.0e-4,
+            10.0,
+        ),
     ]
     angle_stiffness: Annotated[
         float, Number("N m/rad", "torque per angle error", None, 0.0, 1.0e6, follows=(ANGLE_STIFFNESS,))
@@ -61,10 +68,12 @@ class CascadeParameters(NamedTuple):
         float, Number("1/(N m)", "command per torque error", None, 0.0, 1.0e3, follows=(INNER_GAIN,))
     ]
     tolerance: Annotated[
-        float, Number("rad", "angle error within which nothing is learnt", None, 0.0, 1.0, follows=(TOLERANCE,))
+        float,
+        Number("rad", "angle error below which the observed load is not updated", None, 0.0, 1.0, follows=(TOLERANCE,)),
     ]
     rest_distance: Annotated[
-        float, Number("rad", "turn of the joint that shows motion", None, 1.0e-9, 1.0, follows=(REST_DISTANCE,))
+        float,
+        Number("rad", "angle change that counts as motion of the joint", None, 1.0e-9, 1.0, follows=(REST_DISTANCE,)),
     ]
     gravity_torque: Annotated[
         float, Number("N m", "believed largest gravity torque, 0 for none", None, 0.0, 1.0e4, follows=(GRAVITY,))

@@ -50,9 +50,11 @@ def profile_torque(profile: TorqueProfile, phase: float) -> float:
 # the actuator could give. Only the limit of it follows the device.
 
 HOLD_QUANTITIES = (
-    Quantity("swing_angle", "rad", "angle about which the lifted foot is kept", 1.28, 0.5, 2.5),
-    Quantity("hold_stiffness", "N m/rad", "requested torque per angle from it", 3.7, 0.0, 1.0e3),
-    Quantity("hold_damping", "N m s/rad", "requested torque against the angle's rate", 0.35, 0.0, 1.0e3),
+    Quantity("swing_angle", "rad", "target angle of the lifted foot", 1.28, 0.5, 2.5),
+    Quantity("hold_stiffness", "N m/rad", "requested torque per angle from the target (stiffness)", 3.7, 0.0, 1.0e3),
+    Quantity(
+        "hold_damping", "N m s/rad", "requested torque per angular velocity, opposing it (damping)", 0.35, 0.0, 1.0e3
+    ),
     Quantity("angle_rate_filter", "s", "time constant of the filter on the angle's rate", 0.006, 0.0, 1.0),
 )
 
@@ -77,7 +79,7 @@ ASSISTANCE_QUANTITIES = (
     Quantity(
         "largest_torque",
         "N m",
-        "limit of the requested torque, either direction; what the actuator reaches unless given",
+        "limit of the magnitude of the requested torque; default: the torque that the actuator reaches",
         None,
         0.0,
         1.0e3,

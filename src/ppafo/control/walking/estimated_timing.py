@@ -49,16 +49,22 @@ class EstimatedRules(NamedTuple):
     delays: Delays
     anchor_weight: AnchorWeight
     learning_strides: Annotated[
-        float, Number("1", "good strides in a row from which the stride is learnt", 3.0, 1.0, 100.0)
+        float, Number("1", "number of consecutive valid strides from which the mean stride is learnt", 3.0, 1.0, 100.0)
     ]
-    relearning: Annotated[float, Number("1", "weight of a later stride in the learnt one", 0.1, 0.0, 1.0)]
-    angle_scale: Annotated[float, Number("rad", "a difference of the angle that counts as one", 0.1, 1.0e-3, 10.0)]
-    force_scale: Annotated[float, Number("N", "a difference of a force that counts as one", 150.0, 1.0, 1.0e5)]
+    relearning: Annotated[float, Number("1", "weight of each later stride in the learnt mean stride", 0.1, 0.0, 1.0)]
+    angle_scale: Annotated[
+        float, Number("rad", "angle residual that counts as 1 in the sum of squares", 0.1, 1.0e-3, 10.0)
+    ]
+    force_scale: Annotated[
+        float, Number("N", "force residual that counts as 1 in the sum of squares", 150.0, 1.0, 1.0e5)
+    ]
     largest_misfit: Annotated[
-        float, Number("1", "mean square misfit beyond which nothing is estimated", 1.0, 0.0, 1.0e3)
+        float, Number("1", "mean square residual above which the estimate is discarded", 1.0, 0.0, 1.0e3)
     ]
-    clock_trust: Annotated[float, Number("1", "sum of squares that a shift by one knot costs", 4.0, 0.0, 1.0e6)]
-    estimate_weight: Annotated[float, Number("1", "how far an estimate moves the clock, 1 wholly", 0.5, 0.0, 1.0)]
+    clock_trust: Annotated[float, Number("1", "penalty in the sum of squares for a shift by one knot", 4.0, 0.0, 1.0e6)]
+    estimate_weight: Annotated[
+        float, Number("1", "weight of an estimate in the phase correction, 1: full correction", 0.5, 0.0, 1.0)
+    ]
 
 
 _NO_STRIDE, _NO_WINDOW = (0.0,) * KNOTS, (0.0,) * WINDOW

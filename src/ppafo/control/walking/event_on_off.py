@@ -28,18 +28,23 @@ class EventOnOffParameters(NamedTuple):
     ``phases``, ``safety`` and ``timing`` are the rules of phases, safety and timing.
     """
 
-    swing_angle: Annotated[float, Number("rad", "angle at which the foot is kept in the swing", 1.68, 0.5, 2.5)]
+    swing_angle: Annotated[float, Number("rad", "ankle angle to which the foot is lifted in swing", 1.68, 0.5, 2.5)]
     band: Annotated[
-        float, Number("rad", "the foot is lifted above the angle plus this, let go below it less this", 0.145, 0.0, 0.5)
+        float,
+        Number(
+            "rad",
+            "half width of the angle band: lifting starts above swing_angle + band, ends below swing_angle - band",
+            0.145,
+            0.0,
+            0.5,
+        ),
     ]
-    push_off_end: Annotated[
-        float, Number("1", "fraction of the stride time at which the push-off is over", 0.565, 0.1, 1.0)
-    ]
+    push_off_end: Annotated[float, Number("1", "end of push-off, as a fraction of the stride time", 0.565, 0.1, 1.0)]
     largest_torque: Annotated[
         float,
         Number(
             "N m",
-            "torque, either direction, at which the chamber is vented until half of it is left",
+            "torque magnitude at which the chamber is vented until half of the torque remains",
             None,
             0.0,
             1.0e3,

@@ -38,50 +38,54 @@ class SafetyRules(NamedTuple):
     twice as long. ``nominal`` is the nominal device of the chamber observer.
     """
 
-    lowest_force: Annotated[float, Number("N", "a force below this is not a valid reading", -40.0, -1.0e5, 0.0)]
-    largest_force: Annotated[float, Number("N", "a force above this is not a valid reading", 3.0e3, 100.0, 1.0e5)]
-    lowest_angle: Annotated[float, Number("rad", "an angle below this is not a valid reading", 0.3, -10.0, 10.0)]
-    highest_angle: Annotated[float, Number("rad", "an angle above this is not a valid reading", 2.4, -10.0, 10.0)]
+    lowest_force: Annotated[float, Number("N", "lowest valid reading of a force sensor", -40.0, -1.0e5, 0.0)]
+    largest_force: Annotated[float, Number("N", "highest valid reading of a force sensor", 3.0e3, 100.0, 1.0e5)]
+    lowest_angle: Annotated[float, Number("rad", "lowest valid reading of the angle sensor", 0.3, -10.0, 10.0)]
+    highest_angle: Annotated[float, Number("rad", "highest valid reading of the angle sensor", 2.4, -10.0, 10.0)]
     longest_phase: Annotated[float, Number("1", "longest stance or swing, in stride times", 1.2, 0.3, 20.0)]
     frozen_time: Annotated[
-        float, Number("s", "a loaded sensor whose reading does not change for longer is frozen", 0.24, 0.01, 5.0)
+        float, Number("s", "longest time for which the reading of a loaded sensor may stay unchanged", 0.24, 0.01, 5.0)
     ]
-    most_toe_strides: Annotated[float, Number("1", "strides in a row that may be on the toes alone", 1.0, 0.0, 1.0e6)]
+    most_toe_strides: Annotated[
+        float, Number("1", "largest number of consecutive strides on the toes alone", 1.0, 0.0, 1.0e6)
+    ]
     flat_from: Annotated[
-        float, Number("1", "from this fraction of a steady stride on, heel and toes are both loaded", 0.16, 0.05, 0.6)
+        float,
+        Number(
+            "1",
+            "start of foot-flat, when heel and toes are both loaded, as a fraction of a steady stride",
+            0.16,
+            0.05,
+            0.6,
+        ),
     ]
-    flat_to: Annotated[float, Number("1", "and until this fraction", 0.24, 0.05, 0.6)]
+    flat_to: Annotated[float, Number("1", "end of foot-flat, as a fraction of a steady stride", 0.24, 0.05, 0.6)]
     lowest_pressure: Annotated[
-        float, Number("Pa_a", "a chamber pressure below this is not a valid reading", 3.0e4, 0.0, 1.0e5)
+        float, Number("Pa_a", "lowest valid reading of a chamber pressure sensor", 3.0e4, 0.0, 1.0e5)
     ]
     highest_pressure: Annotated[
-        float, Number("Pa_a", "a chamber pressure above this is not a valid reading", 2.0e6, 1.1e5, 1.0e8)
+        float, Number("Pa_a", "highest valid reading of a chamber pressure sensor", 2.0e6, 1.1e5, 1.0e8)
     ]
     filled_pressure: Annotated[
-        float, Number("Pa_a", "a filled chamber has a higher pressure, a vented one a lower", 1.25e5, 1.0e4, 1.0e8)
+        float,
+        Number("Pa_a", "pressure above which a chamber counts as filled, below which as vented", 1.25e5, 1.0e4, 1.0e8),
     ]
-    fill_time: Annotated[
-        float, Number("s", "a chamber is filled when the open valve has fed it for this long", 0.05, 1.0e-3, 10.0)
-    ]
-    vent_time: Annotated[
-        float, Number("s", "both chambers are vented when the valve has vented them for this long", 0.25, 1.0e-3, 10.0)
-    ]
+    fill_time: Annotated[float, Number("s", "time for which a fully open valve fills a chamber", 0.05, 1.0e-3, 10.0)]
+    vent_time: Annotated[float, Number("s", "time for which an open valve vents both chambers", 0.25, 1.0e-3, 10.0)]
     shortest_swing: Annotated[
-        float, Number("1", "shortest swing that is seen in a steady stride, fraction of it", 0.25, 0.0, 0.6)
+        float, Number("1", "shortest valid swing, as a fraction of a steady stride", 0.25, 0.0, 0.6)
     ]
-    resume_strides: Annotated[float, Number("1", "good strides in a row after which a pause ends", 2.0, 1.0, 1.0e3)]
-    largest_drop: Annotated[float, Number("N", "no force as large as this is gone within a sample", 300.0, 10.0, 1.0e5)]
-    lowest_flat_angle: Annotated[
-        float, Number("rad", "no ankle has less while the foot must stand flat", 1.22, -10.0, 10.0)
+    resume_strides: Annotated[
+        float, Number("1", "number of consecutive valid strides that ends a pause", 2.0, 1.0, 1.0e3)
     ]
-    highest_flat_angle: Annotated[
-        float, Number("rad", "no ankle has more while the foot must stand flat", 1.92, -10.0, 10.0)
-    ]
+    largest_drop: Annotated[float, Number("N", "largest force that may vanish within one sample", 300.0, 10.0, 1.0e5)]
+    lowest_flat_angle: Annotated[float, Number("rad", "smallest plausible ankle angle at foot-flat", 1.22, -10.0, 10.0)]
+    highest_flat_angle: Annotated[float, Number("rad", "largest plausible ankle angle at foot-flat", 1.92, -10.0, 10.0)]
     follow_time: Annotated[
         float,
         Number(
             "s",
-            "a pressure follows the valve within this, and the lags of valve and sensor",
+            "time within which a pressure follows the valve, in addition to the lags of valve and sensor",
             8.0e-3,
             0.0,
             1.0,
@@ -89,7 +93,7 @@ class SafetyRules(NamedTuple):
         ),
     ]
     highest_toe_off_angle: Annotated[
-        float, Number("rad", "no ankle has more while its toes still carry", 2.06, -10.0, 10.0)
+        float, Number("rad", "largest plausible ankle angle while the toes are loaded", 2.06, -10.0, 10.0)
     ]
     nominal: NominalDevice
 

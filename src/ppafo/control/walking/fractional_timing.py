@@ -40,21 +40,19 @@ STRUCK, TOES_ON, HEEL_OFF, TOES_OFF = 0.0, 1.0, 2.0, 3.0
 class Delays(NamedTuple):
     """Loading and unloading rates of the forces at each event [N/s], and lags of force sensor and valve [s]."""
 
-    heel_loading_rate: Annotated[
-        float, Number("N/s", "how fast the heel is loaded after its strike", 5.6e3, 100.0, 1.0e6)
-    ]
-    toe_loading_rate: Annotated[float, Number("N/s", "how fast the toes are loaded at contact", 4.0e4, 100.0, 1.0e6)]
+    heel_loading_rate: Annotated[float, Number("N/s", "loading rate of the heel at heel strike", 5.6e3, 100.0, 1.0e6)]
+    toe_loading_rate: Annotated[float, Number("N/s", "loading rate of the toes at contact", 4.0e4, 100.0, 1.0e6)]
     heel_unloading_rate: Annotated[
-        float, Number("N/s", "how fast the load of the heel fades before it rises", 1.3e3, 100.0, 1.0e6)
+        float, Number("N/s", "unloading rate of the heel before heel-off", 1.3e3, 100.0, 1.0e6)
     ]
     toe_unloading_rate: Annotated[
-        float, Number("N/s", "how fast the load of the toes fades before they rise", 7.0e3, 100.0, 1.0e6)
+        float, Number("N/s", "unloading rate of the toes before toe-off", 7.0e3, 100.0, 1.0e6)
     ]
     sensor_lag: Annotated[
         float,
         Number(
             "s",
-            "how late the force sensors follow; from their bandwidth unless given",
+            "lag of the force sensors; from their bandwidth unless given",
             None,
             0.0,
             0.2,
@@ -63,7 +61,7 @@ class Delays(NamedTuple):
     ]
     valve_delay: Annotated[
         float,
-        Number("s", "how late the valve follows: its dead time", None, 0.0, 0.2, follows=(VALVE_DELAY,)),
+        Number("s", "dead time of the valve", None, 0.0, 0.2, follows=(VALVE_DELAY,)),
     ]
 
 
@@ -314,7 +312,7 @@ def phase_time(clock: GaitClock, lead: float, phase: PhaseState) -> GaitTime:
 
 
 AnchorWeight = Annotated[
-    float, Number("1", "how far an event after the strike moves the clock, 1 wholly", 0.8, 0.0, 1.0)
+    float, Number("1", "weight of events after heel strike in the phase correction, 1: full correction", 0.8, 0.0, 1.0)
 ]
 
 

@@ -24,10 +24,10 @@ def _nominal(name: str, unit: str, summary: str, maximum: float, lowest: float =
     )
 
 
-_FLOW = "R T times the conductance of the valve, which the observer of the chambers believes; 0 switches it off"
+_FLOW = "valve conductance times R T in the chamber observer; 0 switches the observer off"
 _PAIR = "1 for a pair of on/off valves, 0 for a spool with a vent valve"
 _INTERVAL = "shortest time between two switchings of a coil"
-_JOINING = "time for which the chambers are joined after chamber 1 was fed"
+_JOINING = "time for which the chambers stay joined after chamber 1 was fed"
 
 
 class NominalDevice(NamedTuple):
@@ -51,9 +51,11 @@ class NominalDevice(NamedTuple):
     nominal_atmospheric_pressure: Annotated[
         float, _nominal("atmospheric_pressure", "Pa_a", "pressure of the atmosphere", 1.0e8)
     ]
-    nominal_relieving: Annotated[float, _nominal("relieving", "", "1 where the supplies take gas back", 1.0)]
+    nominal_relieving: Annotated[
+        float, _nominal("relieving", "", "1 if the supply regulators are relieving (accept reverse flow), else 0", 1.0)
+    ]
     nominal_displacement_per_radian: Annotated[
-        float, _nominal("displacement_per_radian", "m^3/rad", "mean growth of chamber 1 with the angle", 1.0)
+        float, _nominal("displacement_per_radian", "m^3/rad", "mean volume of chamber 1 per angle", 1.0)
     ]
     nominal_dead_volume_1: Annotated[float, _nominal("dead_volume_1", "m^3", "dead volume of chamber 1", 1.0)]
     nominal_dead_volume_2: Annotated[float, _nominal("dead_volume_2", "m^3", "dead volume of chamber 2", 1.0)]
@@ -66,7 +68,7 @@ class NominalDevice(NamedTuple):
     ]
     nominal_switching_interval: Annotated[float, _nominal("switching_interval", "s", _INTERVAL, 1.0)]
     nominal_delay: Annotated[float, _nominal("delay", "s", "dead time of a spool", 1.0)]
-    nominal_lag: Annotated[float, _nominal("lag", "s", "time after which a spool has followed", 1.0)]
+    nominal_lag: Annotated[float, _nominal("lag", "s", "settling time of a spool", 1.0)]
     nominal_dead_band: Annotated[float, _nominal("dead_band", "", "smallest command that opens a spool", 0.99)]
     nominal_joining_time: Annotated[float, _nominal("joining_time", "s", _JOINING, 10.0)]
     nominal_sensor_lag: Annotated[float, _nominal("sensor_lag", "s", "lag of the pressure sensors", 1.0e3)]
@@ -78,12 +80,12 @@ LINE_QUANTITIES = (
         _nominal(f"line_{name}_{line}", unit, f"{summary} of line {line}", maximum)
         for line in (1, 2)
         for name, unit, summary, maximum in (
-            ("droop", "Pa s/J", "droop per gas content (p V) that flows", 1.0e10),
+            ("droop", "Pa s/J", "pressure droop per flow of gas content (p V)", 1.0e10),
             ("largest_flow", "W", "largest flow of gas content (p V)", 1.0e10),
-            ("volume", "m^3", "volume, 0 without lines,", 1.0),
+            ("volume", "m^3", "volume (0 for no line)", 1.0),
         )
     ),
-    _nominal("line_relieving", "", "1 where gas flows back through the regulators", 1.0),
+    _nominal("line_relieving", "", "1 if the line regulators are relieving (accept reverse flow), else 0", 1.0),
 )
 """Settings for the fields of ``nominal_lines``, in order."""
 

@@ -15,13 +15,15 @@ from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 class PhaseRules(NamedTuple):
     """Thresholds [N], debounce [s], first stride time [s], weight of a new stride [-], start of push-off [turns]."""
 
-    load_threshold: Annotated[float, Number("N", "a force sensor counts as loaded above this", 60.0, 1.0, 5.0e3)]
-    unload_threshold: Annotated[float, Number("N", "and as unloaded below this", 30.0, 0.0, 5.0e3)]
-    debounce: Annotated[float, Number("s", "a change of load counts when it has lasted this long", 0.01, 0.0, 0.2)]
-    first_stride_time: Annotated[float, Number("s", "stride time until one has been measured", 1.1, 0.3, 5.0)]
+    load_threshold: Annotated[float, Number("N", "force above which a sensor counts as loaded", 60.0, 1.0, 5.0e3)]
+    unload_threshold: Annotated[float, Number("N", "force below which a sensor counts as unloaded", 30.0, 0.0, 5.0e3)]
+    debounce: Annotated[float, Number("s", "time for which a change of load must last to count", 0.01, 0.0, 0.2)]
+    first_stride_time: Annotated[
+        float, Number("s", "assumed stride time until the first stride is measured", 1.1, 0.3, 5.0)
+    ]
     stride_weight: Annotated[float, Number("1", "weight of a new stride in the moving average", 0.3, 0.0, 1.0)]
     push_off_start: Annotated[
-        float, Number("1", "fraction of the stride time at which push-off may begin", 0.4, 0.0, 1.0)
+        float, Number("1", "earliest start of push-off, as a fraction of the stride time", 0.4, 0.0, 1.0)
     ]
 
 

@@ -83,7 +83,7 @@ def slopes(bandwidth: SensorRates, bandwidth_state: SensorState, now: PlantSnaps
 
 EFFECT = Effect(
     name="bandwidth",
-    summary="Sensors that follow by a first order.",
+    summary="Sensors with a first-order lag.",
     settings=Bandwidths,
     parameters=SensorRates,
     prepare=prepare,

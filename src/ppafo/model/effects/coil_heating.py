@@ -52,7 +52,7 @@ class CoilSettings(NamedTuple):
         float, Number("s", "time constant with which a coil warms and cools", 300.0, 1.0e-3, 1.0e6)
     ]
     pull_in_share: Annotated[
-        float, Number("", "current that lifts the valve, over the last one of a cold coil", 0.5, 0.01, 0.6)
+        float, Number("", "current that lifts the valve, relative to the final current of a cold coil", 0.5, 0.01, 0.6)
     ]
 
 
@@ -114,10 +114,10 @@ EFFECT = Effect(
     symbols=(
         ("x_s", "steady_rise", "K", "rise of temperature of a coil that is always on"),
         ("1/tau", "warming", "1/s", "rate at which a coil warms and cools"),
-        ("-", "slowing", "1/K", "opening time relative to a cold coil, by the rise of temperature"),
-        ("-", "slowing_squared", "1/K^2", "the same, by its square"),
-        ("x", "rise`, `rise_a`, `rise_b", "K", "rises of temperature of a coil, and of both"),
-        ("q", "pull_in_share", "-", "current that lifts a valve, over the last one of a cold coil"),
+        ("-", "slowing", "1/K", "linear coefficient of relative opening time over coil temperature rise"),
+        ("-", "slowing_squared", "1/K^2", "quadratic coefficient of relative opening time over coil temperature rise"),
+        ("x", "rise`, `rise_a`, `rise_b", "K", "temperature rise of a coil, and of both coils"),
+        ("q", "pull_in_share", "-", "current that lifts a valve, relative to the final current of a cold coil"),
         ("-", "is_coil_a", "-", "1 for the coil of chamber 1, 0 for chamber 2's"),
     ),
     state=State(row=CoilRises, start=None, advance=advance, slopes=slopes),

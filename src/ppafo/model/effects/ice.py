@@ -25,7 +25,7 @@ class IceSettings(NamedTuple):
     """Settings of ice in the exhaust: growth and melting."""
 
     blockage_per_gas: Annotated[float, Number("1/kg", "blockage per gas that leaves, 0 for none", 0.0, 0.0, 1.0e6)]
-    melting_time: Annotated[float, Number("s", "time constant with which it melts", 30.0, 1.0e-3, 1.0e6)]
+    melting_time: Annotated[float, Number("s", "time constant of melting", 30.0, 1.0e-3, 1.0e6)]
 
 
 def prepare(settings: IceSettings, _device: Any) -> Ice:

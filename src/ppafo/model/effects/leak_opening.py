@@ -21,7 +21,12 @@ class LeakSettings(NamedTuple):
     pressure: Annotated[
         float, Number("Pa_d", "pressure between chambers at which the leak opens, 0 for always", 0.0, 0.0, 1.0e7)
     ]
-    rise: Annotated[float, Number("", "excess at which half of the leak is open, over that pressure", 1.0, 0.01, 100.0)]
+    rise: Annotated[
+        float,
+        Number(
+            "", "excess pressure at which half of the leak is open, relative to the opening pressure", 1.0, 0.01, 100.0
+        ),
+    ]
 
 
 def lifted_leak(
@@ -52,6 +57,11 @@ EFFECT = Effect(
     equation="C = C_l e / (e + w P_o), e = max(0, |P_1 - P_2| - P_o)",
     symbols=(
         ("P_o", "opening_pressure", "Pa", "pressure between the chambers at which the leak opens"),
-        ("w", "opening_rise", "-", "excess at which half of the leak is open, over the pressure at which it opens"),
+        (
+            "w",
+            "opening_rise",
+            "-",
+            "excess pressure at which half of the leak is open, relative to the pressure at which it opens",
+        ),
     ),
 )

@@ -36,7 +36,7 @@ def prepare(settings: SilencerSettings, device: Any) -> Silencer:
 
 EFFECT = Effect(
     name="silencer",
-    summary="A silencer at the exhaust of the valve, in a row with it.",
+    summary="A silencer at the exhaust of the valve, in series with it.",
     settings=SilencerSettings,
     parameters=Silencer,
     prepare=prepare,

@@ -17,7 +17,7 @@ class SpoolPlace(NamedTuple):
 class SpoolPlay(NamedTuple):
     """Backlash [-] between command and spool."""
 
-    width: Annotated[float, Number("", "whole width of the play over the full command, 0 for none", 0.0, 0.0, 0.5)]
+    width: Annotated[float, Number("", "full width of the play relative to full command, 0 for none", 0.0, 0.0, 0.5)]
 
 
 def spool_position(position: float, command: float, play_width: float) -> float:

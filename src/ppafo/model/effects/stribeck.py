@@ -18,10 +18,20 @@ class StribeckSettings(NamedTuple):
     """Stribeck velocity, at which half of the additional friction is left, and additional friction as a fraction."""
 
     velocity: Annotated[
-        float, Number("rad/s", "angular velocity at which half of the rise is left, 0 for none", 0.0, 0.0, 1.0e4)
+        float,
+        Number(
+            "rad/s", "angular velocity at which half of the additional friction remains, 0 for none", 0.0, 0.0, 1.0e4
+        ),
     ]
     share: Annotated[
-        float, Number("", "share of the fall from static to dynamic friction that the rise has", 0.9, 0.0, 0.99)
+        float,
+        Number(
+            "",
+            "fraction of the fall from static to dynamic friction that is modelled as velocity-dependent",
+            0.9,
+            0.0,
+            0.99,
+        ),
     ]
 
 

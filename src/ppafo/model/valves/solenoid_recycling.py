@@ -150,7 +150,7 @@ class RecyclingSettings(NamedTuple):
         float, Number("s", "time for which the chambers stay joined after plantarflexion", 0.06, 0.0, 1.0)
     ]
     holding_time: Annotated[
-        float, Number("s", "time for which chamber 2 then keeps its gas, without the source", 0.0, 0.0, 1.0)
+        float, Number("s", "time for which chamber 2 then stays closed, without feeding from the source", 0.0, 0.0, 1.0)
     ]
 
 
@@ -183,7 +183,7 @@ def choose(_settings: RecyclingSettings) -> ValveModel:
 
 KIND = ValveKind(
     name="solenoid_recycling",
-    summary="Two on/off valves and a third between the chambers, which opens for a time when chamber 1 was fed.",
+    summary="Two on/off valves and a third one that joins the chambers for a time after chamber 1 was fed.",
     settings=RecyclingSettings,
     choose=choose,
     lag=solenoid.lag,

@@ -88,7 +88,7 @@ def test_a_setting_of_the_valve_that_goes_to_or_from_zero_is_named(
 ) -> None:
     path = "valves.proportional.delay"
     prepared = prepare(experiment, {path: start})
-    with pytest.raises(IdentificationError, match=r"'step': valve\.delay changed to or from 0"):
+    with pytest.raises(IdentificationError, match=r"'step': the fit changed valve\.delay to or from 0"):
         run_with(prepared, {path: then})
 
 
