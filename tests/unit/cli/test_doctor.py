@@ -44,7 +44,7 @@ def test_cache_says_why_a_folder_is_not_used(fresh_cache: Path, capsys: pytest.C
     assert main(["doctor"]) == 0
     assert "not used: other users can write into" in capsys.readouterr().out
     assert main(["doctor", "--warm"]) == 2
-    assert "cannot be kept: other users can write into" in capsys.readouterr().err
+    assert "cannot be stored: other users can write into" in capsys.readouterr().err
 
 
 def test_warming_compiles_every_scenario_of_the_package(

@@ -132,7 +132,7 @@ def test_recordings_of_the_rig_are_drawn_each_on_its_own(tmp_path: Path, capsys:
     (tmp_path / "rig.json").write_text('{"format": "ppafo rig", "recordings": {}}')
     before = names(tmp_path)
     assert main(["export", "figure", str(tmp_path), "--out", str(tmp_path / "one.png")]) == 2
-    assert f"{tmp_path} has 2 figures, free-decay, step-response; without --out" in capsys.readouterr().err
+    assert f"{tmp_path} has 2 figures (free-decay, step-response); omit --out" in capsys.readouterr().err
     assert names(tmp_path) == before
     assert main(["export", "figure", str(tmp_path)]) == 0
     assert {"free-decay.png", "free-decay.svg", "step-response.png", "step-response.svg"} <= set(names(tmp_path))
