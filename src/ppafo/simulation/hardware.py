@@ -56,9 +56,10 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
                 f"--set device.valve={parameter_set.default_valve}"
             )
         name = chosen_valve(parameter_set, valve)
-        of_file = _overrides_for(of_file, parameter_set, section["set"] == in_file.get("set"))
+        is_own = section["set"] == in_file.get("set")
+        of_file = _overrides_for(of_file, parameter_set, is_own)
         parameter_set = with_overrides(parameter_set, of_file, valve)
-        if of_file and section["set"] != in_file.get("set"):
+        if of_file and not is_own:
             _report_file_overrides(reading.file, section["set"], ", ".join(map(str, of_file)))
     except ParameterError as error:
         raise device_error(reading, error) from error

@@ -297,6 +297,7 @@ _SHOWN_PERCENTILES = (0.5, 99.5)
 """Percentiles between which changes are plotted; a few distant ones would squeeze all others into one bar."""
 
 
+# Panels are made by functions with a name: a lambda in a report cannot be pickled.
 def _pareto_panels(comparison: ComparisonResult) -> list[Panel]:
     return [_pareto(comparison, task) for task in comparison.tasks]
 

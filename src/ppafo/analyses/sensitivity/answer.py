@@ -129,6 +129,7 @@ def _colour_of(rank: int) -> str:
     return COLOURS[rank] if rank < _MAXIMUM_LINES else GREY
 
 
+# A function with a name: a lambda in a report cannot be pickled.
 def _panels(influences: Influences) -> list[Panel]:
     return [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)]
 
