@@ -1,9 +1,13 @@
-"""Wording of messages: nearest name, counts, lists of names, and one-line text from other programs."""
+"""Wording of messages: for their reader, nearest name, counts, lists of names, one-line text from other programs."""
 
+import contextlib
 import difflib
 import re
-from collections.abc import Iterable, Mapping, Sequence
+import shlex
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextvars import ContextVar
 from os.path import commonprefix
+from typing import Literal
 
 LONGEST_SHOWN = 40
 """Maximum number of characters of a name or cell quoted in a message."""
@@ -80,3 +84,51 @@ def reason(error: OSError | ValueError) -> str:
     """Return the reason of a failed file access, as the end of a sentence."""
     text = error.strerror if isinstance(error, OSError) and error.strerror else one_line(error)
     return text[:1].lower() + text[1:]
+
+
+_Reader = Literal["caller", "function", "command line"]
+_reader: ContextVar[_Reader] = ContextVar("_reader", default="caller")
+
+
+@contextlib.contextmanager
+def read_by(reader: _Reader) -> Iterator[None]:
+    """Word errors within a ``with`` block for their reader: Python caller, function of the package, or command line.
+
+    A caller knows arguments, a command line user knows options. A function of the package passes arguments that its
+    caller never gave.
+    """
+    token = _reader.set(reader)
+    try:
+        yield
+    finally:
+        _reader.reset(token)
+
+
+def read_by_caller() -> bool:
+    """True for a call from a user's own Python code, which names the arguments."""
+    return _reader.get() == "caller"
+
+
+def argument_text(name: str, value: str = "", option: str = "") -> str:
+    """Return an argument, optionally with its value, as written by the caller.
+
+    On the command line this is the ``option``, by default the name with dashes: ``--peak-flow '4 g/s'``.
+
+    >>> argument_text("peak_flow"), argument_text("peak_flow", "4 g/s")
+    ('peak_flow', "peak_flow='4 g/s'")
+    """
+    if _reader.get() != "command line":
+        return f"{name}={value!r}" if value else name
+    option = option or f"--{name.replace('_', '-')}"
+    return f"{option} {shlex.quote(value)}" if value else option
+
+
+def override_text(overrides: Iterable[str]) -> str:
+    """Return overrides as written by the caller: words of the command line, or an argument in Python.
+
+    >>> override_text(["run.duration=2 s"])
+    "overrides=['run.duration=2 s']"
+    """
+    if _reader.get() != "command line":
+        return f"overrides={list(overrides)!r}"
+    return shlex.join(word for override in overrides for word in ("--set", override))

@@ -8,15 +8,13 @@ TypeError, do the same.
 import contextlib
 import functools
 import inspect
-import shlex
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextvars import ContextVar
-from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from ppafo.arguments.values import AcceptedValues, accepted_values, annotated_parameters, shown
 from ppafo.errors import ArgumentError, PpafoError
-from ppafo.wording import nearest_name
+from ppafo.wording import nearest_name, read_by, read_by_caller
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -30,49 +28,6 @@ class _Parameter(NamedTuple):
 
     default: Any
     accepted: AcceptedValues
-
-
-_Reader = Literal["caller", "function", "command line"]
-_reader: ContextVar[_Reader] = ContextVar("_reader", default="caller")
-
-
-@contextlib.contextmanager
-def read_by(reader: _Reader) -> Iterator[None]:
-    """Word errors within a ``with`` block for their reader: Python caller, function of the package, or command line.
-
-    A caller knows arguments, a command line user knows options. A function of the package passes arguments that its
-    caller never gave.
-    """
-    token = _reader.set(reader)
-    try:
-        yield
-    finally:
-        _reader.reset(token)
-
-
-def argument_text(name: str, value: str = "", option: str = "") -> str:
-    """Return an argument, optionally with its value, as written by the caller.
-
-    On the command line this is the ``option``, by default the name with dashes: ``--peak-flow '4 g/s'``.
-
-    >>> argument_text("peak_flow"), argument_text("peak_flow", "4 g/s")
-    ('peak_flow', "peak_flow='4 g/s'")
-    """
-    if _reader.get() != "command line":
-        return f"{name}={value!r}" if value else name
-    option = option or f"--{name.replace('_', '-')}"
-    return f"{option} {shlex.quote(value)}" if value else option
-
-
-def override_text(overrides: Iterable[str]) -> str:
-    """Return overrides as written by the caller: words of the command line, or an argument in Python.
-
-    >>> override_text(["run.duration=2 s"])
-    "overrides=['run.duration=2 s']"
-    """
-    if _reader.get() != "command line":
-        return f"overrides={list(overrides)!r}"
-    return shlex.join(word for override in overrides for word in ("--set", override))
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
@@ -93,7 +48,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
         # NumPy's usual handling of errors, whatever the host program has set: an underflow is 0, and nothing to raise.
         numpy = sys.modules.get("numpy")
         usual = contextlib.nullcontext() if numpy is None else numpy.errstate(all="warn", under="ignore")
-        is_outermost = _reader.get() == "caller"
+        is_outermost = read_by_caller()
         with usual, read_by("function") if is_outermost else contextlib.nullcontext():
             try:
                 return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature

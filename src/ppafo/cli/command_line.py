@@ -17,13 +17,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, final
 
 from ppafo.arguments import Word, number, whole_number
-from ppafo.arguments.door import read_by
 from ppafo.arguments.values import annotated_parameters
 from ppafo.cli import output
 from ppafo.errors import ArgumentError, PpafoError
 from ppafo.kinds import kind_at
 from ppafo.plugins import name_modules_in, name_plugins
-from ppafo.wording import nearest_name
+from ppafo.wording import nearest_name, read_by
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite

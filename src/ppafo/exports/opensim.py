@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ppafo.arguments.door import argument_text
 from ppafo.errors import ScenarioError
 from ppafo.gait.recorded.mapping import Side
 from ppafo.signals import Channel, Recording
@@ -21,6 +20,7 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import walk
+from ppafo.wording import argument_text
 
 FEW_STRIDES = 0.2
 """Default duration [min] of a walk without a task sequence."""

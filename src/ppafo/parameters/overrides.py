@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from ppafo.arguments import Name, Overrides, checked
-from ppafo.arguments.door import override_text
 from ppafo.errors import ParameterError, PpafoError, UnitError
 from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.gas import SPECIES
@@ -38,7 +37,7 @@ from ppafo.parameters.parameter_set import (
 )
 from ppafo.units import SI, split_number
 from ppafo.units.shown import shown_text
-from ppafo.wording import nearest_name, one_line
+from ppafo.wording import nearest_name, one_line, override_text
 
 CHOSEN_VALVE, NAMED_VALVE = "valve.", "valves."
 Forms = Mapping[str, tuple[tuple[str, ...], ...]]

@@ -4,10 +4,10 @@ import shlex
 from collections.abc import Sequence
 
 from ppafo.arguments import Count, Folder, Name, Overrides, Scenario
-from ppafo.arguments.door import argument_text
 from ppafo.cli import output
 from ppafo.cli.output import CommandOutput
 from ppafo.errors import ScenarioError
+from ppafo.wording import argument_text
 
 MOST_SAMPLES = 10_000_000
 """Largest number of drawn samples in a comparison."""

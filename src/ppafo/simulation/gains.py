@@ -4,7 +4,6 @@ import logging
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from ppafo.arguments.door import override_text
 from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.ports import load_torque
@@ -15,6 +14,7 @@ from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.default_gains import DEAD_TIME, GAIN_TERMS, RATE, loop_terms
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
+from ppafo.wording import override_text
 
 logger = logging.getLogger("ppafo")
 

@@ -20,13 +20,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ppafo.arguments.door import argument_text
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
 from ppafo.storage.files import read_bytes, text_of, write_file
-from ppafo.wording import LONGEST_SHOWN, first_twice, nearest_name, one_line
+from ppafo.wording import LONGEST_SHOWN, argument_text, first_twice, nearest_name, one_line
 
 _OTHERS = (
     (";", "semicolons", 'delimiter = "semicolon", and decimal = "comma" if numbers have decimal commas'),

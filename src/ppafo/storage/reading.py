@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Pressure, Word, checked
-from ppafo.arguments.door import argument_text
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, refused_as
 from ppafo.signals import Recording, recording_kind
 from ppafo.storage.comma_separated import read_csv
 from ppafo.storage.result_folder import CSV_FILE, NETCDF_FILE, RUN_FILE, read_document, read_stored
+from ppafo.wording import argument_text
 
 if TYPE_CHECKING:
     from pandas import DataFrame  # type: ignore[import-untyped]

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.arguments.door import argument_text
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, ScenarioError, StudyError, refused_as
 from ppafo.metrics import METRICS
@@ -35,7 +34,7 @@ from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, samples_
 from ppafo.study.folder import StudyFolder
 from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, read_manifest
 from ppafo.study.runs import follows, unvaried, with_companions
-from ppafo.wording import one_line
+from ppafo.wording import argument_text, one_line
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.arguments.door import argument_text
 from ppafo.errors import DataError, PpafoError
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
@@ -29,6 +28,7 @@ from ppafo.validation.delay import ComparedCurve, Delay, estimate_delay
 from ppafo.validation.measured import MeasuredRecording, supply_gauge
 from ppafo.validation.replay import Replay, Replayed, replay_together
 from ppafo.validation.settings import ReplaySettings, initial_remedies
+from ppafo.wording import argument_text
 
 ENGINE_ERROR = 3.0e-5
 """Integration error of the engine as a fraction of the full range [-] (tests/convergence)."""

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ppafo.arguments.door import argument_text
 from ppafo.errors import PpafoError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.parameters.device import Device
@@ -27,6 +26,7 @@ from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.record import Record, ScaledResiduals, at_rate, record_of
 from ppafo.validation.search import CauseSearch, SizedCause
 from ppafo.validation.settings import ReplaySettings
+from ppafo.wording import argument_text
 
 _TIMES = {
     "milliseconds read as seconds": (1.0e3, "ms"),

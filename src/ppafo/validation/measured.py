@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.arguments.door import override_text
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import DataError
 from ppafo.parameters.device import Device
@@ -30,7 +29,7 @@ from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import NETCDF_FILE
 from ppafo.units.shown import in_units, shown_text
 from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2
-from ppafo.wording import nearest_name
+from ppafo.wording import nearest_name, override_text
 
 MINIMUM_SAMPLES = 10
 """Least number of samples of a recording; fewer do not show a signal over time."""

@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.arguments.door import argument_text
 from ppafo.parameters.device import Device
 from ppafo.signals.faults import correlated_noise_of, isolated_samples
 from ppafo.signals.recording import Floats, Recording
@@ -29,6 +28,7 @@ from ppafo.validation.compared import ANGLE
 from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.replay import Replay, Replayed, replay_together
 from ppafo.validation.settings import ReplaySettings
+from ppafo.wording import argument_text
 
 Flags = NDArray[np.bool_]
 

@@ -3,14 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from ppafo.arguments.door import argument_text
 from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.parameters.device import Device
 from ppafo.simulation.scenario import Leg
 from ppafo.units import parse_quantity
 from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2, Thresholds, parse_thresholds
 from ppafo.validation.replay import MOTIONS, Motion
-from ppafo.wording import nearest_name, one_line
+from ppafo.wording import argument_text, nearest_name, one_line
 
 DEFAULT_LIMIT = 0.02
 """Default limit of the estimated delay [s]; sensors, filters and valves lag less, so a longer lag is a model error."""

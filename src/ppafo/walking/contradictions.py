@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ppafo.arguments.door import override_text
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at, larger, smaller
@@ -24,6 +23,7 @@ from ppafo.walking.declaration import OF_A_WALK
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import Wearer
+from ppafo.wording import override_text
 
 COMPRESSION = 1.6
 """Limit of the chamber pressure relative to the supply pressure, with a margin: at most 1.38 in the shipped walks."""

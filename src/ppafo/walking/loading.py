@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.arguments import Overrides, checked
-from ppafo.arguments.door import argument_text
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ScenarioError, at_fault
 from ppafo.parameters import ParameterSet
@@ -23,7 +22,7 @@ from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME
 from ppafo.walking.building import build_walk
 from ppafo.walking.declaration import OF_A_WALK, walk_file
 from ppafo.walking.motion import walk_of
-from ppafo.wording import one_line
+from ppafo.wording import argument_text, one_line
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 WALKING = Layout(FILE, OF_A_WALK, walk_file, walk_file, build_walk)

@@ -9,9 +9,9 @@ import pytest
 
 import ppafo
 from ppafo.arguments import Count, Fraction, Mass, Overrides, Threads, Word, checked
-from ppafo.arguments.door import argument_text
 from ppafo.cli.main import main
 from ppafo.errors import ArgumentError, StudyError, at_fault
+from ppafo.wording import argument_text
 
 TASK = "torque-task-proportional"
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.arguments.door import read_by
 from ppafo.cli.main import main
 from ppafo.documents.toml_text import table_lines
 from ppafo.loading import load_scenario, reloaded, usage_text
 from ppafo.running import tried
 from ppafo.simulation.simulate import simulate
+from ppafo.wording import read_by
 
 RAMP = [
     "reference.kind=ramp_hold",

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from ppafo.analyses.compare.answer import ComparisonResult, ConfigurationResult, TaskComparison, front_of, remarks_of
 from ppafo.analyses.compare.pairs import COMPARED, PairedMetric, best_probabilities, compare_pairs
-from ppafo.arguments.door import argument_text
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
@@ -24,7 +23,7 @@ from ppafo.studies.sampling import NOISE, with_new_noise
 from ppafo.studies.study import Configuration, Study, with_overrides
 from ppafo.studies.varying import value_at, varied_path
 from ppafo.study.runs import Rows, RunCounter, failures_of, scenario_runs, unvaried
-from ppafo.wording import first_twice, nearest_name
+from ppafo.wording import argument_text, first_twice, nearest_name
 
 AS_WRITTEN = "as written"
 """Name of the task of configurations that run as written."""

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import FileOrName, Length, Mass, Minutes, Pressure, Threads, Torque, Word, checked
-from ppafo.arguments.door import argument_text
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
 from ppafo.units.shown import shown_in
+from ppafo.wording import argument_text
 
 if TYPE_CHECKING:
     from ppafo.analyses.design.profile.answer import Sizing

@@ -71,7 +71,6 @@ def bottle(
         follow_bottle,
         named_gas_uses,
     )
-    from ppafo.arguments.door import argument_text
     from ppafo.arguments.reading import units_given
     from ppafo.errors import ParameterError
     from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
@@ -79,6 +78,7 @@ def bottle(
     from ppafo.units.shown import shown_in, units_in_force
     from ppafo.walking import WalkResult
     from ppafo.walking.bottle.coupling import Schedule
+    from ppafo.wording import argument_text
 
     gas_uses = (recordings,) if isinstance(recordings, str | Path | Recording | WalkResult) else tuple(recordings)
     if bool(gas_uses) == (gas_per_stride is not None):

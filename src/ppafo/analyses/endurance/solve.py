@@ -10,7 +10,6 @@ from ppafo.analyses.endurance.discharge import check_schedule, discharge, discha
 from ppafo.analyses.endurance.gas_demand import GasDemand, demand_of_recording
 from ppafo.analyses.endurance.walk_gas import WALK_FILE, WalkGas, demand_of_walk, read_walk_gas, walk_gas
 from ppafo.arguments import checked
-from ppafo.arguments.door import argument_text
 from ppafo.errors import DataError, ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
 from ppafo.report.kind import Kind
@@ -25,6 +24,7 @@ from ppafo.walking.bottle.supply import is_of_bottle
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import bottle_life
+from ppafo.wording import argument_text
 
 BETWEEN_RESTS = 600.0
 """Default walking time between two rests [s]."""

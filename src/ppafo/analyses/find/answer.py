@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.analyses.find.solve import FindResult
-from ppafo.arguments.door import override_text
 from ppafo.metrics.tracking import ONE_INSTANT
 from ppafo.report.display_units import metric_words
 from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import Kind, of_metric, of_path
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, GREEN, GREY, VERMILION
+from ppafo.wording import override_text
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,6 @@ from ppafo.analyses.linearise.plant import (
     valve_states,
     without_slew_limit,
 )
-from ppafo.arguments.door import argument_text
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.continuous_time import mode_at_rest, torque_at_rest
 from ppafo.engine.in_python import in_program
@@ -34,6 +33,7 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Scenario
+from ppafo.wording import argument_text
 
 STEADY = 1.0e-9
 """Largest time derivative divided by the size of the state [1/s] that counts as zero."""

@@ -19,7 +19,6 @@ from ppafo.analyses.linearise.plant import (
     valve_at,
 )
 from ppafo.analyses.linearise.point import Point, equilibrium, point_at
-from ppafo.arguments.door import argument_text
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError, UnitError, refused_as
@@ -29,6 +28,7 @@ from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import parse_quantity
+from ppafo.wording import argument_text
 
 ON_THE_EDGE = 1.0e-6
 """Difference of the slopes on both sides, divided by the largest slope of the row, above which there is a kink.

@@ -26,10 +26,10 @@ from ppafo.analyses.reproduce.result import (
     result_on_u,
 )
 from ppafo.analyses.reproduce.step_response import SupplyLevels
-from ppafo.arguments.door import override_text
 from ppafo.identification.bench.result import figure_3
 from ppafo.report.finding import Cell, Finding, Section, columns_of
 from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.wording import override_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing

@@ -11,7 +11,6 @@ import numpy as np
 
 from ppafo.analyses.reproduce.claim import Verdict
 from ppafo.analyses.reproduce.event_times import WEARERS, event_error, uneven_task_sequence
-from ppafo.arguments.door import argument_text
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.toml_text import label
 from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
@@ -24,7 +23,7 @@ from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult, integral_of_a_stride
 from ppafo.walking.walk import healthy_metrics, walk
-from ppafo.wording import nearest_name
+from ppafo.wording import argument_text, nearest_name
 
 DEVICE = "ppafo2011"
 MINUTES = 0.5

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.analyses.sensitivity.methods import EvaluatedBlocks, Indices, Method, changes
-from ppafo.arguments.door import argument_text
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.simulation.gains import remark_on_following_gains
@@ -22,6 +21,7 @@ from ppafo.studies.draws import Uncertainty
 from ppafo.studies.limits import CONFIDENCE, check_fraction
 from ppafo.studies.sampling import NOISE
 from ppafo.study.runs import Runs, tracking_violation
+from ppafo.wording import argument_text
 
 _ENDS = (0.05, 0.95)
 """Quantile fractions of a value between which the change of a metric is taken."""

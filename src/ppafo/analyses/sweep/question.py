@@ -65,10 +65,10 @@ def sweep_into_folder(
     """
     from dataclasses import replace
 
-    from ppafo.arguments.door import argument_text
     from ppafo.errors import StudyError
     from ppafo.report.drawing import load_drawing
     from ppafo.studies.draws import study_of
+    from ppafo.wording import argument_text
 
     # Before anything else imports Matplotlib, so that it comes without what it does for others.
     load_drawing()

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import Any
 
-from ppafo.arguments.door import argument_text
 from ppafo.parameters.device import Device
 from ppafo.report.display_units import display_value
 from ppafo.report.kind import Kind
@@ -14,6 +13,7 @@ from ppafo.validation.causes import Diagnosis, ResidualCause
 from ppafo.validation.compared import COMPARED
 from ppafo.validation.settings import ReplaySettings
 from ppafo.version import __version__
+from ppafo.wording import argument_text
 
 _EXPLAINS = 0.5
 """Ratio of the residual with the nearest cause to the residual without any, up to which this cause is named."""

@@ -17,7 +17,6 @@ from ppafo.analyses.walk.task_sequence import (
     task_sequence_pictures,
     trust_remark,
 )
-from ppafo.arguments.door import argument_text
 from ppafo.control.walking.assistance import PEAKS
 from ppafo.documents.json_text import plain
 from ppafo.loading import reloaded, usage_text
@@ -46,6 +45,7 @@ from ppafo.walking.result import WALK_FORMAT, WalkResult
 from ppafo.walking.safety_events import event_lines, failure_times
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import WalkComparison
+from ppafo.wording import argument_text
 
 _OVER_TIME = (
     "Gas, toes and phases over the whole walk. The strip at the bottom shows where the controller helps, only lifts "

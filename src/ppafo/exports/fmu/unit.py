@@ -7,7 +7,6 @@ import zipfile
 from collections.abc import Sequence
 from importlib.resources import files
 
-from ppafo.arguments.door import argument_text
 from ppafo.errors import ScenarioError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library.files import library_files
@@ -17,7 +16,7 @@ from ppafo.exports.fmu.platforms import FLAGS, PLATFORMS, build, host_platform
 from ppafo.exports.fmu.trial import check_unit
 from ppafo.exports.fmu.variables import tuning_of, variability_of
 from ppafo.version import __version__
-from ppafo.wording import nearest_name
+from ppafo.wording import argument_text, nearest_name
 
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 """Earliest date of a zip entry, so that a unit does not depend on its date of creation."""

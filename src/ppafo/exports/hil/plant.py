@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-from ppafo.arguments.door import argument_text
 from ppafo.engine.lanes import RunnableProgram, load_program
 from ppafo.engine.loading import backend_described
 from ppafo.engine.run import Run, batch_of
@@ -13,6 +12,7 @@ from ppafo.model.controlled import TORQUE
 from ppafo.parameters.plant import venting_valve
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario, with_control
+from ppafo.wording import argument_text
 
 CHANNELS_SENT = 5
 

@@ -9,10 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, final
 
-from ppafo.arguments.door import argument_text
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.wire import Reader
-from ppafo.wording import one_line, reason
+from ppafo.wording import argument_text, one_line, reason
 
 try:
     from termios import error as TerminalError  # noqa: N812 - an exception, by a name in lower case

@@ -13,13 +13,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from ppafo.arguments.door import argument_text
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, make_schema, read_model
 from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import DataError, UnitError, raise_noted, refused_as
 from ppafo.gait.recorded.table import LONGEST_FILLED
 from ppafo.units import parse_quantity
+from ppafo.wording import argument_text
 
 _FILE = TomlKind("gait map", "gait-map", resources.files("ppafo.gait.recorded"), DataError)
 _Terms = Annotated[

@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.arguments.door import argument_text
 from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
+from ppafo.wording import argument_text
 
 STRIKE, OFF = "foot strike", "foot off"
 """Kinds of events: heel strike and toe-off."""

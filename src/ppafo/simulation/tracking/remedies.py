@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from ppafo.arguments.door import override_text
 from ppafo.control import angle_loop, torque_loop
 from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import ANGLE, CONTROLLED
@@ -16,6 +15,7 @@ from ppafo.simulation.gains import terms_of
 from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chambers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import LARGEST_SHARE, SettledPart
+from ppafo.wording import override_text
 
 FASTEST_FIRST = (
     torque_loop.PROPORTIONAL_GAIN,

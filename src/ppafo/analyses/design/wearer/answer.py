@@ -15,7 +15,6 @@ from ppafo.analyses.design.wearer.requirements import (
     WearerSizing,
 )
 from ppafo.analyses.parts.sections import part_titles, parts_to_check
-from ppafo.arguments.door import argument_text
 from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
 from ppafo.report.kind import Kind
@@ -25,6 +24,7 @@ from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import who_walks
+from ppafo.wording import argument_text
 
 _HEAD = (
     "valve",

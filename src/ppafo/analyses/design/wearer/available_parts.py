@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ppafo.analyses.design.wearer.requirements import WALKS
-from ppafo.arguments.door import argument_text
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part, load_catalogue
+from ppafo.wording import argument_text
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,6 @@ from typing import Any
 from ppafo.analyses.design.wearer.electrical import Electrical
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.parts.sections import doubts_data
-from ppafo.arguments.door import argument_text
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
@@ -21,6 +20,7 @@ from ppafo.version import __version__
 from ppafo.walking.motion import LONGEST_MINUTES
 from ppafo.walking.result import WalkResult
 from ppafo.walking.wearer import STATURES, WEARER
+from ppafo.wording import argument_text
 
 WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regulators"}
 """Walk, with its controller, for each kind of valve."""

@@ -27,7 +27,6 @@ from ppafo.analyses.design.wearer.requirements import (
 )
 from ppafo.analyses.design.wearer.strides import SHUT_OFF_PARTS, few_strides, of_wearer
 from ppafo.analyses.endurance.solve import endurance_of_walk
-from ppafo.arguments.door import argument_text
 from ppafo.parameters.bottles.bottle import bottle_part
 from ppafo.parameters.parts import Part
 from ppafo.parameters.parts.catalogue import DEFAULT, rated_pressure
@@ -35,6 +34,7 @@ from ppafo.progress import Progress, Report
 from ppafo.walking.loading import load_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import healthy_metrics
+from ppafo.wording import argument_text
 
 _REGULATORS = ("pipeline-jacpac-regulator", "festo-lrma-qs-4")
 """Regulators of plantarflexion and dorsiflexion, unless the user's catalogue has others."""
