@@ -33,14 +33,14 @@ _SUFFIX, _PACKAGE = ".py", "__init__.py"
 
 
 @dataclass(frozen=True, slots=True)
-class Plugin:
+class _Plugin:
     """User module by name, with the folder that contains it; without a folder the usual search path is used."""
 
     module: str
     folder: str = ""
 
 
-_named: dict[str, Plugin] = {}
+_named: dict[str, _Plugin] = {}
 
 
 def name_plugins(plugins: Plugins | str | Path) -> None:
@@ -56,7 +56,7 @@ def name_modules_in(text: str) -> None:
         add_plugin(_of_module(module))
 
 
-def add_plugin(plugin: Plugin) -> None:
+def add_plugin(plugin: _Plugin) -> None:
     """Allow a module with a known folder; KindError if another folder has a module of the same name."""
     earlier = {item.module: item for item in named_plugins()}.get(plugin.module)
     if earlier is not None and earlier.folder and plugin.folder and earlier.folder != plugin.folder:
@@ -66,15 +66,15 @@ def add_plugin(plugin: Plugin) -> None:
     os.environ[VARIABLE] = os.pathsep.join(f"{item.module}={item.folder}" for item in _named.values())
 
 
-def named_plugins() -> tuple[Plugin, ...]:
+def named_plugins() -> tuple[_Plugin, ...]:
     """Return the modules named so far, in this process or in its parent process."""
     for text in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
         module, _, folder = text.partition("=")
-        _named.setdefault(module, Plugin(module, folder))
+        _named.setdefault(module, _Plugin(module, folder))
     return tuple(_named.values())
 
 
-def _found(plugin: str | Path) -> tuple[Plugin, ...]:
+def _found(plugin: str | Path) -> tuple[_Plugin, ...]:
     """Return the module of a path or name, under each of its names; KindError if there is none."""
     text = str(plugin)
     path = Path(text).absolute()
@@ -85,7 +85,7 @@ def _found(plugin: str | Path) -> tuple[Plugin, ...]:
         # From here it has the names of its folders before its own, though none of them says that it is a package.
         dotted = ".".join(Path(text).with_suffix("").parts)
         is_another = dotted != found.module and _MODULE.fullmatch(dotted) is not None
-        return (found, Plugin(dotted, str(Path.cwd()))) if is_another else (found,)
+        return (found, _Plugin(dotted, str(Path.cwd()))) if is_another else (found,)
     module = text.partition(":")[0]
     if path.suffix == _SUFFIX or not _MODULE.fullmatch(module):
         raise KindError(f"plugin '{one_line(text)}': there is no such file; give a .py file, or the name of a module")
@@ -95,21 +95,21 @@ def _found(plugin: str | Path) -> tuple[Plugin, ...]:
     return (named,)
 
 
-def _of_path(path: Path) -> Plugin:
+def _of_path(path: Path) -> _Plugin:
     """Return the module of a file, with the names of its enclosing packages."""
     parts, folder = [path.stem], path.parent
     while (folder / _PACKAGE).is_file():
         parts.insert(0, folder.name)
         folder = folder.parent
-    return Plugin(".".join(parts), str(folder))
+    return _Plugin(".".join(parts), str(folder))
 
 
-def _of_module(module: str) -> Plugin:
+def _of_module(module: str) -> _Plugin:
     """Return the module of a name: from the working folder only if nothing installed has the same name."""
     top, here = module.partition(".")[0], str(Path.cwd())
     if _is_installed(top) or importlib.machinery.PathFinder.find_spec(top, [here]) is None:
-        return Plugin(module)
-    return Plugin(module, here)
+        return _Plugin(module)
+    return _Plugin(module, here)
 
 
 def _is_installed(top: str) -> bool:

@@ -132,7 +132,7 @@ class TabulatedProfile(NamedTuple):
     knots: Annotated[tuple[Knot, ...], KNOTS - 1]
 
 
-class ProfileSegment(NamedTuple):
+class _ProfileSegment(NamedTuple):
     """Line segment between two knots: start and end times [s], and values at start and end."""
 
     start: float
@@ -141,10 +141,10 @@ class ProfileSegment(NamedTuple):
     last: float
 
 
-def next_segment(segment: ProfileSegment, place: float, time: float, value: float) -> ProfileSegment:
+def next_segment(segment: _ProfileSegment, place: float, time: float, value: float) -> _ProfileSegment:
     """Return the segment, or the next one up to the knot at ``time`` [s] if ``place`` [s] is past the segment's end."""
     passed = place >= segment.end
-    return ProfileSegment(
+    return _ProfileSegment(
         start=segment.end if passed else segment.start,
         first=segment.last if passed else segment.first,
         end=time if passed else segment.end,
@@ -156,7 +156,7 @@ def table_value(profile: TabulatedProfile, time: float) -> tuple[float, float, f
     """Value, rate and second derivative (0 also at the corners) at a time [s] of 0 or later."""
     place = time - profile.period * float(int(time / profile.period))
     # Every knot is looked at: a search would branch, and 32 selects cost little in vector code.
-    segment = ProfileSegment(start=0.0, first=profile.value_01, end=profile.knots[0].time, last=profile.knots[0].value)
+    segment = _ProfileSegment(start=0.0, first=profile.value_01, end=profile.knots[0].time, last=profile.knots[0].value)
     for knot in profile.knots[1:]:
         segment = next_segment(segment, place, knot.time, knot.value)
     segment = next_segment(segment, place, profile.period, profile.value_01)
@@ -177,7 +177,7 @@ def table_bounds(profile: TabulatedProfile) -> tuple[float, float]:
     return profile.level + lowest, profile.level + highest
 
 
-class KnotWindow(NamedTuple):
+class _KnotWindow(NamedTuple):
     """Four consecutive knots, times [s] and values; the time of interest lies between ``start`` and ``end``."""
 
     earlier: Knot
@@ -186,11 +186,11 @@ class KnotWindow(NamedTuple):
     later: Knot
 
 
-def next_window(window: KnotWindow, place: float, knot: Knot) -> KnotWindow:
+def next_window(window: _KnotWindow, place: float, knot: Knot) -> _KnotWindow:
     """Return the window, shifted by one knot to include ``knot`` if ``place`` [s] is past the window's end."""
     passed = place >= window.end.time
     earlier, start, end, later = window.start, window.end, window.later, knot
-    return KnotWindow(
+    return _KnotWindow(
         earlier=Knot(
             earlier.time if passed else window.earlier.time, earlier.value if passed else window.earlier.value
         ),
@@ -214,7 +214,7 @@ def repeated_knot(profile: TabulatedProfile, before: Knot, knot: Knot) -> Knot:
     )
 
 
-def window_at(profile: TabulatedProfile, place: float) -> KnotWindow:
+def window_at(profile: TabulatedProfile, place: float) -> _KnotWindow:
     """Return the knots around a time [s] within one period; the time lies before the end of the window."""
     first = Knot(0.0, profile.value_01)
     second = repeated_knot(profile, first, profile.knots[0])
@@ -224,7 +224,7 @@ def window_at(profile: TabulatedProfile, place: float) -> KnotWindow:
     for knot in profile.knots:
         is_used = knot.time < profile.period
         time, value = (knot.time if is_used else time), (knot.value if is_used else value)
-    window = KnotWindow(earlier=Knot(time - profile.period, value), start=first, end=second, later=third)
+    window = _KnotWindow(earlier=Knot(time - profile.period, value), start=first, end=second, later=third)
     before = third
     for knot in profile.knots[2:]:
         found = repeated_knot(profile, before, knot)

@@ -49,7 +49,7 @@ class GasRates(NamedTuple):
     vented: float
 
 
-class TurningChambers(NamedTuple):
+class _TurningChambers(NamedTuple):
     """Both chambers, and rates of volume change due to the rotation [m^3/s]."""
 
     now: Chambers
@@ -65,12 +65,12 @@ def turning_chambers(
     pressure_2: float,
     *,
     parts: ActuatorFunctions,
-) -> TurningChambers:
+) -> _TurningChambers:
     """Both chambers at an angle [rad], angular velocity [rad/s] and absolute pressures [Pa]. Equations (4), (5)."""
     less = parts.chambers(plant, angle - NEAR, pressure_1, pressure_2)
     more = parts.chambers(plant, angle + NEAR, pressure_1, pressure_2)
     per_angle = angular_velocity / (2.0 * NEAR)
-    return TurningChambers(
+    return _TurningChambers(
         now=parts.chambers(plant, angle, pressure_1, pressure_2),
         growth_1=(more.volume_1 - less.volume_1) * per_angle,
         growth_2=(more.volume_2 - less.volume_2) * per_angle,
@@ -85,7 +85,7 @@ def flows_at(plant: PlantParameters, openings: Openings, pressure_1: float, pres
 
 
 def isothermal_rates(
-    plant: PlantParameters, openings: Openings, at: TurningChambers, pressure_1: float, pressure_2: float
+    plant: PlantParameters, openings: Openings, at: _TurningChambers, pressure_1: float, pressure_2: float
 ) -> GasRates:
     """Rates of isothermal gas, ideal or real, at absolute pressures [Pa]. Equations (3), (9)."""
     in_1, in_2, leak = flows_at(plant, openings, pressure_1, pressure_2)
@@ -110,7 +110,7 @@ def thermal_rates(
     plant: PlantParameters,
     thermal: ThermalParameters,
     openings: Openings,
-    at: TurningChambers,
+    at: _TurningChambers,
     pressure_1: float,
     pressure_2: float,
     temperature_1: float,
@@ -158,7 +158,7 @@ def thermal_rates(
 
 
 def pressure_rates(
-    plant: PlantParameters, at: TurningChambers, pressure_1: float, pressure_2: float, gained_1: float, gained_2: float
+    plant: PlantParameters, at: _TurningChambers, pressure_1: float, pressure_2: float, gained_1: float, gained_2: float
 ) -> tuple[float, float]:
     """Rates of both pressures [Pa/s] from the rates of the contents [kg/s]: time derivative of equation (3).
 

@@ -37,7 +37,7 @@ OWN = "ppafo."
 """Prefix of module names whose functions may also be called through the module name."""
 
 
-class EffectRows(Protocol):
+class _EffectRows(Protocol):
     """Present parameters and states of effects, by name."""
 
     def __getitem__(self, name: str, /) -> Any:
@@ -53,7 +53,7 @@ class PythonFunctions:
     def __init__(
         self,
         replacements: Replacements,
-        rows: EffectRows,
+        rows: _EffectRows,
         operations: "Operations | None" = None,
     ) -> None:
         self._replacements, self._rows, self._operations = replacements, rows, operations
@@ -140,7 +140,7 @@ def _names_of(code: CodeType) -> frozenset[str]:
     return names.union(*(_names_of(constant) for constant in code.co_consts if isinstance(constant, CodeType)))
 
 
-def functions_of(program: Program, rows: EffectRows, operations: "Operations | None" = None) -> PythonFunctions:
+def functions_of(program: Program, rows: _EffectRows, operations: "Operations | None" = None) -> PythonFunctions:
     """Return the model functions as replaced in a program, with rows of its effects; ProgramError as for linking."""
     return PythonFunctions(_replacements_in(program), rows, operations)
 

@@ -194,7 +194,7 @@ def _assigned_names(target: ast.AST) -> set[str]:
 _ORIGIN = re.compile(rf"{re.escape(ORIGIN)} (?P<file>.*): (?P<lines>[\d ]+)$")
 
 
-class SourcePosition(NamedTuple):
+class _SourcePosition(NamedTuple):
     """Line of a user's file where a statement starts, and the line where the next statement starts."""
 
     file: str
@@ -202,7 +202,7 @@ class SourcePosition(NamedTuple):
     next_line: int
 
 
-def place_in(lines: list[str], number: int) -> SourcePosition | None:
+def place_in(lines: list[str], number: int) -> _SourcePosition | None:
     """Return the source position of line ``number`` of a generated text; None for lines without a source file."""
     for start in range(min(number, len(lines)) - 1, -1, -1):
         origin = _ORIGIN.match(lines[start])
@@ -215,5 +215,5 @@ def place_in(lines: list[str], number: int) -> SourcePosition | None:
         index = number - 1 - (start + 2)
         if not 0 <= index < len(at) - 1:
             return None
-        return SourcePosition(origin["file"], at[index], min(line for line in at if line > at[index]))
+        return _SourcePosition(origin["file"], at[index], min(line for line in at if line > at[index]))
     return None

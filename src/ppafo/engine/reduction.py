@@ -73,7 +73,7 @@ class Effects:
         return [*self.groups, *self.slots]
 
 
-class StepModule(Protocol):
+class _StepModule(Protocol):
     """Step functions of the module for which a function of the step is reduced."""
 
     @property
@@ -176,7 +176,7 @@ def _definitions(file: str) -> dict[int, ast.FunctionDef]:
 class Reduction:
     """Reduction of one function; ``known`` are names with known values, in addition to ``parts``."""
 
-    def __init__(self, module: StepModule, function: FunctionType, known: Mapping[str, Any]) -> None:
+    def __init__(self, module: _StepModule, function: FunctionType, known: Mapping[str, Any]) -> None:
         self.module, self.function = module, function
         self.definition = definition_of(function)
         self.scope: dict[str, Any] = function.__globals__

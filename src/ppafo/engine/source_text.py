@@ -30,7 +30,7 @@ class NameRead(NamedTuple):
     value: Any
 
 
-class ComposedFrom(NamedTuple):
+class _ComposedFrom(NamedTuple):
     """Function as it was at composition."""
 
     function: Any
@@ -44,7 +44,7 @@ class MadeFrom:
     """Names read and functions composed for a text, which determine whether the text is up to date."""
 
     reads: list[NameRead] = field(default_factory=list)
-    functions: list[ComposedFrom] = field(default_factory=list)
+    functions: list[_ComposedFrom] = field(default_factory=list)
 
     def is_current(self) -> bool:
         """Return whether all names and functions still have the values used at composition."""
@@ -154,7 +154,7 @@ class SourceCollector:
             problem = f"'{function.__name__}' calls itself, which cannot be compiled"
             raise refusal(function.__code__.co_filename, tree, problem)
         self.made_from.functions.append(
-            ComposedFrom(
+            _ComposedFrom(
                 function=function,
                 code=function.__code__,
                 defaults=function.__defaults__,

@@ -29,7 +29,7 @@ class Action(NamedTuple):
     other: float
 
 
-class ObservationFlag(NamedTuple):
+class _ObservationFlag(NamedTuple):
     """Flag of an environment: 1 if it is observed in this call, else 0."""
 
     is_observed: float
@@ -130,7 +130,7 @@ def tables_judged(program: Program, task: Task) -> dict[str, Mapping[str, Any]]:
         "states": program.state_rows(),
         "parameters": program.parameter_rows(),
         "own": OWN,
-        "chosen": {"asked": ObservationFlag},
+        "chosen": {"asked": _ObservationFlag},
         "observations": {"view": task.view},
         "outcomes": {"outcome": Outcome},
     }
@@ -159,7 +159,7 @@ class PythonKernel:
 def kernel_source(program: Program, task: Task) -> str:
     """Return the source of the module with ``command``, ``advance`` and ``judge``, each for a block of environments."""
     collector = SourceCollector(INLINE)
-    further = {**OWN, "action": Action, "asked": ObservationFlag, "view": task.view, "outcome": Outcome}
+    further = {**OWN, "action": Action, "asked": _ObservationFlag, "view": task.view, "outcome": Outcome}
     step = StepText(program, collector, further=further)
     loop = lane_loop(step, COMPILED, "advance", ARGUMENTS)
     begin = lane_entry(step, command, {"states": step.states, "actions": {"action": Action}}, {"task": task})

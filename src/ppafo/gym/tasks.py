@@ -54,7 +54,7 @@ class Sensed(NamedTuple):
     torque: float
 
 
-class TorqueView(NamedTuple):
+class _TorqueView(NamedTuple):
     """Observation: sensors, requested torque [N m], its rate [N m/s], last command [-]."""
 
     sensed: Sensed
@@ -63,7 +63,7 @@ class TorqueView(NamedTuple):
     command: float
 
 
-class AngleView(NamedTuple):
+class _AngleView(NamedTuple):
     """Observation: sensors, requested angle [rad], last command [-]."""
 
     sensed: Sensed
@@ -71,7 +71,7 @@ class AngleView(NamedTuple):
     command: float
 
 
-class WalkView(NamedTuple):
+class _WalkView(NamedTuple):
     """Observation: sensors, forces of heel and toe [N], time since the heel was loaded [s], last command [-].
 
     The time is since the last heel strike in the heel sensor; a command is -1 to 1, or 2 for venting.
@@ -106,23 +106,23 @@ def sensed_of(seen: Measurement | GaitMeasurement) -> Sensed:
 
 def view_torque(
     seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
-) -> TorqueView:
+) -> _TorqueView:
     """Observation in the torque task."""
-    return TorqueView(sensed=sensed_of(seen), requested=wanted.torque, requested_rate=wanted.rate, command=command)
+    return _TorqueView(sensed=sensed_of(seen), requested=wanted.torque, requested_rate=wanted.rate, command=command)
 
 
 def view_angle(
     seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
-) -> AngleView:
+) -> _AngleView:
     """Observation in the angle task."""
-    return AngleView(sensed=sensed_of(seen), requested=goal.angle, command=command)
+    return _AngleView(sensed=sensed_of(seen), requested=goal.angle, command=command)
 
 
 def view_walk(
     seen: GaitMeasurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
-) -> WalkView:
+) -> _WalkView:
     """Observation at a time [s] of a walk."""
-    return WalkView(
+    return _WalkView(
         sensed=sensed_of(seen),
         heel_force=seen.heel_force,
         toe_force=seen.toe_force,
@@ -216,9 +216,9 @@ class Task:
 TASKS = {
     task.name: task
     for task in (
-        Task("torque", TorqueView, view_torque, torque_error, remember, "N m", 1.0, 1.0),
-        Task("angle", AngleView, view_angle, angle_error, remember, "rad", 10.0, 1.0),
-        Task("walk", WalkView, view_walk, stride_error, remember_strike, "N m", 1.0, 1.0, valve_or_vent, 2),
+        Task("torque", _TorqueView, view_torque, torque_error, remember, "N m", 1.0, 1.0),
+        Task("angle", _AngleView, view_angle, angle_error, remember, "rad", 10.0, 1.0),
+        Task("walk", _WalkView, view_walk, stride_error, remember_strike, "N m", 1.0, 1.0, valve_or_vent, 2),
     )
 }
 """Tasks by name."""

@@ -126,7 +126,7 @@ HEADROOM = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EnvironmentSettings:
+class _EnvironmentSettings:
     """Settings of an environment besides its task, explained in ``PneumaticEnv``."""
 
     scenario: str | Path | None = None
@@ -157,18 +157,18 @@ class EnvironmentSettings:
             raise ScenarioError(f"frame_skip = {self.frame_skip!r}: must be a whole number of at least 1")
 
 
-def settings_of(arguments: Mapping[str, Any]) -> EnvironmentSettings:
+def settings_of(arguments: Mapping[str, Any]) -> _EnvironmentSettings:
     """Return settings by name; ScenarioError for an unknown name."""
-    names = [field.name for field in fields(EnvironmentSettings)]
+    names = [field.name for field in fields(_EnvironmentSettings)]
     for name in arguments:
         if name not in names:
             hint = nearest_name(name, names)
             raise ScenarioError(f"an environment has no argument '{name}'{hint}; available: {', '.join(names)}")
-    return EnvironmentSettings(**arguments)
+    return _EnvironmentSettings(**arguments)
 
 
 def episodes_of(
-    task: str, file: str | Path, overrides: Sequence[str], varied: Ranges, settings: EnvironmentSettings
+    task: str, file: str | Path, overrides: Sequence[str], varied: Ranges, settings: _EnvironmentSettings
 ) -> ScenarioEpisodes | _WalkEpisodes:
     """Return the episodes of a task in a scenario or walk; ScenarioError for a scenario that does not suit the task."""
     duration = settings.duration
@@ -193,7 +193,7 @@ def episodes_of(
 class World:
     """Common basis of single and vector environments: episodes, spaces, and creation of environments."""
 
-    def __init__(self, task: str, settings: EnvironmentSettings) -> None:
+    def __init__(self, task: str, settings: _EnvironmentSettings) -> None:
         self.settings = settings
         self.task = TASKS[task]
         default_file, flaws = DEFAULTS[task]
@@ -219,7 +219,7 @@ class World:
         if self.is_continuous:
             self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.task.actions,), np.float32)
 
-    def __reduce__(self) -> "tuple[type[World], tuple[str, EnvironmentSettings]]":
+    def __reduce__(self) -> "tuple[type[World], tuple[str, _EnvironmentSettings]]":
         """Pickle task and settings only; programs and their compiled code are rebuilt."""
         return World, (self.task.name, self.settings)
 

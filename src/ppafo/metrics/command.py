@@ -70,7 +70,7 @@ def peak_torque(recording: Recording) -> float:
     return float(np.max(np.abs(recording["torque"])))
 
 
-class RequestedTorqueSums(NamedTuple):
+class _RequestedTorqueSums(NamedTuple):
     """Sums over the samples with a requested torque in a walk, and the number of these samples.
 
     ``squares`` are squared torque errors, ``requested`` squared requested torques [N^2 m^2].
@@ -86,24 +86,24 @@ def is_torque_requested(command: float, task: float) -> bool:
     return command <= VENTS_ABOVE and task != MID_STANCE
 
 
-def start_requested_torque(_course: ReferenceSummary, _sample: Sample) -> RequestedTorqueSums:
+def start_requested_torque(_course: ReferenceSummary, _sample: Sample) -> _RequestedTorqueSums:
     """Zero sums at the start of a walk."""
-    return RequestedTorqueSums(0.0, 0.0, 0.0)
+    return _RequestedTorqueSums(0.0, 0.0, 0.0)
 
 
 def update_requested_torque(
-    state: RequestedTorqueSums, _course: ReferenceSummary, sample: Sample
-) -> RequestedTorqueSums:
+    state: _RequestedTorqueSums, _course: ReferenceSummary, sample: Sample
+) -> _RequestedTorqueSums:
     """Add a sample to the sums if a torque is requested."""
     error, counts = sample.reference - sample.torque, is_torque_requested(sample.command, sample.stride.phase)
-    return RequestedTorqueSums(
+    return _RequestedTorqueSums(
         state.squares + (error * error if counts else 0.0),
         state.requested + (sample.reference * sample.reference if counts else 0.0),
         state.samples + (1.0 if counts else 0.0),
     )
 
 
-ASKED = MeterKind("asked", RequestedTorqueSums, start_requested_torque, update_requested_torque)
+ASKED = MeterKind("asked", _RequestedTorqueSums, start_requested_torque, update_requested_torque)
 
 
 def requested_samples(recording: Recording) -> Masks:

@@ -67,19 +67,19 @@ def gas_per_work(recording: Recording) -> float | None:
     return gained(recording, ("supplied_mass",), gas_taken) / work if work > 0.0 else None
 
 
-class GasGains(NamedTuple):
+class _GasGains(NamedTuple):
     """Gas at the first sample [kg], and increases of masses and totals from the first to the last sample [kg]."""
 
     first: GasSample
     gained: GasSample
 
 
-def start_gas(course: ReferenceSummary, sample: Sample) -> GasGains:
+def start_gas(course: ReferenceSummary, sample: Sample) -> _GasGains:
     """Zero increases at the first sample."""
-    return GasGains(sample.gas, NO_GAS)
+    return _GasGains(sample.gas, NO_GAS)
 
 
-def update_gas(state: GasGains, course: ReferenceSummary, sample: Sample) -> GasGains:
+def update_gas(state: _GasGains, course: ReferenceSummary, sample: Sample) -> _GasGains:
     """Increases after one more sample."""
     # A run may go on after its last sample, to the end of a step: what passes there is in no recording.
     gained = GasSample(
@@ -89,25 +89,25 @@ def update_gas(state: GasGains, course: ReferenceSummary, sample: Sample) -> Gas
         mass_1=sample.gas.mass_1 - state.first.mass_1,
         mass_2=sample.gas.mass_2 - state.first.mass_2,
     )
-    return GasGains(state.first, gained)
+    return _GasGains(state.first, gained)
 
 
-GAS = MeterKind("gas", GasGains, start_gas, update_gas)
+GAS = MeterKind("gas", _GasGains, start_gas, update_gas)
 
 
-class EnergyGains(NamedTuple):
+class _EnergyGains(NamedTuple):
     """Energies of the gas at the first sample [J], and their increases from the first to the last sample [J]."""
 
     first: EnergySample
     gained: EnergySample
 
 
-def start_energy(course: ReferenceSummary, sample: Sample) -> EnergyGains:
+def start_energy(course: ReferenceSummary, sample: Sample) -> _EnergyGains:
     """Zero increases at the first sample."""
-    return EnergyGains(sample.energy, NO_ENERGY)
+    return _EnergyGains(sample.energy, NO_ENERGY)
 
 
-def update_energy(state: EnergyGains, course: ReferenceSummary, sample: Sample) -> EnergyGains:
+def update_energy(state: _EnergyGains, course: ReferenceSummary, sample: Sample) -> _EnergyGains:
     """Increases after one more sample."""
     gained = EnergySample(
         gas_energy=sample.energy.gas_energy - state.first.gas_energy,
@@ -116,10 +116,10 @@ def update_energy(state: EnergyGains, course: ReferenceSummary, sample: Sample) 
         wall_heat=sample.energy.wall_heat - state.first.wall_heat,
         gas_work=sample.energy.gas_work - state.first.gas_work,
     )
-    return EnergyGains(state.first, gained)
+    return _EnergyGains(state.first, gained)
 
 
-ENERGY = MeterKind("energy", EnergyGains, start_energy, update_energy)
+ENERGY = MeterKind("energy", _EnergyGains, start_energy, update_energy)
 
 
 class Peaks(NamedTuple):

@@ -92,7 +92,7 @@ def toe_clearance_error(recording: Recording) -> float:
     return float(np.min(recording["toe_difference"]))
 
 
-class FootError(NamedTuple):
+class _FootError(NamedTuple):
     """Squared foot angle error at the last sample [rad^2], its trapezoidal sum [rad^2], lowest toe difference [m]."""
 
     last: float
@@ -100,20 +100,20 @@ class FootError(NamedTuple):
     lowest: float
 
 
-def start_foot_error(course: ReferenceSummary, sample: Sample) -> FootError:
+def start_foot_error(course: ReferenceSummary, sample: Sample) -> _FootError:
     """Foot error of the first sample."""
     error = sample.foot.angle - sample.foot.measured_angle
-    return FootError(error * error, 0.0, sample.foot.toe_difference)
+    return _FootError(error * error, 0.0, sample.foot.toe_difference)
 
 
-def update_foot_error(state: FootError, course: ReferenceSummary, sample: Sample) -> FootError:
+def update_foot_error(state: _FootError, course: ReferenceSummary, sample: Sample) -> _FootError:
     """Foot error after one more interval."""
     error = sample.foot.angle - sample.foot.measured_angle
     square = error * error
-    return FootError(square, state.total + 0.5 * (state.last + square), min(state.lowest, sample.foot.toe_difference))
+    return _FootError(square, state.total + 0.5 * (state.last + square), min(state.lowest, sample.foot.toe_difference))
 
 
-FOOT_ERROR = MeterKind("foot_error", FootError, start_foot_error, update_foot_error)
+FOOT_ERROR = MeterKind("foot_error", _FootError, start_foot_error, update_foot_error)
 
 
 # The interval is the same between all samples, so that it cancels in a mean over time.

@@ -19,7 +19,7 @@ SHORTEST_HOLD = 0.1
 """Shortest hold that is judged as a hold, as a fraction of the run [-]."""
 
 
-class SettledSums(NamedTuple):
+class _SettledSums(NamedTuple):
     """Sums over the samples of the settled part so far, and extremes of the controlled quantity over the run.
 
     ``squares`` is the sum of squared errors, ``total`` the sum of errors, ``taken`` the number of samples,
@@ -51,11 +51,11 @@ class SettledSums(NamedTuple):
     bottom: float
 
 
-def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
+def start_settled(course: ReferenceSummary, sample: Sample) -> _SettledSums:
     """Sums with the first sample only."""
     value = sample.value
     error = value - sample.reference
-    return SettledSums(
+    return _SettledSums(
         squares=error * error,
         total=error,
         taken=1.0,
@@ -77,7 +77,7 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
     )
 
 
-def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample) -> SettledSums:
+def update_settled(state: _SettledSums, course: ReferenceSummary, sample: Sample) -> _SettledSums:
     """Sums with one more sample; they restart at half of the run and at half of the hold.
 
     Reversals of the command restart at three quarters, too: a loop that has come to rest by then does not oscillate.
@@ -102,7 +102,7 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
     command = update_reversals(state.command, course, sample)
     met_upwards = 1.0 if state.met_upwards > 0.0 or error <= 0.0 else 0.0
     met_downwards = 1.0 if state.met_downwards > 0.0 or error >= 0.0 else 0.0
-    return SettledSums(
+    return _SettledSums(
         squares=error * error + (0.0 if anew else state.squares),
         total=error + (0.0 if anew else state.total),
         taken=1.0 if anew else state.taken + 1.0,
@@ -132,7 +132,7 @@ def is_long_enough(hold_start: float, samples: float) -> bool:
     return length >= 1.0 and length >= SHORTEST_HOLD * (samples - 1.0)
 
 
-SETTLED = MeterKind("settled", SettledSums, start_settled, update_settled, True)
+SETTLED = MeterKind("settled", _SettledSums, start_settled, update_settled, True)
 
 
 def farther(highest: Floats, lowest: Floats) -> Floats:

@@ -41,7 +41,7 @@ PER_STRIDE: dict[str, _StrideQuantity] = {
 }
 
 
-class StrideTotals(NamedTuple):
+class _StrideTotals(NamedTuple):
     """Gas from the supply [kg], works of T_ex [J], toe clearances [m] and number of toe landings, since some instant.
 
     Fields have the names of ``PER_STRIDE``.
@@ -54,7 +54,7 @@ class StrideTotals(NamedTuple):
     toe_landing: float
 
 
-class CurrentStride(NamedTuple):
+class _CurrentStride(NamedTuple):
     """Stride in progress.
 
     ``is_whole`` is 1 for a stride that started with a heel strike; the first one of a walk did not. ``on_toes`` is 1
@@ -65,13 +65,13 @@ class CurrentStride(NamedTuple):
 
     is_whole: float
     on_toes: float
-    at_strike: StrideTotals
+    at_strike: _StrideTotals
     lacked_help: float
     squared_errors: float
     push_off_samples: float
 
 
-class EndedStrides(NamedTuple):
+class _EndedStrides(NamedTuple):
     """Numbers of completed strides.
 
     ``whole`` counts all but a partial first one, ``helped`` those with assistance throughout, and ``averaged`` the
@@ -83,7 +83,7 @@ class EndedStrides(NamedTuple):
     whole: float
     helped: float
     averaged: float
-    sums: StrideTotals
+    sums: _StrideTotals
     squared_errors: float
     push_off_samples: float
 
@@ -97,14 +97,14 @@ class StrideMeter(NamedTuple):
     strikes: float
     first_gas: float
     gas: float
-    current: CurrentStride
-    ended: EndedStrides
+    current: _CurrentStride
+    ended: _EndedStrides
     safe_time: float
 
 
-def totals_at(sample: StrideSample) -> StrideTotals:
+def totals_at(sample: StrideSample) -> _StrideTotals:
     """Totals since the start of the walk at a sample."""
-    return StrideTotals(
+    return _StrideTotals(
         gas=sample.supplied_mass,
         positive_push_off_work=sample.positive_push_off_work,
         net_push_off_work=sample.net_push_off_work,
@@ -113,14 +113,16 @@ def totals_at(sample: StrideSample) -> StrideTotals:
     )
 
 
-def sums_with_stride(sums: StrideTotals, at_strike: StrideTotals, at_end: StrideTotals, on_toes: float) -> StrideTotals:
+def sums_with_stride(
+    sums: _StrideTotals, at_strike: _StrideTotals, at_end: _StrideTotals, on_toes: float
+) -> _StrideTotals:
     """Sums over strides including one more, given the totals at its start and its end.
 
     ``on_toes`` is 1 if the stride started on the toes: that landing belongs to this stride, the one at its end to the
     next.
     """
     # Field by field: compiled code has no loop over a row.
-    return StrideTotals(
+    return _StrideTotals(
         gas=sums.gas + (at_end.gas - at_strike.gas),
         positive_push_off_work=sums.positive_push_off_work
         + (at_end.positive_push_off_work - at_strike.positive_push_off_work),
@@ -130,9 +132,9 @@ def sums_with_stride(sums: StrideTotals, at_strike: StrideTotals, at_end: Stride
     )
 
 
-def begun_stride(sample: StrideSample, is_whole: float, on_toes: float) -> CurrentStride:
+def begun_stride(sample: StrideSample, is_whole: float, on_toes: float) -> _CurrentStride:
     """Stride that starts at a sample, with empty sums."""
-    return CurrentStride(
+    return _CurrentStride(
         is_whole=is_whole,
         on_toes=on_toes,
         at_strike=totals_at(sample),
@@ -143,7 +145,7 @@ def begun_stride(sample: StrideSample, is_whole: float, on_toes: float) -> Curre
 
 
 def _start(_course: ReferenceSummary, sample: Sample) -> StrideMeter:
-    no_sums = StrideTotals(
+    no_sums = _StrideTotals(
         gas=0.0, positive_push_off_work=0.0, net_push_off_work=0.0, toe_clearance=0.0, toe_landing=0.0
     )
     return StrideMeter(
@@ -151,7 +153,9 @@ def _start(_course: ReferenceSummary, sample: Sample) -> StrideMeter:
         first_gas=sample.stride.supplied_mass,
         gas=sample.stride.supplied_mass,
         current=begun_stride(sample.stride, 0.0, 0.0),
-        ended=EndedStrides(whole=0.0, helped=0.0, averaged=0.0, sums=no_sums, squared_errors=0.0, push_off_samples=0.0),
+        ended=_EndedStrides(
+            whole=0.0, helped=0.0, averaged=0.0, sums=no_sums, squared_errors=0.0, push_off_samples=0.0
+        ),
         safe_time=sample.stride.time if sample.stride.level > HELPS else NOT_YET,
     )
 
@@ -172,7 +176,7 @@ def _update(strides: StrideMeter, _course: ReferenceSummary, sample: Sample) -> 
     )
 
 
-def stride_with_sample(stride: CurrentStride, sample: Sample) -> CurrentStride:
+def stride_with_sample(stride: _CurrentStride, sample: Sample) -> _CurrentStride:
     """Current stride after one more sample."""
     error = sample.reference - sample.torque
     pushes = sample.stride.phase == PUSH_OFF
@@ -183,14 +187,14 @@ def stride_with_sample(stride: CurrentStride, sample: Sample) -> CurrentStride:
     )
 
 
-def ended_with_stride(ended: EndedStrides, stride: CurrentStride, sample: Sample) -> EndedStrides:
+def ended_with_stride(ended: _EndedStrides, stride: _CurrentStride, sample: Sample) -> _EndedStrides:
     """Completed strides including the one that ends at ``sample``, the first sample after a heel strike."""
     # A stride with less help in a part of it is no example; in the first ones the controller still learns their time.
     is_helped = stride.is_whole > 0.5 and stride.lacked_help < 0.5
     is_averaged = is_helped and ended.whole >= float(SETTLING)
     at_end = totals_at(sample.stride)
     sums = sums_with_stride(ended.sums, stride.at_strike, at_end, stride.on_toes) if is_averaged else ended.sums
-    return EndedStrides(
+    return _EndedStrides(
         whole=ended.whole + stride.is_whole,
         helped=ended.helped + (1.0 if is_helped else 0.0),
         averaged=ended.averaged + (1.0 if is_averaged else 0.0),

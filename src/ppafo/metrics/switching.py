@@ -144,29 +144,29 @@ def count_of(turns: Floats) -> Floats:
     return truncated(larger(abs(turns) - 1.0, 0.0))
 
 
-class Oscillations(NamedTuple):
+class _Oscillations(NamedTuple):
     """Reversal state of the ramp, then of the hold; ``turns_on_ramp`` is the final ``turns`` of the ramp."""
 
     swing: Swing
     turns_on_ramp: float
 
 
-def start_oscillations(course: ReferenceSummary, sample: Sample) -> Oscillations:
+def start_oscillations(course: ReferenceSummary, sample: Sample) -> _Oscillations:
     """Zero reversals at the first sample."""
     value = sample.value
-    return Oscillations(Swing(value, UNDECIDED, value), UNDECIDED)
+    return _Oscillations(Swing(value, UNDECIDED, value), UNDECIDED)
 
 
-def update_oscillations(state: Oscillations, course: ReferenceSummary, sample: Sample) -> Oscillations:
+def update_oscillations(state: _Oscillations, course: ReferenceSummary, sample: Sample) -> _Oscillations:
     """State after one more sample; the first sample of the hold is also the last one of the ramp."""
     value = sample.value
     swing = next_swing(state.swing, value, OSCILLATION_THRESHOLD * course.largest)
     anew = course.hold_start == sample.number
     begun = Swing(value if anew else swing.play, UNDECIDED if anew else swing.turns, value if anew else swing.highest)
-    return Oscillations(begun, swing.turns if anew else state.turns_on_ramp)
+    return _Oscillations(begun, swing.turns if anew else state.turns_on_ramp)
 
 
-OSCILLATIONS = MeterKind("oscillations", Oscillations, start_oscillations, update_oscillations, True)
+OSCILLATIONS = MeterKind("oscillations", _Oscillations, start_oscillations, update_oscillations, True)
 
 
 def read_oscillations_ramp(readings: Readings) -> Floats:

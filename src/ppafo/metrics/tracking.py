@@ -57,7 +57,7 @@ def final_error(recording: Recording) -> float:
     return float(abs(error_of(recording)[-1]))
 
 
-class SquaredError(NamedTuple):
+class _SquaredError(NamedTuple):
     """Squared error at the last sample, and its trapezoidal sums before the hold and on the hold, in intervals."""
 
     last: float
@@ -65,13 +65,13 @@ class SquaredError(NamedTuple):
     on_hold: float
 
 
-def start_squared_error(course: ReferenceSummary, sample: Sample) -> SquaredError:
+def start_squared_error(course: ReferenceSummary, sample: Sample) -> _SquaredError:
     """Squared error of the first sample."""
     error = sample.reference - sample.value
-    return SquaredError(error * error, 0.0, 0.0)
+    return _SquaredError(error * error, 0.0, 0.0)
 
 
-def update_squared_error(state: SquaredError, course: ReferenceSummary, sample: Sample) -> SquaredError:
+def update_squared_error(state: _SquaredError, course: ReferenceSummary, sample: Sample) -> _SquaredError:
     """Sums including one more interval."""
     error = sample.reference - sample.value
     square = error * error
@@ -79,34 +79,34 @@ def update_squared_error(state: SquaredError, course: ReferenceSummary, sample: 
     piece = 0.5 * (state.last + square)
     # The reference did not rest yet at the sample before this one.
     is_before = course.hold_start >= sample.number
-    return SquaredError(
+    return _SquaredError(
         square, state.before_hold + (piece if is_before else 0.0), state.on_hold + (0.0 if is_before else piece)
     )
 
 
-SQUARED_ERROR = MeterKind("squared_error", SquaredError, start_squared_error, update_squared_error, True)
+SQUARED_ERROR = MeterKind("squared_error", _SquaredError, start_squared_error, update_squared_error, True)
 
 
-class AbsoluteError(NamedTuple):
+class _AbsoluteError(NamedTuple):
     """Largest absolute error so far, and absolute error at the last sample."""
 
     largest: float
     last: float
 
 
-def start_absolute_error(course: ReferenceSummary, sample: Sample) -> AbsoluteError:
+def start_absolute_error(course: ReferenceSummary, sample: Sample) -> _AbsoluteError:
     """Absolute error of the first sample."""
     error = abs(sample.reference - sample.value)
-    return AbsoluteError(error, error)
+    return _AbsoluteError(error, error)
 
 
-def update_absolute_error(state: AbsoluteError, course: ReferenceSummary, sample: Sample) -> AbsoluteError:
+def update_absolute_error(state: _AbsoluteError, course: ReferenceSummary, sample: Sample) -> _AbsoluteError:
     """Absolute errors including the next sample."""
     error = abs(sample.reference - sample.value)
-    return AbsoluteError(max(state.largest, error), error)
+    return _AbsoluteError(max(state.largest, error), error)
 
 
-ABSOLUTE_ERROR = MeterKind("absolute_error", AbsoluteError, start_absolute_error, update_absolute_error)
+ABSOLUTE_ERROR = MeterKind("absolute_error", _AbsoluteError, start_absolute_error, update_absolute_error)
 
 
 def read_rms_error(readings: Readings) -> Floats:

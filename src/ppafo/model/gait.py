@@ -340,7 +340,7 @@ class Kinematics(NamedTuple):
     acceleration: float
 
 
-class PhaseMotion(NamedTuple):
+class _PhaseMotion(NamedTuple):
     """Phase [turns], stride frequency [Hz], stride [-] and their time derivatives; load, tilt and scuff as in a part.
 
     ``slope`` of the ground [rad] with its derivatives.
@@ -400,7 +400,7 @@ def part_at(sequence: TimedSequence, time: float) -> SequencePart:
     return found
 
 
-def pace_in(part: SequencePart, time: float) -> PhaseMotion:
+def pace_in(part: SequencePart, time: float) -> _PhaseMotion:
     """Phase, stride frequency and stride amplitude at a time [s] within a part."""
     passed = time - part.start
     fraction = min(passed / part.length, 1.0)
@@ -408,7 +408,7 @@ def pace_in(part: SequencePart, time: float) -> PhaseMotion:
     square = fraction * fraction
     # Integral of the blend, x^4 (2.5 - 3 x + x^2): the phase is the integral of the cadence.
     integral = square * square * (2.5 + fraction * (fraction - 3.0))
-    return PhaseMotion(
+    return _PhaseMotion(
         turns=part.turns + part.frequency * passed + part.frequency_gain * part.length * integral,
         frequency=part.frequency + part.frequency_gain * shape.value,
         frequency_rate=part.frequency_gain * shape.rate / part.length,
@@ -426,7 +426,7 @@ def pace_in(part: SequencePart, time: float) -> PhaseMotion:
     )
 
 
-def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: PhaseMotion, standing: float) -> Kinematics:
+def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: _PhaseMotion, standing: float) -> Kinematics:
     """Angle [rad] between its value in standing and the gait's, weighted by the stride amplitude."""
     away = value_at(series, at) - standing
     rate = rate_at(series, at, pace.frequency)
@@ -439,7 +439,7 @@ def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: PhaseMotion, s
     )
 
 
-def tilt_of_shank(timing: GaitTiming, phase: float, pace: PhaseMotion) -> Kinematics:
+def tilt_of_shank(timing: GaitTiming, phase: float, pace: _PhaseMotion) -> Kinematics:
     """Forward lean of the shank for a strike with the toes: largest at the strike, zero at toe-off and standing."""
     standing = STANDS_AT * timing.heel_off
     # Counted from standing, the lean rises from toe-off to the strike and falls to standing without a wrap in between.

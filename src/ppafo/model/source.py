@@ -142,7 +142,7 @@ class BottleContent(NamedTuple):
     outflow_enthalpy: float
 
 
-class BottleRates(NamedTuple):
+class _BottleRates(NamedTuple):
     """Time derivatives of ``BottleState``, and power [W] over the boundary: outflow enthalpy and heat from the room."""
 
     mass_rate: float
@@ -241,12 +241,12 @@ def content_temperature(table: FluidTable, mass: float, volume: float, energy: f
 
 def bottle_rates(
     content: BottleContent, state: BottleState, draw: float, wall: BottleWall, room_temperature: float
-) -> BottleRates:
+) -> _BottleRates:
     """Rates of a bottle for an outflow of vapour [kg/s]: balances of mass, and of energy of content and wall."""
     to_content = wall.content_heat_transfer * (state.wall_temperature - content.temperature)
     from_room = wall.room_heat_transfer * (room_temperature - state.wall_temperature)
     outflow = draw * content.outflow_enthalpy
-    return BottleRates(
+    return _BottleRates(
         mass_rate=-draw,
         content_energy_rate=to_content - outflow,
         wall_temperature_rate=(from_room - to_content) / wall.wall_heat_capacity,

@@ -27,7 +27,7 @@ from ppafo.units import number_text, to_si
 from ppafo.wording import nearest_name, one_line, reason, said_missing
 
 
-class VolumeColumn(NamedTuple):
+class _VolumeColumn(NamedTuple):
     """Column of the file: SI unit, magnitude [SI] above which a number is rejected, and an example of a unit."""
 
     unit: str
@@ -36,10 +36,10 @@ class VolumeColumn(NamedTuple):
 
 
 COLUMNS = {
-    "angle": VolumeColumn("rad", 10.0, "deg"),
-    "pressure": VolumeColumn("Pa_a", 1.0e7, "kPa_g"),
-    "volume_1": VolumeColumn("m^3", 1.0, "mL"),
-    "volume_2": VolumeColumn("m^3", 1.0, "mL"),
+    "angle": _VolumeColumn("rad", 10.0, "deg"),
+    "pressure": _VolumeColumn("Pa_a", 1.0e7, "kPa_g"),
+    "volume_1": _VolumeColumn("m^3", 1.0, "mL"),
+    "volume_2": _VolumeColumn("m^3", 1.0, "mL"),
 }
 _NEEDED = ("angle", "pressure", "volume_1")
 _NEAREST_ANGLES = 0.01

@@ -91,7 +91,7 @@ class RigState(NamedTuple):
     sensor_pressure_2: float
 
 
-class Node(NamedTuple):
+class _Node(NamedTuple):
     """Gas state at one point: absolute pressure [Pa], temperature [K], specific enthalpy [J/kg]."""
 
     pressure: float
@@ -106,7 +106,7 @@ class Exchange(NamedTuple):
     energy: float
 
 
-class ChamberFlows(NamedTuple):
+class _ChamberFlows(NamedTuple):
     """Mass flows [kg/s] and enthalpy flows [W] between the valve and one chamber.
 
     ``supplied_mass``: mass flow from the source through the valve
@@ -159,23 +159,23 @@ class Observables(NamedTuple):
     static_limit: float
 
 
-def gas_node(rig: RigPhysics, mass: float, energy: float, volume: float) -> Node:
+def gas_node(rig: RigPhysics, mass: float, energy: float, volume: float) -> _Node:
     """Return the gas state in a volume [m^3] from mass [kg] and internal energy [J]."""
     temperature = gas_temperature(energy, mass, rig.heat_capacity)
     pressure = real_pressure(mass, volume, temperature, rig.gas_constant, rig.virial)
     enthalpy = gas_enthalpy(temperature, mass / volume, rig.gas_constant, rig.heat_capacity, rig.virial)
-    return Node(pressure, temperature, enthalpy)
+    return _Node(pressure, temperature, enthalpy)
 
 
-def ambient_node(rig: RigPhysics, pressure: float, temperature: float) -> Node:
+def ambient_node(rig: RigPhysics, pressure: float, temperature: float) -> _Node:
     """Return the gas state outside the chambers at an absolute pressure [Pa] and a temperature [K]."""
     density = real_density(pressure, temperature, rig.gas_constant, rig.virial)
     enthalpy = gas_enthalpy(temperature, density, rig.gas_constant, rig.heat_capacity, rig.virial)
-    return Node(pressure, temperature, enthalpy)
+    return _Node(pressure, temperature, enthalpy)
 
 
 def orifice_exchange(
-    rig: RigPhysics, a: Node, b: Node, fraction: float, orifice: ExactOrifice, is_relieving: float
+    rig: RigPhysics, a: _Node, b: _Node, fraction: float, orifice: ExactOrifice, is_relieving: float
 ) -> Exchange:
     """Mass flow [kg/s] and enthalpy flow [W] through an orifice, positive from a to b. Equations (6) to (8).
 
@@ -190,7 +190,7 @@ def orifice_exchange(
     return Exchange(flow, flow * enthalpy)
 
 
-def leak_exchange(rig: RigPhysics, a: Node, b: Node, orifice: ExactOrifice) -> Exchange:
+def leak_exchange(rig: RigPhysics, a: _Node, b: _Node, orifice: ExactOrifice) -> Exchange:
     """Leak across the vane [kg/s], [W], positive from a to b: flow through an orifice and a laminar gap."""
     through_orifice = orifice_exchange(rig, a, b, 1.0, orifice, 1.0)
     laminar = rig.laminar_conductance * (a.pressure * a.pressure - b.pressure * b.pressure)
@@ -199,13 +199,13 @@ def leak_exchange(rig: RigPhysics, a: Node, b: Node, orifice: ExactOrifice) -> E
     return Exchange(through_orifice.mass + laminar, through_orifice.energy + laminar * enthalpy)
 
 
-def wall_heat(rig: RigPhysics, node: Node, volume: float) -> float:
+def wall_heat(rig: RigPhysics, node: _Node, volume: float) -> float:
     """Heat flow [W] from the wall of a volume [m^3] into the gas."""
     area = rig.wall_area_per_volume * volume
     return heat_from_wall(node.temperature, rig.wall_temperature, rig.heat_transfer_coefficient, area)
 
 
-def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> tuple[Node, Node]:
+def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> tuple[_Node, _Node]:
     """Return the gas state of both chambers at an angle [rad]; ambient air if the chambers are open."""
     # A number, not a truth value: all that the compiled functions read is a float.
     if rig.chambers_open > 0.5:
@@ -231,8 +231,8 @@ def observables(given: RigNumbers, state: RigState, inputs: Inputs) -> Observabl
 
 
 def side(
-    given: RigNumbers, node: Node, regulated: float, line_mass: float, line_energy: float, source: float, vent: float
-) -> ChamberFlows:
+    given: RigNumbers, node: _Node, regulated: float, line_mass: float, line_energy: float, source: float, vent: float
+) -> _ChamberFlows:
     """Return the flows [kg/s], [W] between the valve and one chamber.
 
     ``source`` and ``vent`` are openings of the valve [-], ``regulated`` is the supply pressure [Pa]; ``line_mass`` [kg]
@@ -251,7 +251,7 @@ def side(
         into = orifice_exchange(rig, port, node, 1.0, given.line_orifice, 1.0)
     # Without a line its gas keeps its 0 kg: all that the valve passes enters the chamber, and there is no wall.
     heat = wall_heat(rig, port, rig.line_volume)
-    return ChamberFlows(
+    return _ChamberFlows(
         supplied_mass=supplied.mass,
         vented_mass=vented.mass,
         enthalpy_in=energy,

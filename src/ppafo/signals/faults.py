@@ -49,7 +49,7 @@ class Gap:
 
 
 @dataclass(frozen=True, slots=True)
-class Plateau:
+class _Plateau:
     """Longest interval at exactly the largest or smallest value: first and last sample index, value, and ``word``."""
 
     first: int
@@ -80,12 +80,12 @@ def lasting_change(values: Floats) -> float:
     return float(np.ptp([part.mean() for part in parts]))
 
 
-def plateaus(values: Floats) -> tuple[Plateau, Plateau]:
+def plateaus(values: Floats) -> tuple[_Plateau, _Plateau]:
     """Return the longest intervals at exactly the largest and at exactly the smallest value."""
     largest, smallest = float(values.max()), float(values.min())
     return (
-        Plateau(*longest_run(values == largest), largest, "largest"),
-        Plateau(*longest_run(values == smallest), smallest, "smallest"),
+        _Plateau(*longest_run(values == largest), largest, "largest"),
+        _Plateau(*longest_run(values == smallest), smallest, "smallest"),
     )
 
 
@@ -97,7 +97,7 @@ def longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
     return int(starts[longest]), int(ends[longest] - 1)
 
 
-def is_at_limit(values: Floats, plateau: Plateau) -> bool:
+def is_at_limit(values: Floats, plateau: _Plateau) -> bool:
     """Tell whether a plateau is a saturated sensor: the noise stops there, or the signal runs into it at speed.
 
     A signal that comes to rest by itself keeps its noise, or slows down before.
@@ -119,7 +119,7 @@ def scatters(values: Floats) -> bool:
     return values.size > 2 and float(np.median(np.abs(np.diff(values, 2)))) > _SMOOTH * float(np.ptp(values))
 
 
-def stands_out(values: Floats, plateau: Plateau) -> bool:
+def stands_out(values: Floats, plateau: _Plateau) -> bool:
     """Tell whether a plateau is far longer than any other, so that it is no step of a coarse converter."""
     if plateau.count < FEWEST_AT_LIMIT or plateau.count == values.size:
         return False

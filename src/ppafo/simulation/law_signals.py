@@ -40,7 +40,7 @@ _Mass = Annotated[float, Number("kg", "")]
 _Length = Annotated[float, Number("m", "")]
 
 
-class SignalsOfWalk(NamedTuple):
+class _SignalsOfWalk(NamedTuple):
     """Sample period [s] and bandwidth of the pressure sensors [Hz] in a walk, which has no transport delay."""
 
     period: _Seconds
@@ -182,7 +182,7 @@ def time_in_scenario(signals: Signals) -> float:
     return signals.delay + lag_of_sensor(signals.bandwidth)
 
 
-def time_in_walk(signals: SignalsOfWalk) -> float:
+def time_in_walk(signals: _SignalsOfWalk) -> float:
     """Lag of the pressure sensors in a walk [s]."""
     return lag_of_sensor(signals.bandwidth)
 
@@ -208,7 +208,7 @@ def turning_with_foot(signals: Any) -> tuple[float, float]:
 
 _PRESSURES = (PERIOD_PATH, "sensors.pressure_bandwidth")
 _ANGLE = (*_PRESSURES, "sensors.delay", *_OF_ANGLE, *_OF_DEVICE)
-IN_WALK = LawSignals(signals=SignalsOfWalk, late=time_in_walk, paths=_PRESSURES, places=anywhere)
+IN_WALK = LawSignals(signals=_SignalsOfWalk, late=time_in_walk, paths=_PRESSURES, places=anywhere)
 """Signals of a torque controller in a walk."""
 IN_SCENARIO = LawSignals(signals=Signals, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay"), places=anywhere)
 """Signals of a controller of torque or pressure, for a vane alone."""

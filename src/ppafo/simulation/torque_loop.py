@@ -209,7 +209,7 @@ _PER_PRESSURE: dict[str, tuple[Callable[[MeanChambers], float], Callable[[MeanCh
 """Derivatives of a controlled pressure with respect to both chamber pressures."""
 
 
-class LoopFunctions(NamedTuple):
+class _LoopFunctions(NamedTuple):
     """Loop of the controlled quantity, its reach, and the torque loop, as functions of rows.
 
     ``rows`` are the row types and ``sources`` the paths that fill them. ``joint`` is the function for the joint, None
@@ -224,7 +224,7 @@ class LoopFunctions(NamedTuple):
     joint: PlainFunction | None
 
 
-def loop_functions(device: Device, seen: LawSignals, controlled: str, sonic: bool) -> LoopFunctions:
+def loop_functions(device: Device, seen: LawSignals, controlled: str, sonic: bool) -> _LoopFunctions:
     """Return the loop functions of a device for a controller with given signals.
 
     ``sonic`` selects the valve's orifice as a sonic conductance instead of an area.
@@ -262,4 +262,4 @@ def loop_functions(device: Device, seen: LawSignals, controlled: str, sonic: boo
     )
     rows = (*chambers.rows, FlowNumbers, valve.settings, seen.signals)
     reach = made_of(reach_of, "reach_of_device", parts)
-    return LoopFunctions(loop=loop, reach=reach, torque_loop=torque_loop, rows=rows, sources=sources, joint=joint)
+    return _LoopFunctions(loop=loop, reach=reach, torque_loop=torque_loop, rows=rows, sources=sources, joint=joint)

@@ -27,7 +27,7 @@ EVENT_ROW, FRACTION_ROW = "clock.event", "clock.fraction"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class EventErrors:
+class _EventErrors:
     """Timing errors of one kind of event [s], positive for a late detection; one for each matched event.
 
     ``missed`` is the number of true events without a detection, ``false`` the number of detections without a true
@@ -79,19 +79,19 @@ def _rises(is_so: NDArray[np.bool_]) -> Samples:
     return np.flatnonzero(is_so[1:] & ~is_so[:-1]) + 1
 
 
-def event_errors(true: Samples, known: Samples, interval: float, stride_time: float) -> EventErrors:
+def event_errors(true: Samples, known: Samples, interval: float, stride_time: float) -> _EventErrors:
     """Return the timing errors of one kind of event; ``interval`` [s] is the sample interval, stride time in [s].
 
     Each true event is matched with the nearest known event within a quarter of a stride.
     """
     if not (true.size and known.size):
-        return EventErrors(np.empty(0), int(true.size), int(known.size))
+        return _EventErrors(np.empty(0), int(true.size), int(known.size))
     # Every pair: a walk has some hundred events of a kind.
     apart = known[np.newaxis, :] - true[:, np.newaxis]
     nearest = np.argmin(np.abs(apart), axis=1)
     errors = interval * np.take_along_axis(apart, nearest[:, np.newaxis], axis=1)[:, 0]
     near = np.abs(errors) <= TOO_FAR * stride_time
-    return EventErrors(errors[near], int((~near).sum()), int(known.size - np.unique(nearest[near]).size))
+    return _EventErrors(errors[near], int((~near).sum()), int(known.size - np.unique(nearest[near]).size))
 
 
 def within(events: Mapping[str, Samples], part: slice) -> dict[str, Samples]:

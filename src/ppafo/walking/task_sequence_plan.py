@@ -38,7 +38,7 @@ device may hold the foot at another angle; only the forefoot is on the stair in 
 
 
 @dataclass(frozen=True, slots=True)
-class TimedSegment:
+class _TimedSegment:
     """Segment in time: kind, title for tables, start and end [s] as floats or arrays (wearers,)."""
 
     kind: str
@@ -56,7 +56,7 @@ class PlannedSequence:
     """
 
     timed: TimedSequence
-    spans: tuple[TimedSegment, ...]
+    spans: tuple[_TimedSegment, ...]
     steady: tuple[tuple[Numbers, Numbers], ...]
     duration: Numbers
 
@@ -138,7 +138,7 @@ def plan_task_sequence(
     """
     load = RESTING_LOAD if sequence.segments[0].kind == "rest" else STANDING_LOAD
     planner = _Planner(frequency, STANDS_AT * timing.heel_off, load)
-    spans: list[TimedSegment] = []
+    spans: list[_TimedSegment] = []
     for index, segment in enumerate(sequence.segments):
         start, title = planner.time, segment.kind
         if "speed" in segment.values:
@@ -146,7 +146,7 @@ def plan_task_sequence(
         elif "cadence" in segment.values:
             title += f", {60.0 * segment.values['cadence']:.3g} steps/min"
         _plan_segment(planner, segment, _ratio(sequence, index, gait), strike_angle)
-        spans.append(TimedSegment(segment.kind, title, start, planner.time))
+        spans.append(_TimedSegment(segment.kind, title, start, planner.time))
     duration = planner.time
     if planner.ratio == 0.0:
         # The last part is endless, for steps after the last segment.

@@ -90,7 +90,7 @@ class CascadeParameters(NamedTuple):
     dead_band: BelievedBand
 
 
-class CascadeState(NamedTuple):
+class _CascadeState(NamedTuple):
     """Cascade state: reference and angle of the previous sample [rad], their rates, observed load, requested torque.
 
     ``rate`` is the filtered rate of the angle and ``asked`` the rate of the reference [rad/s]; ``quickening`` is the
@@ -133,13 +133,13 @@ FASTEST_CREEP = 10.0
 
 def cascade_update(
     parameters: CascadeParameters,
-    state: CascadeState,
+    state: _CascadeState,
     reference: float,
     measurement: Measurement,
     period: float,
     *,
     parts: ErrorFunctions = OF_TORQUE,
-) -> tuple[float, CascadeState]:
+) -> tuple[float, _CascadeState]:
     """Command u from -1 to 1 for an angle error e [rad] and the measured torque T [N m]:
 
         T_wanted = k_a e + d_a (rate of e) + load + breakaway + gravity + friction + inertia,    u = k_p (T_wanted - T)
@@ -198,7 +198,7 @@ def cascade_update(
     wanted = before if rests_within else needed
     unlimited = parameters.torque_gain * parts.steered(wanted - measurement.torque)
     command = beyond_dead_band(max(-1.0, min(1.0, unlimited)), parameters.dead_band)
-    return command, CascadeState(
+    return command, _CascadeState(
         reference=reference,
         angle=measurement.angle,
         rate=rate,
@@ -222,7 +222,7 @@ CASCADE = ControllerKind(
     source="disturbance observer: Ohnishi 1987; cascade: Bone and Ning 2007; gains by Skogestad 2003",
     quantities=quantities_of(CascadeParameters),
     parameters=CascadeParameters,
-    initial=CascadeState(),
+    initial=_CascadeState(),
     update=cascade_update,
     controls=(ANGLE,),
 )

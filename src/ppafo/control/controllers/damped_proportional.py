@@ -24,7 +24,7 @@ class DampedGains(NamedTuple):
     damping_filter: Annotated[float, Number("s", "time constant of the filter on the torque's rate", 0.001, 0.0, 10.0)]
 
 
-class DampedProportionalParameters(NamedTuple):
+class _DampedProportionalParameters(NamedTuple):
     """Gains, time between knots [s], learnt commands [-] at the knots, and assumed dead band of the valve [-]."""
 
     gains: DampedGains
@@ -41,14 +41,14 @@ class TorqueSlope(NamedTuple):
     started: float = 0.0
 
 
-class DampedProportionalState(NamedTuple):
+class _DampedProportionalState(NamedTuple):
     """Time since the start [s], and torque and torque rate at the previous sample."""
 
     elapsed: float = 0.0
     course: TorqueSlope = TorqueSlope()
 
 
-def learnt_command(parameters: DampedProportionalParameters, elapsed: float) -> float:
+def learnt_command(parameters: _DampedProportionalParameters, elapsed: float) -> float:
     """Command [-] of the table at a time since the start [s]: linear between knots, constant after the last knot."""
     position = min(elapsed / parameters.knot_spacing, KNOTS - 1.0)
     # The last knot has no line after it: the line before it is used up to its end.
@@ -76,19 +76,19 @@ def damped_command(
 
 
 def damped_update(
-    parameters: DampedProportionalParameters,
-    state: DampedProportionalState,
+    parameters: _DampedProportionalParameters,
+    state: _DampedProportionalState,
     reference: float,
     measurement: Measurement,
     period: float,
     *,
     parts: ErrorFunctions = OF_TORQUE,
-) -> tuple[float, DampedProportionalState]:
+) -> tuple[float, _DampedProportionalState]:
     """Command from -1 to 1: ``damped_command`` plus the learnt command of the table, with dead-band compensation."""
     ahead = learnt_command(parameters, state.elapsed)
     wanted, value = parts.steered(reference), parts.steered(seen_value(measurement, parts=parts))
     opening, course = damped_command(parameters.gains, state.course, wanted, value, ahead, period)
-    return beyond_dead_band(opening, parameters.dead_band), DampedProportionalState(state.elapsed + period, course)
+    return beyond_dead_band(opening, parameters.dead_band), _DampedProportionalState(state.elapsed + period, course)
 
 
 GAIN_QUANTITIES = quantities_of(DampedGains)
@@ -107,8 +107,8 @@ DAMPED_PROPORTIONAL = ControllerKind(
         ),
         DEAD_BAND,
     ),
-    parameters=DampedProportionalParameters,
-    initial=DampedProportionalState(),
+    parameters=_DampedProportionalParameters,
+    initial=_DampedProportionalState(),
     update=damped_update,
     controls=ANYTHING,
 )

@@ -118,7 +118,7 @@ NEARLY_SUPPLY = 0.999
 """Largest fraction of the supply pressure used by the feed-forward; above it no opening meets the request."""
 
 
-class PidFeedforwardParameters(NamedTuple):
+class _PidFeedforwardParameters(NamedTuple):
     """Gains of the feedback, weight of the feed-forward [-], and the nominal device."""
 
     feedback: PidGains
@@ -126,7 +126,7 @@ class PidFeedforwardParameters(NamedTuple):
     nominal: NominalChambers
 
 
-class PidFeedforwardState(NamedTuple):
+class _PidFeedforwardState(NamedTuple):
     """State of the PID, and the reference at the previous sample [N m]."""
 
     feedback: PidState = PidState()
@@ -134,12 +134,12 @@ class PidFeedforwardState(NamedTuple):
 
 
 def feedforward_update(
-    parameters: PidFeedforwardParameters,
-    state: PidFeedforwardState,
+    parameters: _PidFeedforwardParameters,
+    state: _PidFeedforwardState,
     reference: float,
     measurement: Measurement,
     period: float,
-) -> tuple[float, PidFeedforwardState]:
+) -> tuple[float, _PidFeedforwardState]:
     """Command from -1 to 1: PID on the torque error [N m], equation (13), plus feed-forward of the reference rate."""
     rate = (reference - state.reference) / period * state.feedback.started
     # Along the reference, with the other chamber vented, not at the measured state: the feed-forward must not see the
@@ -153,10 +153,10 @@ def feedforward_update(
     error = reference - measurement.torque
     opening, feedback = pid_command(parameters.feedback, state.feedback, error, ahead, period)
     command = beyond_dead_band(opening, nominal.dead_band)
-    return command, PidFeedforwardState(feedback, reference)
+    return command, _PidFeedforwardState(feedback, reference)
 
 
-def feedforward_restart(state: PidFeedforwardState, requested: float, continues: float) -> PidFeedforwardState:
+def feedforward_restart(state: _PidFeedforwardState, requested: float, continues: float) -> _PidFeedforwardState:
     """State, reset where a new task starts (``continues`` 0): PID at its start, reference rate 0; else unchanged."""
     return state._replace(feedback=pid_restart(state.feedback, requested, continues))
 
@@ -170,14 +170,14 @@ PID_FEEDFORWARD = ControllerKind(
         Quantity("feedforward", "", "weight of the feed-forward, 0 for none", 1.0, 0.0, 2.0),
         *NOMINAL_QUANTITIES,
     ),
-    parameters=PidFeedforwardParameters,
-    initial=PidFeedforwardState(),
+    parameters=_PidFeedforwardParameters,
+    initial=_PidFeedforwardState(),
     update=feedforward_update,
     restart=feedforward_restart,
 )
 
 
-class FeedbackLinearisationParameters(NamedTuple):
+class _FeedbackLinearisationParameters(NamedTuple):
     """Decay rate of the error [1/s], time constant of the velocity filter [s], and the nominal device."""
 
     convergence_rate: Annotated[
@@ -198,7 +198,7 @@ class FeedbackLinearisationState(NamedTuple):
 
 
 def linearising_update(
-    parameters: FeedbackLinearisationParameters,
+    parameters: _FeedbackLinearisationParameters,
     state: FeedbackLinearisationState,
     reference: float,
     measurement: Measurement,
@@ -231,8 +231,8 @@ FEEDBACK_LINEARISATION = ControllerKind(
     name="feedback_linearisation",
     summary="Chamber dynamics inverted at the measured pressures and angle: the torque error decays at a chosen rate.",
     source="Slotine and Li 1991, Applied Nonlinear Control, chapter 6; on pneumatic actuators Richer and Hurmuzlu 2000",
-    quantities=quantities_of(FeedbackLinearisationParameters),
-    parameters=FeedbackLinearisationParameters,
+    quantities=quantities_of(_FeedbackLinearisationParameters),
+    parameters=_FeedbackLinearisationParameters,
     initial=FeedbackLinearisationState(),
     update=linearising_update,
     restart=linearising_restart,

@@ -34,7 +34,7 @@ class PidGains(NamedTuple):
     ]
 
 
-class PidParameters(NamedTuple):
+class _PidParameters(NamedTuple):
     """Gains of a PID, and the assumed dead band of the valve [-]."""
 
     gains: PidGains
@@ -74,7 +74,7 @@ def pid_command(gains: PidGains, state: PidState, error: float, ahead: float, pe
 
 
 def pid_update(
-    parameters: PidParameters,
+    parameters: _PidParameters,
     state: PidState,
     reference: float,
     measurement: Measurement,
@@ -98,8 +98,8 @@ PID = ControllerKind(
     name="pid",
     summary="Proportional, integral and derivative action on the torque error.",
     source="the paper, equation (13); gains that are not given: Skogestad 2003, Simple analytic rules",
-    quantities=quantities_of(PidParameters),
-    parameters=PidParameters,
+    quantities=quantities_of(_PidParameters),
+    parameters=_PidParameters,
     initial=PidState(),
     update=pid_update,
     restart=pid_restart,

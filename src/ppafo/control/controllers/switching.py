@@ -37,7 +37,7 @@ CONSTANT = ControllerKind(
 )
 
 
-class OrderedParameters(NamedTuple):
+class _OrderedParameters(NamedTuple):
     """Externally set command [-] and assistance level from 0 to 3; level 3 closes a shut-off valve."""
 
     command: Annotated[float, Number("", "command, above 0 feeds chamber 1", 1.0, -1.0, 2.0)]
@@ -50,26 +50,26 @@ class Help(NamedTuple):
     level: float
 
 
-class OrderedState(NamedTuple):
+class _OrderedState(NamedTuple):
     """State of a controller whose assistance level is set from outside."""
 
     safety: Help
 
 
 def ordered_update(
-    parameters: OrderedParameters, state: OrderedState, reference: float, measurement: Measurement, period: float
-) -> tuple[float, OrderedState]:
+    parameters: _OrderedParameters, state: _OrderedState, reference: float, measurement: Measurement, period: float
+) -> tuple[float, _OrderedState]:
     """Externally set command [-] and assistance level, independent of the measurement."""
-    return parameters.command, OrderedState(Help(parameters.safe_state))
+    return parameters.command, _OrderedState(Help(parameters.safe_state))
 
 
 ORDERED = ControllerKind(
     name="ordered",
     summary="Command and assistance level from outside, for a plant whose shut-off valve follows the level.",
     source="chosen here",
-    quantities=quantities_of(OrderedParameters),
-    parameters=OrderedParameters,
-    initial=OrderedState(Help(0.0)),
+    quantities=quantities_of(_OrderedParameters),
+    parameters=_OrderedParameters,
+    initial=_OrderedState(Help(0.0)),
     update=ordered_update,
     needs_reference=False,
 )

@@ -121,8 +121,8 @@ class TorqueRequest(NamedTuple):
     torque: float = 0.0
 
 
-class Assessment(NamedTuple):
-    """Assessment of one sample by a walking controller, before the law computes the command."""
+class _Assessment(NamedTuple):
+    """_Assessment of one sample by a walking controller, before the law computes the command."""
 
     phase: PhaseState
     clock: Any
@@ -192,7 +192,7 @@ def timed_phase(
 
 def assess(
     parameters: Any, state: Any, measurement: GaitMeasurement, period: float, *, parts: TimingParts
-) -> Assessment:
+) -> _Assessment:
     """Assess a sample taken every ``period`` [s]: gait phase, safety, requested torque [N m], and permission to act.
 
     ``parameters`` and ``state`` are rows with the fields of ``LawParameters`` and ``LawState`` (``frame.py``).
@@ -211,7 +211,7 @@ def assess(
     on_toes = phase.phase == MID_STANCE and phase.in_phase >= phase.since_strike
     is_eased = on_toes and phase.since_strike < EASING_TIME and measurement.torque > EASED
     has_task = phases.lifts(phase.phase) or phase.phase == PUSH_OFF or is_eased
-    return Assessment(
+    return _Assessment(
         phase=phase,
         clock=clock,
         time=time,
@@ -222,7 +222,7 @@ def assess(
     )
 
 
-def valve_command(assessment: Assessment, command: float, period: float) -> tuple[float, SafetyState]:
+def valve_command(assessment: _Assessment, command: float, period: float) -> tuple[float, SafetyState]:
     """Valve command [-] and next safety state: the command of the law where the device acts, else ``VENT``."""
     sent = command if assessment.acts > 0.5 else VENT
     return safety.safe_command(assessment.safety, assessment.phase.phase, sent, period)

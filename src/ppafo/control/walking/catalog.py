@@ -21,7 +21,7 @@ from ppafo.model.sensors import GaitMeasurement, Measurement
 # Proportional and integral action on the torque error, in walking.
 
 
-class ProportionalParameters(NamedTuple):
+class _ProportionalParameters(NamedTuple):
     """Gains on the torque error [1/(N m)] and its integral [1/(N m s)], and assumed dead band of the valve [-]."""
 
     torque_gain: Annotated[
@@ -34,19 +34,19 @@ class ProportionalParameters(NamedTuple):
     dead_band: BelievedBand
 
 
-class ProportionalState(NamedTuple):
+class _ProportionalState(NamedTuple):
     """Integral part of the command [-]."""
 
     integral: float
 
 
 def proportional_update(
-    parameters: ProportionalParameters,
-    state: ProportionalState,
+    parameters: _ProportionalParameters,
+    state: _ProportionalState,
     reference: float,
     measurement: Measurement,
     period: float,
-) -> tuple[float, ProportionalState]:
+) -> tuple[float, _ProportionalState]:
     """Command from -1 to 1 and next state for a torque error e [N m], once every ``period`` [s].
 
     The opening is u = torque_gain e + torque_integral_gain (integral of e), with dead-band compensation.
@@ -57,21 +57,21 @@ def proportional_update(
     added = parameters.torque_integral_gain * error * period
     integral = state.integral + (added if abs(proposed) < 1.0 else 0.0)
     command = beyond_dead_band(max(-1.0, min(1.0, proposed)), parameters.dead_band)
-    return command, ProportionalState(integral)
+    return command, _ProportionalState(integral)
 
 
-def proportional_restart(state: ProportionalState, requested: float, continues: float) -> ProportionalState:
+def proportional_restart(state: _ProportionalState, requested: float, continues: float) -> _ProportionalState:
     """State, reset after a change of task (``continues`` 0, else 1); ``requested`` [N m] is not used."""
-    return ProportionalState(integral=state.integral * continues)
+    return _ProportionalState(integral=state.integral * continues)
 
 
 PROPORTIONAL = ControllerKind(
     name="proportional",
     summary="Proportional and integral action on the torque error.",
     source="profile of four parameters as in J. Zhang et al., Science 356 (2017) 1280",
-    quantities=quantities_of(ProportionalParameters),
-    parameters=ProportionalParameters,
-    initial=ProportionalState(0.0),
+    quantities=quantities_of(_ProportionalParameters),
+    parameters=_ProportionalParameters,
+    initial=_ProportionalState(0.0),
     update=proportional_update,
     restart=proportional_restart,
 )

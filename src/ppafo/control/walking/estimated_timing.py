@@ -87,7 +87,7 @@ class Window(NamedTuple):
     moved: Annotated[tuple[float, ...], WINDOW] = _NO_WINDOW
 
 
-class EstimatedClock(NamedTuple):
+class _EstimatedClock(NamedTuple):
     """Estimated gait phase: fractional clock, learnt stride, window of recent knots.
 
     ``next_knot`` is the number of the next knot, ``filled`` the number of knots in the window, ``learnt`` the number of
@@ -103,7 +103,7 @@ class EstimatedClock(NamedTuple):
     moved: float = 0.0
 
 
-START = EstimatedClock()
+START = _EstimatedClock()
 
 
 def misfit(stride: LearntStride, window: Window, rules: EstimatedRules, shift: int) -> float:
@@ -171,14 +171,14 @@ def knots_passed(fraction: float, next_knot: float) -> float:
     return ahead + KNOTS if ahead <= -0.5 * KNOTS else ahead
 
 
-def is_learnt(rules: EstimatedRules, clock: EstimatedClock) -> bool:
+def is_learnt(rules: EstimatedRules, clock: _EstimatedClock) -> bool:
     """Return whether enough strides were learnt to estimate the gait phase."""
     return clock.learnt >= rules.learning_strides
 
 
 def passed_knot(
-    rules: EstimatedRules, clock: EstimatedClock, gait_clock: GaitClock, learnt: float, measurement: GaitMeasurement
-) -> EstimatedClock:
+    rules: EstimatedRules, clock: _EstimatedClock, gait_clock: GaitClock, learnt: float, measurement: GaitMeasurement
+) -> _EstimatedClock:
     """Clock after passing a knot: the stride is learnt, and the clock corrected by a part of the estimated shift."""
     ready = is_learnt(rules, clock)
     # The first strides are averaged evenly, later ones fade in.
@@ -201,7 +201,7 @@ def passed_knot(
     # No further back than the strike; a clock that is still before a detected strike is not moved back at all.
     moved = max(rules.estimate_weight * shift, min(0.0, -gait_clock.fraction))
     next_knot = clock.next_knot + 1.0
-    return EstimatedClock(
+    return _EstimatedClock(
         clock=gait_clock._replace(fraction=gait_clock.fraction + moved),
         stride=stride,
         window=window,
@@ -215,12 +215,12 @@ def passed_knot(
 def follow(
     rules: EstimatedRules,
     phase_rules: PhaseRules,
-    clock: EstimatedClock,
+    clock: _EstimatedClock,
     before: PhaseState,
     phase: PhaseState,
     measurement: GaitMeasurement,
     period: float,
-) -> EstimatedClock:
+) -> _EstimatedClock:
     """Clock after a sample taken every ``period`` [s]: fractional timing until a stride is learnt, then estimated."""
     ready = is_learnt(rules, clock) & (clock.filled >= WINDOW)
     # An estimated clock is not corrected by events other than the strike, and by this only a little.
@@ -238,7 +238,7 @@ def follow(
     return clock._replace(clock=gait_clock, learnt=learnt)
 
 
-def gait_time(rules: EstimatedRules, clock: EstimatedClock, phase: PhaseState) -> GaitTime:
+def gait_time(rules: EstimatedRules, clock: _EstimatedClock, phase: PhaseState) -> GaitTime:
     """Time since the heel strike [s], advanced by the delay of the valve."""
     return phase_time(clock.clock, rules.delays.valve_delay, phase)
 

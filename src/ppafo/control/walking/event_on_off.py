@@ -22,7 +22,7 @@ from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
 
 
-class EventOnOffParameters(NamedTuple):
+class _EventOnOffParameters(NamedTuple):
     """Angle of the lifted foot and band about it [rad], end of push-off [turns], largest torque [N m].
 
     ``phases``, ``safety`` and ``timing`` are the rules of phases, safety and timing.
@@ -56,7 +56,7 @@ class EventOnOffParameters(NamedTuple):
     timing: EmptyRow
 
 
-class EventOnOffState(NamedTuple):
+class _EventOnOffState(NamedTuple):
     """Phase, clock and safety; ``lifting`` is 1 for a lifted foot, ``resting`` is 1 while excess torque is vented."""
 
     phase: PhaseState = PhaseState()
@@ -66,19 +66,19 @@ class EventOnOffState(NamedTuple):
     resting: float = 0.0
 
 
-USUAL_CLOCK = ClockParts(AT_THRESHOLDS, EventOnOffState)
+USUAL_CLOCK = ClockParts(AT_THRESHOLDS, _EventOnOffState)
 """Parts of the law unless another timing is chosen."""
 
 
 def update(
-    parameters: EventOnOffParameters,
-    state: EventOnOffState,
+    parameters: _EventOnOffParameters,
+    state: _EventOnOffState,
     reference: float,
     measurement: GaitMeasurement,
     period: float,
     *,
     parts: ClockParts = USUAL_CLOCK,
-) -> tuple[float, EventOnOffState]:
+) -> tuple[float, _EventOnOffState]:
     """Command [-]: 1 plantarflexion, -1 dorsiflexion, ``VENT`` for free motion; the reference is not used."""
     phase, clock, time = timed_phase(parameters, state.phase, state.clock, measurement, period, parts=parts.timing)
     watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
@@ -98,7 +98,7 @@ def update(
     rests = abs(measurement.torque) > (0.5 * largest if state.resting > 0.5 else largest)
     command = VENT if rests and command * measurement.torque > 0.0 else command
     command, watch = safety.safe_command(watch, phase.phase, command, period)
-    following: EventOnOffState = parts.state(
+    following: _EventOnOffState = parts.state(
         phase=phase, clock=clock, safety=watch, lifting=lifting if held else 0.0, resting=1.0 if rests else 0.0
     )
     return command, following
@@ -108,9 +108,9 @@ EVENT_ON_OFF = ControllerKind(
     name="event_on_off",
     summary="Event-based: dorsiflexion in swing and landing, free in mid-stance, plantarflexion in push-off.",
     source="the paper, figure 1A and section 'PPAFO Hardware': binary, event-based control",
-    quantities=(*quantities_of(EventOnOffParameters), *LINE_QUANTITIES),
-    parameters=EventOnOffParameters,
-    initial=EventOnOffState(),
+    quantities=(*quantities_of(_EventOnOffParameters), *LINE_QUANTITIES),
+    parameters=_EventOnOffParameters,
+    initial=_EventOnOffState(),
     update=update,
     only_switches=True,
 )

@@ -74,7 +74,7 @@ class Events(NamedTuple):
     toes_off: float = 0.0
 
 
-class StrideTiming(NamedTuple):
+class _StrideTiming(NamedTuple):
     """Stride times: mean of recent strides and their number, last stride, and prediction for the present stride.
 
     ``mean_time``, ``last`` and ``this_time`` in [s]; ``counted`` is the number of strides in the mean; ``even`` is 1 if
@@ -98,7 +98,7 @@ class GaitClock(NamedTuple):
     fraction: float = 0.0
     event: float = TOES_OFF
     event_fractions: Events = Events()
-    strides: StrideTiming = StrideTiming()
+    strides: _StrideTiming = _StrideTiming()
 
 
 CLOCK_START = GaitClock()
@@ -193,8 +193,8 @@ def last_event(clock: GaitClock, fraction: float, predicted: Events, seen: Event
 
 
 def next_strides(
-    strides: StrideTiming, strikes: bool, ends: bool, on_heel: bool, duration: float, first_time: float, weight: float
-) -> StrideTiming:
+    strides: _StrideTiming, strikes: bool, ends: bool, on_heel: bool, duration: float, first_time: float, weight: float
+) -> _StrideTiming:
     """Stride times after a sample at which a stride of some ``duration`` [s] may end.
 
     The first strides have equal weights, later ones ``weight``. An irregular stride does not count until a second
@@ -213,7 +213,7 @@ def next_strides(
     counts = ends & (is_first | is_near | repeats)
     mean_time = updated if counts else mean
     is_regular = counts & on_heel & (not is_first)
-    return StrideTiming(
+    return _StrideTiming(
         mean_time=mean_time,
         counted=strides.counted + 1.0 if counts else strides.counted,
         last=duration if ends else strides.last,
@@ -222,7 +222,7 @@ def next_strides(
     )
 
 
-def predicted_time(strides: StrideTiming, seen: Events, detected: Events, recent: Events, weight: float) -> float:
+def predicted_time(strides: _StrideTiming, seen: Events, detected: Events, recent: Events, weight: float) -> float:
     """Predicted duration of the present stride [s], corrected by an early or late heel-off or toe-off.
 
     ``detected`` are the fractions of the events in the mean stride, ``recent`` their fractions in recent strides.
@@ -316,7 +316,7 @@ AnchorWeight = Annotated[
 ]
 
 
-class FractionalRules(NamedTuple):
+class _FractionalRules(NamedTuple):
     """Known delays, and correction of the clock per event after the strike [-]."""
 
     delays: Delays
@@ -324,7 +324,7 @@ class FractionalRules(NamedTuple):
 
 
 def follow_fraction(
-    rules: FractionalRules,
+    rules: _FractionalRules,
     phase_rules: PhaseRules,
     clock: GaitClock,
     before: PhaseState,
@@ -336,7 +336,7 @@ def follow_fraction(
     return next_clock(rules.delays, phase_rules, clock, before, phase, rules.anchor_weight, 1.0, period)
 
 
-def fractional_time(rules: FractionalRules, clock: GaitClock, phase: PhaseState) -> GaitTime:
+def fractional_time(rules: _FractionalRules, clock: GaitClock, phase: PhaseState) -> GaitTime:
     """Time since the heel strike [s], advanced by the delay of the valve."""
     return phase_time(clock, rules.delays.valve_delay, phase)
 
@@ -345,8 +345,8 @@ FRACTIONAL = TimingKind(
     name="fractional",
     summary="Percent of gait: time since the heel strike over recent stride times, known delays taken off.",
     source="fractional timing, usual in the field; anchored anew at each detected event",
-    quantities=quantities_of(FractionalRules),
-    parameters=FractionalRules,
+    quantities=quantities_of(_FractionalRules),
+    parameters=_FractionalRules,
     initial=CLOCK_START,
     follow=follow_fraction,
     gait_time=fractional_time,

@@ -43,7 +43,7 @@ class LawState(NamedTuple):
     law: Any
 
 
-class WalkingParts(NamedTuple):
+class _WalkingParts(NamedTuple):
     """Parts of a walking torque law: functions of the timing, class of the state, and functions of the law.
 
     ``update`` returns command [-] and next state. ``restart(state, requested, continues)`` returns the state at a
@@ -56,13 +56,13 @@ class WalkingParts(NamedTuple):
     restart: Callable[[Any, float, float], Any]
 
 
-class InitialStateParts(NamedTuple):
+class _InitialStateParts(NamedTuple):
     """Initial state of a law."""
 
     start: Any
 
 
-def restart_anew(state: Any, requested: float, continues: float, *, parts: InitialStateParts) -> Any:
+def restart_anew(state: Any, requested: float, continues: float, *, parts: _InitialStateParts) -> Any:
     """State of a law that is reset where another task starts (``continues`` 0, else 1)."""
     return state if continues > 0.5 else parts.start
 
@@ -79,7 +79,7 @@ def law_that_walks_update(
     measurement: GaitMeasurement,
     period: float,
     *,
-    parts: WalkingParts,
+    parts: _WalkingParts,
 ) -> tuple[float, LawState]:
     """Command from -1 to 1, or ``VENT``, and the next state; the reference is not used."""
     assessment = assess(parameters, state, measurement, period, parts=parts.timing)
@@ -123,8 +123,8 @@ def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
     parameters = row_with(f"{title}Parameters", LawParameters, law=law.parameters, timing=EmptyRow)
     state = row_with(f"{title}State", LawState, law=type(law.initial), clock=EmptyRow)
     # A law without a state has nothing to begin anew, and its empty NamedTuple no literal in C.
-    anew = made_of(restart_anew, f"restart_{name}", InitialStateParts(law.initial)) if len(law.initial) else keep_state
-    parts = WalkingParts(timing=AT_THRESHOLDS, state=state, update=law.update, restart=law.restart or anew)
+    anew = made_of(restart_anew, f"restart_{name}", _InitialStateParts(law.initial)) if len(law.initial) else keep_state
+    parts = _WalkingParts(timing=AT_THRESHOLDS, state=state, update=law.update, restart=law.restart or anew)
     return replace(
         law,
         name=name,

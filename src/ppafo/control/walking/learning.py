@@ -126,7 +126,7 @@ def next_table(table: Knots, position: float, weight: float, step: float, forget
     )
 
 
-class EventDampedLearningParameters(NamedTuple):
+class _EventDampedLearningParameters(NamedTuple):
     """Gains of law and learning, assumed dead band [-], assistance, and rules of phases, safety and timing."""
 
     law: DampedGains
@@ -138,7 +138,7 @@ class EventDampedLearningParameters(NamedTuple):
     timing: EmptyRow
 
 
-class EventDampedLearningState(NamedTuple):
+class _EventDampedLearningState(NamedTuple):
     """Phase, clock, safety, torque request, state of the torque law, and learnt table."""
 
     phase: PhaseState = PhaseState()
@@ -149,19 +149,19 @@ class EventDampedLearningState(NamedTuple):
     table: Knots = EMPTY
 
 
-USUAL_CLOCK = ClockParts(AT_THRESHOLDS, EventDampedLearningState)
+USUAL_CLOCK = ClockParts(AT_THRESHOLDS, _EventDampedLearningState)
 """Parts of the law unless another timing is chosen."""
 
 
 def update(
-    parameters: EventDampedLearningParameters,
-    state: EventDampedLearningState,
+    parameters: _EventDampedLearningParameters,
+    state: _EventDampedLearningState,
     reference: float,
     measurement: GaitMeasurement,
     period: float,
     *,
     parts: ClockParts = USUAL_CLOCK,
-) -> tuple[float, EventDampedLearningState]:
+) -> tuple[float, _EventDampedLearningState]:
     """Command from -1 to 1, or ``VENT``; the reference is not used."""
     assessment = assess(parameters, state, measurement, period, parts=parts.timing)
     phase, torque, profile = assessment.phase, measurement.torque, parameters.assistance.push_off
@@ -184,7 +184,7 @@ def update(
     opening, law = damped_command(parameters.law, law, assessment.request.torque, torque, feedforward, period)
     command = beyond_dead_band(opening, parameters.dead_band)
     command, watch = assistance.valve_command(assessment, command, period)
-    following: EventDampedLearningState = parts.state(
+    following: _EventDampedLearningState = parts.state(
         phase=phase,
         clock=assessment.clock,
         safety=watch,
@@ -205,7 +205,7 @@ KIND = ControllerKind(
         DEAD_BAND,
         *ASSISTING_QUANTITIES,
     ),
-    parameters=EventDampedLearningParameters,
-    initial=EventDampedLearningState(),
+    parameters=_EventDampedLearningParameters,
+    initial=_EventDampedLearningState(),
     update=update,
 )

@@ -35,7 +35,7 @@ LONG_AGO = 1.0e9
 """Time [s] since the command of a coil that was switched off before the start."""
 
 
-class ObservedValve(NamedTuple):
+class _ObservedValve(NamedTuple):
     """On/off valve: present flow (0 or 1), commanded flow, time since the command, and switching time [s]."""
 
     position: float = 0.0
@@ -44,7 +44,7 @@ class ObservedValve(NamedTuple):
     waits: float = 0.0
 
 
-class CommandInTransit(NamedTuple):
+class _CommandInTransit(NamedTuple):
     """Command on its way to a spool or a vent valve [-], after one, two and three thirds of the dead time."""
 
     first: float = 0.0
@@ -52,7 +52,7 @@ class CommandInTransit(NamedTuple):
     third: float = 0.0
 
 
-class ObservedChamber(NamedTuple):
+class _ObservedChamber(NamedTuple):
     """Estimated gas of a chamber.
 
     ``content`` p V [J], expected sensor ``pressure`` [Pa], gas ``passed`` lately [J], and duration ``contrary`` of an
@@ -77,13 +77,13 @@ class Observer(NamedTuple):
     lines downstream of the regulators.
     """
 
-    chamber_1: ObservedChamber = ObservedChamber()
-    chamber_2: ObservedChamber = ObservedChamber()
+    chamber_1: _ObservedChamber = _ObservedChamber()
+    chamber_2: _ObservedChamber = _ObservedChamber()
     command: float = 2.0
-    coil_1: ObservedValve = ObservedValve()
-    coil_2: ObservedValve = ObservedValve()
-    on_the_way: CommandInTransit = CommandInTransit()
-    venting: CommandInTransit = CommandInTransit(1.0, 1.0, 1.0)
+    coil_1: _ObservedValve = _ObservedValve()
+    coil_2: _ObservedValve = _ObservedValve()
+    on_the_way: _CommandInTransit = _CommandInTransit()
+    venting: _CommandInTransit = _CommandInTransit(1.0, 1.0, 1.0)
     spool: float = 0.0
     joined: float = 0.0
     lines: LineState = LineState(0.0, 0.0, 0.0)
@@ -163,8 +163,8 @@ def flow_into(nominal: NominalDevice, pressure: float, node: float, is_relieving
 
 
 def next_coil(
-    nominal: NominalDevice, coil: ObservedValve, requested: float, period: float
-) -> tuple[ObservedValve, float]:
+    nominal: NominalDevice, coil: _ObservedValve, requested: float, period: float
+) -> tuple[_ObservedValve, float]:
     """Coil after a sample [s] with the ``requested`` position, and its mean position [-] in the sample."""
     switches = (requested != coil.target) & (coil.since >= nominal.nominal_switching_interval - SAME)
     delay = nominal.nominal_opening_delay if requested > 0.5 else nominal.nominal_closing_delay
@@ -172,7 +172,7 @@ def next_coil(
     waits = delay if switches else coil.waits
     # Fraction of the sample before the change: the weight of the present position in the mean.
     before = min(waits, period) / period
-    return ObservedValve(
+    return _ObservedValve(
         position=target if waits <= period + SAME else coil.position,
         target=target,
         since=(0.0 if switches else coil.since) + period,
@@ -181,8 +181,8 @@ def next_coil(
 
 
 def next_on_the_way(
-    nominal: NominalDevice, on_the_way: CommandInTransit, target: float, period: float
-) -> CommandInTransit:
+    nominal: NominalDevice, on_the_way: _CommandInTransit, target: float, period: float
+) -> _CommandInTransit:
     """Command in transit after a sample [s] with a ``target`` [-]: three first-order lags that add up to the dead time.
 
     The mean flow is then correct, without a buffer for all samples of the dead time.
@@ -190,7 +190,7 @@ def next_on_the_way(
     share = period / (period + nominal.nominal_delay / 3.0)
     first = on_the_way.first + (target - on_the_way.first) * share
     second = on_the_way.second + (first - on_the_way.second) * share
-    return CommandInTransit(first=first, second=second, third=on_the_way.third + (second - on_the_way.third) * share)
+    return _CommandInTransit(first=first, second=second, third=on_the_way.third + (second - on_the_way.third) * share)
 
 
 def contradiction(
@@ -212,12 +212,12 @@ def contradiction(
 
 def next_chamber(
     nominal: NominalDevice,
-    chamber: ObservedChamber,
+    chamber: _ObservedChamber,
     supplying: Supplying,
     reading: ChamberReading,
     is_blind: bool,
     period: float,
-) -> tuple[ObservedChamber, float]:
+) -> tuple[_ObservedChamber, float]:
     """Chamber after a sample [s], updated by the flow and then by its reading; and gas taken from the supply [J].
 
     The content is taken from the sensor while the observer ``is_blind``: at the start, and while the chambers are
@@ -249,7 +249,7 @@ def next_chamber(
     # In gas content, which no movement of the ankle changes.
     residual = (measured - expected) * volume
     excess = contradiction(nominal, passed, supplying, reading, expected)
-    return ObservedChamber(
+    return _ObservedChamber(
         content=max(content + residual * min(share, 1.0), 0.0),
         pressure=expected,
         passed=0.0 if is_blind else passed,
@@ -378,7 +378,7 @@ def next_lines(nominal: NominalDevice, lines: LineState, taken_1: float, taken_2
     )
 
 
-def is_fed(nominal: NominalDevice, coil: ObservedValve, spool: float) -> bool:
+def is_fed(nominal: NominalDevice, coil: _ObservedValve, spool: float) -> bool:
     """Return whether the valve is estimated to feed its chamber; ``spool`` [-] is positive towards the chamber."""
     return (coil.position > 0.5) if nominal.nominal_pair > 0.5 else (spool > 0.0)
 
@@ -391,7 +391,7 @@ NEARLY_FULL = 0.8
 """Fraction of the supply pressure above which a vented chamber is still connected to the supply."""
 
 
-def has_gas(chamber: ObservedChamber, volume: float, measured: float) -> bool:
+def has_gas(chamber: _ObservedChamber, volume: float, measured: float) -> bool:
     """Return whether a chamber with a reading [Pa] in its volume [m^3] has received gas since it was connected."""
     # Against the content when the feeding began: an offset of the sensor is in both.
     return measured * volume - chamber.least > SHOWS_GAS * chamber.passed
@@ -399,11 +399,11 @@ def has_gas(chamber: ObservedChamber, volume: float, measured: float) -> bool:
 
 def cause_of(
     nominal: NominalDevice,
-    chamber: ObservedChamber,
+    chamber: _ObservedChamber,
     volume: float,
     measured: float,
     supply: float,
-    coil: ObservedValve,
+    coil: _ObservedValve,
     spool: float,
     venting: float,
     lost_beside: float,

@@ -30,7 +30,7 @@ _LONGEST_ASIDE = 86400.0
 
 
 @dataclass(frozen=True, slots=True)
-class CacheEntry:
+class _CacheEntry:
     """File or folder in the cache: path, size [byte], and time of last use [s since 1970]."""
 
     path: Path
@@ -38,12 +38,12 @@ class CacheEntry:
     used: float
 
 
-def list_programs(folder: Path) -> list[CacheEntry]:
+def list_programs(folder: Path) -> list[_CacheEntry]:
     """Return the programs in a cache folder, most recently used first."""
     return measured([*entries_named(folder, PROGRAM), *entries_named(folder / "__pycache__", PROGRAM)])
 
 
-def list_texts(folder: Path) -> list[CacheEntry]:
+def list_texts(folder: Path) -> list[_CacheEntry]:
     """Return the texts in a cache folder, most recently used first.
 
     Other files in the folder are ignored, and so are all files if the folder is a link.
@@ -83,7 +83,7 @@ def evict(folder: Path) -> None:
             remove(entry.path)
 
 
-def evict_beyond(entries: Iterable[CacheEntry], maximum_bytes: int) -> None:
+def evict_beyond(entries: Iterable[_CacheEntry], maximum_bytes: int) -> None:
     """Remove entries unused for ``LONGEST_UNUSED`` and the least recently used entries beyond ``maximum_bytes``."""
     now, total = time.time(), 0
     # The list begins with what was used last, so that the total passes the limit at what is dropped.
@@ -101,7 +101,7 @@ def entries_named(folder: Path, pattern: re.Pattern[str]) -> list[Path]:
         return []
 
 
-def measured(paths: Iterable[Path]) -> list[CacheEntry]:
+def measured(paths: Iterable[Path]) -> list[_CacheEntry]:
     """Return files and folders with their sizes, most recently used first."""
     entries = []
     for path in paths:
@@ -110,5 +110,5 @@ def measured(paths: Iterable[Path]) -> list[CacheEntry]:
             size, used = sum(file.lstat().st_size for file in files), path.lstat().st_mtime
         except OSError:  # another process has removed it in this instant
             size, used = 0, time.time()
-        entries.append(CacheEntry(path, size, used))
+        entries.append(_CacheEntry(path, size, used))
     return sorted(entries, key=lambda entry: -entry.used)

@@ -87,14 +87,14 @@ LOWEST_REBOUND = 1.0e-7
 """Height of a rebound divided by the angle range [-] below which the vane stays at the stop."""
 
 
-class FrictionTorques(NamedTuple):
+class _FrictionTorques(NamedTuple):
     """Magnitudes of the friction torque [N m]: largest static friction, and kinetic friction."""
 
     at_rest: float
     in_motion: float
 
 
-class Departure(NamedTuple):
+class _Departure(NamedTuple):
     """Start of the second part of a step: fraction of the step [-], angle [rad] and angular velocity [rad/s]."""
 
     fraction: float
@@ -147,7 +147,7 @@ class PartSlide(NamedTuple):
     """
 
     torque: float
-    friction: FrictionTorques
+    friction: _FrictionTorques
     angular_velocity: float
     departs: float
 
@@ -196,9 +196,9 @@ def time_to_stop(distance: float, angular_velocity: float, acceleration: float) 
 
 def friction_now(
     plant: PlantParameters, angular_velocity: float, pressure_1: float, pressure_2: float
-) -> FrictionTorques:
+) -> _FrictionTorques:
     """Friction torques [N m] at an angular velocity [rad/s] and two absolute pressures [Pa]. Equation (10)."""
-    return FrictionTorques(
+    return _FrictionTorques(
         at_rest=friction_at_rest(plant.static_torque, pressure_1, pressure_2),
         in_motion=friction_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2),
     )
@@ -206,10 +206,10 @@ def friction_now(
 
 def depart(
     plant: PlantParameters,
-    departure: Departure,
+    departure: _Departure,
     torque: float,
     next_torque: float,
-    friction: FrictionTorques,
+    friction: _FrictionTorques,
     step: float,
 ) -> tuple[float, float]:
     """Angle [rad] and angular velocity [rad/s] at the end of a step whose last part starts at ``departure``.
@@ -346,7 +346,7 @@ def depart_part(
     fraction = velocity / (fall if fall != 0.0 else 1.0) if begun.way != 0.0 else 0.0
     turning_angle = clamp_angle(plant, state.angle + 0.5 * fraction * length * velocity)
     left_torque = begun.torque + fraction * (slid.torque - begun.torque)
-    departure = Departure(fraction, turning_angle, 0.0)
+    departure = _Departure(fraction, turning_angle, 0.0)
     angle, rate = depart(plant, departure, left_torque, slid.torque, slid.friction, length)
     error = part_error(plant, begun, slid, angle, length, parts=parts)
     departs = slid.departs > 0.5
@@ -397,7 +397,7 @@ def first_event(
     acceleration: float,
     full_velocity: float,
     step: float,
-) -> Departure:
+) -> _Departure:
     """First event of a step: impact on a stop, reversal, or, for a vane at rest, departure at the start of the step.
 
     ``free_angle`` [rad] and ``full_velocity`` [rad/s] are the predicted values at the end of the step without the
@@ -417,7 +417,7 @@ def first_event(
     fraction = impact if hits_first else (reversal if reverses else 0.0)
     angle = stop if hits_first else (turning_angle if reverses else state.angle)
     thrown_back = rebound(velocity - impact * fall)
-    return Departure(fraction, angle, thrown_back if hits_first else 0.0)
+    return _Departure(fraction, angle, thrown_back if hits_first else 0.0)
 
 
 def begin_free(

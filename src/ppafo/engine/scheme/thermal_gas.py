@@ -73,7 +73,7 @@ class ThermalFlows(NamedTuple):
     heat: float
 
 
-class FlowSlopes(NamedTuple):
+class _FlowSlopes(NamedTuple):
     """Gamma h times the derivatives of ``ThermalFlows`` with respect to both contents [-], without walls and work.
 
     Derivatives of contents apply to the content that enters the chambers; the chambers retain the fractions ``kept_1``
@@ -219,7 +219,7 @@ def flow_slopes(
     near_1: float,
     near_2: float,
     at: WarmChambers,
-) -> FlowSlopes:
+) -> _FlowSlopes:
     """Gamma h times the derivatives of all flows with respect to both contents [-].
 
     ``root_1`` and ``root_2`` are ``sqrt(T / T_0)`` of both chambers [-]. The weights are gamma h times pressure divided
@@ -235,7 +235,7 @@ def flow_slopes(
     vent_2 = steeper_transport(thermal, in_2.total - in_2.from_source, turns_2, 1.0, root_2)
     by_1 = leak.by_1 * weight_1
     by_2 = leak.by_2 * weight_2
-    return FlowSlopes(
+    return _FlowSlopes(
         content_1_by_1=(in_1.source_slope * source_1.content + vent_slope_1 * vent_1.content) * weight_1
         - by_1 * leak_carries.content,
         content_1_by_2=-by_2 * leak_carries.content,
@@ -259,7 +259,7 @@ def flow_slopes(
     )
 
 
-def flow_response(slopes: FlowSlopes, content_1: float, content_2: float) -> ThermalFlows:
+def flow_response(slopes: _FlowSlopes, content_1: float, content_2: float) -> ThermalFlows:
     """Gamma h times the rate of change of all flows except heat [kg/s], for given rates of both contents [kg/s]."""
     return ThermalFlows(
         content_1=slopes.kept_1 * (slopes.content_1_by_1 * content_1 + slopes.content_1_by_2 * content_2),
@@ -290,7 +290,7 @@ def combine_flows(one: ThermalFlows, factor_one: float, other: ThermalFlows, fac
     )
 
 
-class ThermalMatrix(NamedTuple):
+class _ThermalMatrix(NamedTuple):
     """Matrix of a step with an energy balance, after elimination of the masses.
 
     Attributes:
@@ -301,7 +301,7 @@ class ThermalMatrix(NamedTuple):
         cooling_1, cooling_2: gamma h times the decrease of the wall heat with the contents [-]
     """
 
-    slopes: FlowSlopes
+    slopes: _FlowSlopes
     a: float
     b: float
     c: float
@@ -333,7 +333,7 @@ class ThermalGas(NamedTuple):
         ended: chambers after the stage
     """
 
-    matrix: ThermalMatrix
+    matrix: _ThermalMatrix
     first: ThermalFlows
     drift: ThermalFlows
     end: PlantState
@@ -347,8 +347,8 @@ def thermal_matrix(
     masses: ThermalState,
     at: WarmChambers,
     weight: float,
-    slopes: FlowSlopes,
-) -> ThermalMatrix:
+    slopes: _FlowSlopes,
+) -> _ThermalMatrix:
     """Matrix of a step with an energy balance; ``weight`` is gamma h [s]."""
     cooling_1 = weight * thermal.wall_exchange * at.volume_1 / masses.mass_1
     cooling_2 = weight * thermal.wall_exchange * at.volume_2 / masses.mass_2
@@ -363,7 +363,7 @@ def thermal_matrix(
     b = -kept_1 * slopes.content_1_by_2 - kept_1 * wall_1 * slopes.mass_1_by_2
     c = -kept_2 * slopes.content_2_by_1 - kept_2 * wall_2 * slopes.mass_2_by_1
     d = 1.0 - kept_2 * slopes.content_2_by_2 + work_2 + kept_2 * cooling_2 - kept_2 * wall_2 * slopes.mass_2_by_2
-    return ThermalMatrix(
+    return _ThermalMatrix(
         slopes=slopes,
         a=a,
         b=b,
@@ -377,7 +377,7 @@ def thermal_matrix(
     )
 
 
-def solve_thermal_stage(matrix: ThermalMatrix, right: ThermalFlows) -> ThermalFlows:
+def solve_thermal_stage(matrix: _ThermalMatrix, right: ThermalFlows) -> ThermalFlows:
     """Stage slopes [kg/s] of a step with an energy balance, from the right-hand sides [kg/s]."""
     # Right-hand sides of the contents after the masses are eliminated.
     right_1 = right.content_1 + matrix.slopes.kept_1 * matrix.wall_1 * right.mass_1

@@ -79,7 +79,7 @@ def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: floa
     return linear_torque(plant, first, second, pressure_1, pressure_2)
 
 
-class CylinderSettings(NamedTuple):
+class _CylinderSettings(NamedTuple):
     """Settings of a cylinder: bore, rod diameter, and geometry of the lever."""
 
     bore: Annotated[float, Number("m", "diameter of the piston", minimum=1.0e-3, maximum=0.5)]
@@ -91,7 +91,7 @@ class CylinderSettings(NamedTuple):
     ]
 
 
-def prepare(settings: CylinderSettings, stops: Range) -> Cylinder:
+def prepare(settings: _CylinderSettings, stops: Range) -> Cylinder:
     """Geometry of the cylinder from settings and stops."""
     bore, rod = settings.bore, settings.rod_diameter
     lever, base, offset = settings.lever_length, settings.base_distance, settings.lever_offset
@@ -109,7 +109,7 @@ def prepare(settings: CylinderSettings, stops: Range) -> Cylinder:
     )
 
 
-def problem(settings: CylinderSettings, stops: Range) -> str:
+def problem(settings: _CylinderSettings, stops: Range) -> str:
     """Describe a rod as wide as the bore, or a lever that reaches its dead centre between the stops; else empty."""
     if settings.rod_diameter >= settings.bore:
         return "rod_diameter must be below bore"
@@ -127,7 +127,7 @@ def problem(settings: CylinderSettings, stops: Range) -> str:
 KIND = ActuatorKind(
     name="cylinder",
     summary="A double-acting cylinder between two pins that drives a lever.",
-    settings=CylinderSettings,
+    settings=_CylinderSettings,
     model=ActuatorModel(Cylinder, prepare, chambers, pressures, torque, gives=False),
     problem=problem,
 )

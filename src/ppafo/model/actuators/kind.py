@@ -115,7 +115,7 @@ class ShapedPlant(Protocol):
     """Torque T_ex [N m]."""
 
 
-class UnpressurisedPlant(NamedTuple):
+class _UnpressurisedPlant(NamedTuple):
     """Plant parameters that the ``chambers`` function of a kind reads; pressures are relative to the atmosphere."""
 
     shape: Any
@@ -124,7 +124,7 @@ class UnpressurisedPlant(NamedTuple):
 
 def mean_growth(shape: Any, stops: Range, gauge: float, chambers: Callable[..., Chambers]) -> float:
     """Mean volume change of chamber 1 between the stops [m^3/rad] at a gauge pressure [Pa]: torque per pressure."""
-    still = UnpressurisedPlant(shape, 0.0)
+    still = _UnpressurisedPlant(shape, 0.0)
     first = chambers(still, stops.angle_min, gauge, 0.0).volume_1
     last = chambers(still, stops.angle_max, gauge, 0.0).volume_1
     # 1e-9 rad: stops that coincide must not divide by 0.

@@ -236,7 +236,7 @@ def has_one_chamber(table: Table) -> bool:
     return not any(number for curve in curves for number in (*curve.powers, *curve.bends))
 
 
-class TableSettings(NamedTuple):
+class _TableSettings(NamedTuple):
     """Settings of a tabulated actuator: passive stiffness without pressure, and its angle of zero torque."""
 
     passive_stiffness: Annotated[
@@ -245,7 +245,7 @@ class TableSettings(NamedTuple):
     rest_angle: Annotated[float, Number("rad", "angle at which the material gives no torque", 0.0, -10.0, 10.0)]
 
 
-def prepare(settings: TableSettings, stops: Range, table: Table) -> Measured:
+def prepare(settings: _TableSettings, stops: Range, table: Table) -> Measured:
     """Numbers of the actuator from settings, stops and table."""
     return Measured(
         table=table,
@@ -259,7 +259,7 @@ def prepare(settings: TableSettings, stops: Range, table: Table) -> Measured:
 KIND = ActuatorKind(
     name="table",
     summary="An actuator that was measured: volumes over angle and pressure, from a CSV file.",
-    settings=TableSettings,
+    settings=_TableSettings,
     # The file is judged where it is read.
     model=ActuatorModel(Measured, prepare, chambers, pressures, torque, table=Table),
     has_one_chamber=has_one_chamber,

@@ -9,14 +9,14 @@ from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import follow, follow_rate
 
 
-class SensorRates(NamedTuple):
+class _SensorRates(NamedTuple):
     """Rates [1/s] of angle sensor and pressure sensors, 2 pi times the bandwidth; 0 for a sensor without lag."""
 
     angle: float
     pressure: float
 
 
-class SensorState(NamedTuple):
+class _SensorState(NamedTuple):
     """Readings of the sensors: angle [rad] and absolute pressures [Pa]."""
 
     angle: float
@@ -24,7 +24,7 @@ class SensorState(NamedTuple):
     pressure_2: float
 
 
-class Bandwidths(NamedTuple):
+class _Bandwidths(NamedTuple):
     """Settings of sensors with a lag: a bandwidth [Hz] for each signal."""
 
     angle_bandwidth: Annotated[
@@ -35,15 +35,15 @@ class Bandwidths(NamedTuple):
     ]
 
 
-def prepare(settings: Bandwidths, _device: Any) -> SensorRates:
+def prepare(settings: _Bandwidths, _device: Any) -> _SensorRates:
     """Parameters of sensors with given bandwidths [Hz]: their rates [1/s]."""
     # A first order with a bandwidth f (-3 dB) follows at the rate 2 pi f.
     turn = 2.0 * math.pi
-    return SensorRates(angle=turn * settings.angle_bandwidth, pressure=turn * settings.pressure_bandwidth)
+    return _SensorRates(angle=turn * settings.angle_bandwidth, pressure=turn * settings.pressure_bandwidth)
 
 
 def sensor_readings(
-    angle: float, pressure_1: float, pressure_2: float, bandwidth: SensorRates, bandwidth_state: SensorState
+    angle: float, pressure_1: float, pressure_2: float, bandwidth: _SensorRates, bandwidth_state: _SensorState
 ) -> tuple[float, float, float]:
     """Sensor readings of angle [rad] and absolute pressures [Pa]; a sensor without a bandwidth reads the true value."""
     follows_angle, follows_pressure = bandwidth.angle > 0.0, bandwidth.pressure > 0.0
@@ -55,26 +55,26 @@ def sensor_readings(
     )
 
 
-def start(_bandwidth: SensorRates, now: PlantSnapshot) -> SensorState:
+def start(_bandwidth: _SensorRates, now: PlantSnapshot) -> _SensorState:
     """State of the sensors at the start of a run, equal to the true values."""
-    return SensorState(angle=now.angle, pressure_1=now.pressure_1, pressure_2=now.pressure_2)
+    return _SensorState(angle=now.angle, pressure_1=now.pressure_1, pressure_2=now.pressure_2)
 
 
 def advance(
-    bandwidth: SensorRates, bandwidth_state: SensorState, before: PlantSnapshot, after: PlantSnapshot, step: float
-) -> SensorState:
+    bandwidth: _SensorRates, bandwidth_state: _SensorState, before: PlantSnapshot, after: PlantSnapshot, step: float
+) -> _SensorState:
     """Sensor readings after a step [s] over which the true values are linear in time; exact."""
     pressure = bandwidth.pressure
-    return SensorState(
+    return _SensorState(
         angle=follow(bandwidth.angle, step, bandwidth_state.angle, before.angle, after.angle),
         pressure_1=follow(pressure, step, bandwidth_state.pressure_1, before.pressure_1, after.pressure_1),
         pressure_2=follow(pressure, step, bandwidth_state.pressure_2, before.pressure_2, after.pressure_2),
     )
 
 
-def slopes(bandwidth: SensorRates, bandwidth_state: SensorState, now: PlantSnapshot) -> SensorState:
+def slopes(bandwidth: _SensorRates, bandwidth_state: _SensorState, now: PlantSnapshot) -> _SensorState:
     """Rates of the sensor readings [rad/s, Pa/s]."""
-    return SensorState(
+    return _SensorState(
         angle=follow_rate(bandwidth.angle, bandwidth_state.angle, now.angle),
         pressure_1=follow_rate(bandwidth.pressure, bandwidth_state.pressure_1, now.pressure_1),
         pressure_2=follow_rate(bandwidth.pressure, bandwidth_state.pressure_2, now.pressure_2),
@@ -84,13 +84,13 @@ def slopes(bandwidth: SensorRates, bandwidth_state: SensorState, now: PlantSnaps
 EFFECT = Effect(
     name="bandwidth",
     summary="Sensors with a first-order lag.",
-    settings=Bandwidths,
-    parameters=SensorRates,
+    settings=_Bandwidths,
+    parameters=_SensorRates,
     prepare=prepare,
     switch=("angle_bandwidth", "pressure_bandwidth"),
     laws={shown_signals: sensor_readings},
     source="a first-order lag, exact between two instants",
     equation="dy/dt = 2 pi f (x - y)",
-    state=State(row=SensorState, start=start, advance=advance, slopes=slopes),
+    state=State(row=_SensorState, start=start, advance=advance, slopes=slopes),
     section_of_files="sensors",
 )

@@ -13,7 +13,7 @@ COPPER = 3.93e-3
 """Temperature coefficient of the resistance of copper at 20 degC [1/K]."""
 
 
-class CoilHeating(NamedTuple):
+class _CoilHeating(NamedTuple):
     """Steady temperature rise of a coil that is always on [K], its rate [1/s], coefficients of the opening time.
 
     The opening time relative to a cold coil is ``1 + slowing x + slowing_squared x^2`` for a rise of ``x`` [K].
@@ -56,7 +56,7 @@ class CoilSettings(NamedTuple):
     ]
 
 
-def prepare(settings: CoilSettings, _device: Any) -> CoilHeating:
+def prepare(settings: CoilSettings, _device: Any) -> _CoilHeating:
     """Parameters from the settings; a parabola is fitted through a cold, a half warm and a hot coil.
 
     The parabola is within 0.6 % of the formula for every allowed rise and share, and avoids a logarithm in each step.
@@ -66,7 +66,7 @@ def prepare(settings: CoilSettings, _device: Any) -> CoilHeating:
     half, full = relative_opening_time(0.5 * steady, share) - 1.0, relative_opening_time(steady, share) - 1.0
     # Without a rise both differences are 0, and so is the parabola.
     whole = max(steady, 1.0e-30)
-    return CoilHeating(
+    return _CoilHeating(
         steady_rise=steady,
         warming=1.0 / settings.time_constant,
         slowing=(4.0 * half - full) / whole,
@@ -74,14 +74,16 @@ def prepare(settings: CoilSettings, _device: Any) -> CoilHeating:
     )
 
 
-def warm_opening_time(time: float, is_coil_a: float, coil_heating: CoilHeating, coil_heating_state: CoilRises) -> float:
+def warm_opening_time(
+    time: float, is_coil_a: float, coil_heating: _CoilHeating, coil_heating_state: CoilRises
+) -> float:
     """Time [s] from energising to flow at the present coil temperature."""
     rise = coil_heating_state.rise_a if is_coil_a > 0.5 else coil_heating_state.rise_b
     return opening_time(time, is_coil_a) * (1.0 + rise * (coil_heating.slowing + rise * coil_heating.slowing_squared))
 
 
 def advance(
-    coil_heating: CoilHeating, coil_heating_state: CoilRises, _before: PlantSnapshot, after: PlantSnapshot, step: float
+    coil_heating: _CoilHeating, coil_heating_state: CoilRises, _before: PlantSnapshot, after: PlantSnapshot, step: float
 ) -> CoilRises:
     """Temperature rises [K] after a step [s] with one command: ``dx/dt = (x_s on - x) / tau``, solved exactly."""
     on_a, on_b = coil_commands(after.command)
@@ -92,7 +94,7 @@ def advance(
     )
 
 
-def slopes(coil_heating: CoilHeating, coil_heating_state: CoilRises, now: PlantSnapshot) -> CoilRises:
+def slopes(coil_heating: _CoilHeating, coil_heating_state: CoilRises, now: PlantSnapshot) -> CoilRises:
     """Rates [K/s] of the temperature rises of both coils."""
     on_a, on_b = coil_commands(now.command)
     return CoilRises(
@@ -105,7 +107,7 @@ EFFECT = Effect(
     name="coil_heating",
     summary="Coils of solenoid valves that warm while they are on, and then lift their valves later.",
     settings=CoilSettings,
-    parameters=CoilHeating,
+    parameters=_CoilHeating,
     prepare=prepare,
     switch=("steady_rise",),
     laws={opening_time: warm_opening_time},

@@ -21,14 +21,14 @@ class IceState(NamedTuple):
     blockage: float = 0.0
 
 
-class IceSettings(NamedTuple):
+class _IceSettings(NamedTuple):
     """Settings of ice in the exhaust: growth and melting."""
 
     blockage_per_gas: Annotated[float, Number("1/kg", "blockage per gas that leaves, 0 for none", 0.0, 0.0, 1.0e6)]
     melting_time: Annotated[float, Number("s", "time constant of melting", 30.0, 1.0e-3, 1.0e6)]
 
 
-def prepare(settings: IceSettings, _device: Any) -> Ice:
+def prepare(settings: _IceSettings, _device: Any) -> Ice:
     """Growth and melting rates of ice."""
     return Ice(blockage_per_gas=settings.blockage_per_gas, melting=1.0 / settings.melting_time)
 
@@ -55,7 +55,7 @@ def slopes(ice: Ice, ice_state: IceState, now: PlantSnapshot) -> IceState:
 EFFECT = Effect(
     name="ice",
     summary="Ice at the exhaust of the valve, which grows with the gas that leaves and melts.",
-    settings=IceSettings,
+    settings=_IceSettings,
     parameters=Ice,
     prepare=prepare,
     switch=("blockage_per_gas",),

@@ -9,7 +9,7 @@ from ppafo.model.plant import gravity_torque
 from ppafo.model.ports import load_torque
 
 
-class JointLoad(NamedTuple):
+class _JointLoad(NamedTuple):
     """Parameters of a load at the joint, equal to its settings."""
 
     drag: Annotated[float, Number("N m s^2/rad^2", "drag torque per square of the rate", 0.0, 0.0, 1.0e3)]
@@ -20,7 +20,7 @@ class JointLoad(NamedTuple):
     ]
 
 
-def joint_load_torque(torque: float, angle: float, rate: float, joint_load: JointLoad) -> float:
+def joint_load_torque(torque: float, angle: float, rate: float, joint_load: _JointLoad) -> float:
     """Load torque [N m] of drag, spring and weight at the joint: ``c w |w| + k (theta - theta_0) + T_w(theta)``."""
     others = load_torque(torque, angle, rate)
     drag = joint_load.drag * rate * abs(rate)
@@ -31,8 +31,8 @@ def joint_load_torque(torque: float, angle: float, rate: float, joint_load: Join
 EFFECT = Effect(
     name="joint_load",
     summary="A load at the joint beside the foot plate: drag, spring, weight of a link.",
-    settings=JointLoad,
-    parameters=JointLoad,
+    settings=_JointLoad,
+    parameters=_JointLoad,
     prepare=None,
     switch=("drag", "stiffness", "weight"),
     laws={load_torque: joint_load_torque},

@@ -15,7 +15,7 @@ class LeakOpening(NamedTuple):
     opening_rise: float
 
 
-class LeakSettings(NamedTuple):
+class _LeakSettings(NamedTuple):
     """Settings of a leak past the vane with an opening pressure and a gradual rise."""
 
     pressure: Annotated[
@@ -48,7 +48,7 @@ def lifted_leak(
 EFFECT = Effect(
     name="leak_opening",
     summary="A leak between the chambers that opens at a pressure.",
-    settings=LeakSettings,
+    settings=_LeakSettings,
     parameters=LeakOpening,
     prepare=None,
     switch=("pressure",),

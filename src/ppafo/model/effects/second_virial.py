@@ -21,7 +21,7 @@ class SecondVirial(NamedTuple):
     per_mass: float
 
 
-class VirialSettings(NamedTuple):
+class _VirialSettings(NamedTuple):
     """Settings of a real gas: the second virial coefficient, and the fraction of it that applies."""
 
     share: Annotated[
@@ -39,7 +39,7 @@ class VirialSettings(NamedTuple):
     ]
 
 
-def prepare(settings: VirialSettings, device: Any) -> SecondVirial:
+def prepare(settings: _VirialSettings, device: Any) -> SecondVirial:
     """Parameters from a fraction of a molar coefficient, with the molar mass of the device's gas."""
     return SecondVirial(settings.share * settings.coefficient / device.gas.molar_mass)
 
@@ -84,7 +84,7 @@ def ideal_gas_density(density: float, second_virial: SecondVirial) -> tuple[floa
 EFFECT = Effect(
     name="second_virial",
     summary="Gas that is not ideal, by its second virial coefficient.",
-    settings=VirialSettings,
+    settings=_VirialSettings,
     parameters=SecondVirial,
     prepare=prepare,
     switch=("share",),

@@ -17,7 +17,7 @@ from ppafo.model.valves.kind import JoiningPath, ValveKind, ValveModel
 from ppafo.model.valves.solenoid import NEVER, SAME_INSTANT, Coil, PairPositions, PairState, TimedSolenoid
 
 
-class RecyclingSolenoid(NamedTuple):
+class _RecyclingSolenoid(NamedTuple):
     """Parameters of the pair, joining time of the chambers, and subsequent holding time of chamber 2 [s]."""
 
     pair: TimedSolenoid
@@ -38,7 +38,7 @@ class RecyclingState(NamedTuple):
     release_time: float = NEVER
 
 
-class RecyclingPositions(NamedTuple):
+class _RecyclingPositions(NamedTuple):
     """Positions of both valves, 1 to the source, 0 to the atmosphere; ``joined`` and ``keeps_gas`` as in the state."""
 
     position_a: float
@@ -47,7 +47,7 @@ class RecyclingPositions(NamedTuple):
     keeps_gas: float
 
 
-def settle(valve: RecyclingSolenoid, state: RecyclingState, command: float, time: float) -> RecyclingState:
+def settle(valve: _RecyclingSolenoid, state: RecyclingState, command: float, time: float) -> RecyclingState:
     """State after the changes and commands that are due at ``time`` [s]."""
     pair = solenoid.settle_timed(valve.pair, state.pair, command, time)
     feeds_1, feeds_2 = pair.coil_a.position > 0.5, pair.coil_b.position > 0.5
@@ -68,7 +68,7 @@ def settle(valve: RecyclingSolenoid, state: RecyclingState, command: float, time
     )
 
 
-def next_event(valve: RecyclingSolenoid, state: RecyclingState, command: float, time: float) -> float:
+def next_event(valve: _RecyclingSolenoid, state: RecyclingState, command: float, time: float) -> float:
     """Time [s] of the next event: a coil accepts a command, a flow changes, joining or holding ends; huge for never."""
     event = solenoid.next_timed_event(valve.pair, state.pair, command, time)
     event = min(event, state.release_time) if state.keeps_gas > 0.5 else event
@@ -76,12 +76,12 @@ def next_event(valve: RecyclingSolenoid, state: RecyclingState, command: float, 
 
 
 def advance(
-    valve: RecyclingSolenoid, state: RecyclingState, command: float, time: float, step: float
-) -> tuple[RecyclingPositions, RecyclingState]:
+    valve: _RecyclingSolenoid, state: RecyclingState, command: float, time: float, step: float
+) -> tuple[_RecyclingPositions, RecyclingState]:
     """Positions [-] during one part [s] of a step, after all changes that are due at its start, and the state."""
     settled = settle(valve, state, command, time)
     pair = settled.pair
-    shown = RecyclingPositions(
+    shown = _RecyclingPositions(
         position_a=pair.coil_a.position,
         position_b=pair.coil_b.position,
         joined=settled.joined,
@@ -90,7 +90,7 @@ def advance(
     return shown, settled
 
 
-def connect(plant: PlantParameters, shown: RecyclingPositions) -> tuple[SinglePort, SinglePort]:
+def connect(plant: PlantParameters, shown: _RecyclingPositions) -> tuple[SinglePort, SinglePort]:
     """Ports of both chambers: shut while joined, and chamber 2's also while it keeps its gas. Equation (8)."""
     port_1, port_2 = solenoid.connect_positions(plant, PairPositions(shown.position_a, shown.position_b))
     share_1 = 1.0 - shown.joined
@@ -111,12 +111,12 @@ def connect(plant: PlantParameters, shown: RecyclingPositions) -> tuple[SinglePo
     )
 
 
-def joined_opening(shown: RecyclingPositions) -> float:
+def joined_opening(shown: _RecyclingPositions) -> float:
     """Opening [-] between the chambers during a step."""
     return shown.joined
 
 
-def instant(valve: RecyclingSolenoid, state: RecyclingState, command: float) -> Openings:
+def instant(valve: _RecyclingSolenoid, state: RecyclingState, command: float) -> Openings:
     """Openings [-] of the pair at an instant."""
     pair = solenoid.instant_timed(valve.pair, state.pair, command)
     share_1 = 1.0 - state.joined
@@ -129,12 +129,12 @@ def instant(valve: RecyclingSolenoid, state: RecyclingState, command: float) -> 
     )
 
 
-def joined_at_instant(valve: RecyclingSolenoid, state: RecyclingState, command: float) -> float:
+def joined_at_instant(valve: _RecyclingSolenoid, state: RecyclingState, command: float) -> float:
     """Opening [-] between the chambers at an instant."""
     return state.joined
 
 
-def rates(valve: RecyclingSolenoid, state: RecyclingState, command: float) -> RecyclingState:
+def rates(valve: _RecyclingSolenoid, state: RecyclingState, command: float) -> RecyclingState:
     """Rates [1/s] of the state, which are 0 between two events."""
     still = Coil(position=0.0, target=0.0, accepted_time=0.0, change_time=0.0)
     return RecyclingState(PairState(still, still), joined=0.0, keeps_gas=0.0, parting_time=0.0, release_time=0.0)
@@ -154,18 +154,18 @@ class RecyclingSettings(NamedTuple):
     ]
 
 
-def prepare(settings: RecyclingSettings) -> RecyclingSolenoid:
+def prepare(settings: RecyclingSettings) -> _RecyclingSolenoid:
     """Parameters [s] from ``settings`` [SI]."""
-    return RecyclingSolenoid(solenoid.prepare_timed(settings), settings.joining_time, settings.holding_time)
+    return _RecyclingSolenoid(solenoid.prepare_timed(settings), settings.joining_time, settings.holding_time)
 
 
 MODEL = replace(
     solenoid.TIMED,
-    parameters=RecyclingSolenoid,
+    parameters=_RecyclingSolenoid,
     state=RecyclingState,
     prepare=prepare,
     initial=RecyclingState,
-    shown=RecyclingPositions,
+    shown=_RecyclingPositions,
     advance=advance,
     connect=connect,
     instant=instant,

@@ -26,35 +26,35 @@ from ppafo.processor.fixed_point import (
 from ppafo.processor.torque_laws.law import FixedLaw, Numbers, fixed_point_kind
 
 
-class OnOffNumbers(NamedTuple):
+class _OnOffNumbers(NamedTuple):
     """Parameters of on/off control: limits of the readings."""
 
     limits: ConverterLimits
 
 
-class OnOffCounts(NamedTuple):
+class _OnOffCounts(NamedTuple):
     """State of on/off control: 1 while all readings have been valid."""
 
     sound: int
 
 
-class OnOffRows(NamedTuple):
+class _OnOffRows(NamedTuple):
     """Steps of the converter, and parameters of ``on_off_sample``."""
 
     steps: CountResolution
-    numbers: OnOffNumbers
+    numbers: _OnOffNumbers
 
 
-def on_off_sample(numbers: OnOffNumbers, state: OnOffCounts, readings: ConverterCounts) -> tuple[int, OnOffCounts]:
+def on_off_sample(numbers: _OnOffNumbers, state: _OnOffCounts, readings: ConverterCounts) -> tuple[int, _OnOffCounts]:
     """Command in steps: 1000 for an error of 0 or more, else -1000; permanently 0 after a reading out of range."""
     sound = still_sound(state.sound, readings, numbers.limits)
     command = COMMAND_STEPS if error_of(readings, numbers.limits) >= 0 else -COMMAND_STEPS
-    return (command if sound == 1 else 0), OnOffCounts(sound)
+    return (command if sound == 1 else 0), _OnOffCounts(sound)
 
 
 def on_off_update(
-    parameters: OnOffRows, state: OnOffCounts, reference: float, measurement: Measurement, period: float
-) -> tuple[float, OnOffCounts]:
+    parameters: _OnOffRows, state: _OnOffCounts, reference: float, measurement: Measurement, period: float
+) -> tuple[float, _OnOffCounts]:
     """Command from -1 to 1 by ``on_off_sample`` for the converter readings."""
     readings = read(parameters.steps, parameters.numbers.limits, reference, measurement)
     command, after = on_off_sample(each(int, parameters.numbers), each(int, state), readings)
@@ -63,22 +63,22 @@ def on_off_update(
 
 ON_OFF_FIXED_POINT = fixed_point_kind(
     FLOAT_ON_OFF,
-    OnOffRows,
-    each(float, OnOffCounts(1)),
+    _OnOffRows,
+    each(float, _OnOffCounts(1)),
     on_off_update,
     Numbers("on_off_fixed_point", (*OF_STEPS, *OF_LIMITS)),
 )
 ON_OFF = FixedLaw(
     kind=ON_OFF_FIXED_POINT,
     sample=on_off_sample,
-    numbers=OnOffNumbers,
+    numbers=_OnOffNumbers,
     number_quantities=OF_LIMITS,
-    begins=OnOffCounts(1),
+    begins=_OnOffCounts(1),
     state_ranges={"sound": (0, 1)},
 )
 
 
-class DeadZoneNumbers(NamedTuple):
+class _DeadZoneNumbers(NamedTuple):
     """Limits of the readings; errors at which the valve opens and closes again [counts]; opening [steps]."""
 
     limits: ConverterLimits
@@ -87,23 +87,23 @@ class DeadZoneNumbers(NamedTuple):
     opening: int
 
 
-class DeadZoneCounts(NamedTuple):
+class _DeadZoneCounts(NamedTuple):
     """Direction of the opening: 1, 0 (closed) or -1; and 1 while all readings have been valid."""
 
     direction: int
     sound: int
 
 
-class DeadZoneRows(NamedTuple):
+class _DeadZoneRows(NamedTuple):
     """Steps of the converter, and parameters of ``dead_zone_sample``."""
 
     steps: CountResolution
-    numbers: DeadZoneNumbers
+    numbers: _DeadZoneNumbers
 
 
 def dead_zone_sample(
-    numbers: DeadZoneNumbers, state: DeadZoneCounts, readings: ConverterCounts
-) -> tuple[int, DeadZoneCounts]:
+    numbers: _DeadZoneNumbers, state: _DeadZoneCounts, readings: ConverterCounts
+) -> tuple[int, _DeadZoneCounts]:
     """Command in steps: opening in the direction of an error beyond the dead zone; 0 for good after a bad reading."""
     sound = still_sound(state.sound, readings, numbers.limits)
     error = error_of(readings, numbers.limits)
@@ -112,12 +112,12 @@ def dead_zone_sample(
     limit_down = numbers.release if state.direction < 0 else numbers.dead_zone
     direction = 1 if error > limit_up else (-1 if error < -limit_down else 0)
     opening = numbers.opening if direction > 0 else (-numbers.opening if direction < 0 else 0)
-    return (opening if sound == 1 else 0), DeadZoneCounts(direction=direction, sound=sound)
+    return (opening if sound == 1 else 0), _DeadZoneCounts(direction=direction, sound=sound)
 
 
 def dead_zone_update(
-    parameters: DeadZoneRows, state: DeadZoneCounts, reference: float, measurement: Measurement, period: float
-) -> tuple[float, DeadZoneCounts]:
+    parameters: _DeadZoneRows, state: _DeadZoneCounts, reference: float, measurement: Measurement, period: float
+) -> tuple[float, _DeadZoneCounts]:
     """Command from -1 to 1 by ``dead_zone_sample`` for the converter readings."""
     readings = read(parameters.steps, parameters.numbers.limits, reference, measurement)
     command, after = dead_zone_sample(each(int, parameters.numbers), each(int, state), readings)
@@ -125,7 +125,7 @@ def dead_zone_update(
 
 
 def prepare_dead_zone(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:
-    """Numbers of ``DeadZoneNumbers`` after the limits, for settings in SI units and a torque per count [N m]."""
+    """Numbers of ``_DeadZoneNumbers`` after the limits, for settings in SI units and a torque per count [N m]."""
     # A release beyond the dead zone would close the valve before it opens.
     zone, release = settings["dead_zone"], min(settings["release"], settings["dead_zone"])
     counts = [float(min(LARGEST_READING, int(torque / torque_step + 0.5))) for torque in (zone, release)]
@@ -145,16 +145,16 @@ _DEAD_ZONE_NUMBERS = (
 )
 DEAD_ZONE_FIXED_POINT = fixed_point_kind(
     FLOAT_DEAD_ZONE,
-    DeadZoneRows,
-    each(float, DeadZoneCounts(0, 1)),
+    _DeadZoneRows,
+    each(float, _DeadZoneCounts(0, 1)),
     dead_zone_update,
     Numbers("on_off_dead_zone_fixed_point", (*OF_STEPS, *_DEAD_ZONE_NUMBERS), prepare_dead_zone, largest_dead_zone),
 )
 DEAD_ZONE = FixedLaw(
     kind=DEAD_ZONE_FIXED_POINT,
     sample=dead_zone_sample,
-    numbers=DeadZoneNumbers,
+    numbers=_DeadZoneNumbers,
     number_quantities=_DEAD_ZONE_NUMBERS,
-    begins=DeadZoneCounts(0, 1),
+    begins=_DeadZoneCounts(0, 1),
     state_ranges={"direction": (-1, 1), "sound": (0, 1)},
 )

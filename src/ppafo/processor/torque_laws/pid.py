@@ -57,7 +57,7 @@ SHARE = float(2**FRACTION_BITS)
 """Integer value of a fraction of 1."""
 
 
-class PidNumbers(NamedTuple):
+class _PidNumbers(NamedTuple):
     """Limits of the readings, gains as 15-bit fractions and shifts; filter, anti-windup and dead band in 1/2^15."""
 
     limits: ConverterLimits
@@ -72,7 +72,7 @@ class PidNumbers(NamedTuple):
     dead_band: int
 
 
-class PidCounts(NamedTuple):
+class _PidCounts(NamedTuple):
     """Integral [integral units], error [counts], slope [1/65536 counts], 1 once started, 1 while readings are valid."""
 
     integral: int
@@ -82,14 +82,14 @@ class PidCounts(NamedTuple):
     sound: int
 
 
-class PidRows(NamedTuple):
+class _PidRows(NamedTuple):
     """Steps of the converter, and parameters of ``pid_sample``."""
 
     steps: CountResolution
-    numbers: PidNumbers
+    numbers: _PidNumbers
 
 
-def pid_sample(numbers: PidNumbers, state: PidCounts, readings: ConverterCounts) -> tuple[int, PidCounts]:
+def pid_sample(numbers: _PidNumbers, state: _PidCounts, readings: ConverterCounts) -> tuple[int, _PidCounts]:
     """Command in steps from -1000 to 1000 for a sample; permanently 0 after a reading at an end of its range."""
     sound = still_sound(state.sound, readings, numbers.limits)
     error = error_of(readings, numbers.limits)
@@ -111,15 +111,15 @@ def pid_sample(numbers: PidNumbers, state: PidCounts, readings: ConverterCounts)
     # Back-calculation, after the command: the integral of the next sample has it, as in equation (13) with floats.
     excess = limited(command - unlimited, LARGEST_EXCESS)
     integral = limited(integral + fraction_of(excess * FINE, numbers.anti_windup), LARGEST_INTEGRAL)
-    after = PidCounts(integral=integral, error=error, slope=slope, started=1, sound=sound)
+    after = _PidCounts(integral=integral, error=error, slope=slope, started=1, sound=sound)
     sent = beyond_band(command, numbers.dead_band, FULL)
     # A half first: the shift rounds down.
     return ((sent + HALF_STEP) >> PART_BITS if sound == 1 else 0), after
 
 
 def pid_update(
-    parameters: PidRows, state: PidCounts, reference: float, measurement: Measurement, period: float
-) -> tuple[float, PidCounts]:
+    parameters: _PidRows, state: _PidCounts, reference: float, measurement: Measurement, period: float
+) -> tuple[float, _PidCounts]:
     """Command from -1 to 1 by ``pid_sample`` for the converter readings, once every ``period`` [s]."""
     readings = read(parameters.steps, parameters.numbers.limits, reference, measurement)
     command, after = pid_sample(each(int, parameters.numbers), each(int, state), readings)
@@ -149,7 +149,7 @@ def pid_factors(
 
 
 def prepare_pid(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:
-    """Numbers of ``PidNumbers`` after the limits, for settings in SI units, period [s] and torque per count [N m]."""
+    """Numbers of ``_PidNumbers`` after the limits, for settings in SI units, period [s] and torque per count [N m]."""
     gains, shares = pid_factors(settings, period, torque_step)
     scaled = (number for gain in gains for number in gain_of(gain))
     return (*scaled, *(float(min(LARGEST_FRACTION, int(share * SHARE + 0.5))) for share in shares))
@@ -176,12 +176,12 @@ _PID_NUMBERS = (
     Quantity("anti_windup", "", "share of the excess that is pulled back, in 1/2^15", None, 0.0, _MOST_OF_FRACTION),
     Quantity("dead_band", "", "dead band of the valve, in 1/2^15", None, 0.0, _MOST_OF_FRACTION),
 )
-_PID_BEGINS = PidCounts(integral=0, error=0, slope=0, started=0, sound=1)
+_PID_BEGINS = _PidCounts(integral=0, error=0, slope=0, started=0, sound=1)
 _LARGEST_ERROR = 2 * LARGEST_READING
 """Largest error in counts: reference from mid-range and pressure difference each span at most one range."""
 PID_FIXED_POINT = fixed_point_kind(
     FLOAT_PID,
-    PidRows,
+    _PidRows,
     each(float, _PID_BEGINS),
     pid_update,
     Numbers("pid_fixed_point", (*OF_STEPS, *_PID_NUMBERS), prepare_pid, largest_pid),
@@ -189,7 +189,7 @@ PID_FIXED_POINT = fixed_point_kind(
 PID = FixedLaw(
     kind=PID_FIXED_POINT,
     sample=pid_sample,
-    numbers=PidNumbers,
+    numbers=_PidNumbers,
     number_quantities=_PID_NUMBERS,
     begins=_PID_BEGINS,
     state_ranges={

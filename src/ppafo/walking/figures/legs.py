@@ -85,7 +85,7 @@ def last_phases(result: WalkResult, strides: int, per_stride: int) -> Floats:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LegArtists:
+class _LegArtists:
     """Matplotlib lines of one leg: shank, foot as a wedge of ankle, heel and toes, and ankle joint."""
 
     shank: "Line2D"
@@ -101,7 +101,7 @@ class LegArtists:
         self.joint.set_data([knee[0], ankle[0]], [knee[1], ankle[1]])
 
 
-def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False) -> LegArtists:
+def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False) -> _LegArtists:
     """Add the lines of one leg to the axes, with a line width [points]; ``place`` sets their position."""
     from matplotlib.patches import Polygon
 
@@ -118,7 +118,7 @@ def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False)
     axes.add_patch(foot)
     size = 0.0 if is_ghost else 1.6 * width
     (joint,) = axes.plot([], [], "o", color="white", markeredgecolor=colour, markersize=size, zorder=3.5)
-    return LegArtists(shank, foot, joint)
+    return _LegArtists(shank, foot, joint)
 
 
 def draw_ground(axes: "Axes", left: float, right: float) -> None:
