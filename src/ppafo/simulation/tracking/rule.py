@@ -294,8 +294,9 @@ def largest_deviation(settled: SettledPart) -> Floats:
     The numbers of ``settled`` may be arrays (runs,).
     """
     # Degrees count for an angle, however far it goes.
-    swing = np.maximum(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * settled.way)
-    limit: Floats = np.where(settled.rests, swing, np.maximum(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * settled.way))
+    rests, way = np.asarray(settled.rests), np.asarray(settled.way)
+    swing, error = LARGEST_SWING_SHARE * way, LARGEST_ANGLE_SHARE * way
+    limit: Floats = np.where(rests, np.maximum(LARGEST_ANGLE_SWING, swing), np.maximum(LARGEST_ANGLE_ERROR, error))
     return limit
 
 
@@ -306,7 +307,7 @@ def excess_of_task(settled: SettledPart, is_switched: bool) -> _TaskExcess:
     (runs,).
     """
     rests, share = np.asarray(settled.rests), np.asarray(settled.share)
-    deviation = np.where(rests, settled.span, settled.worst) / largest_deviation(settled)
+    deviation: Floats = np.where(rests, settled.span, settled.worst) / largest_deviation(settled)
     deviation = np.where(np.asarray(settled.way) > 0.0, deviation, 0.0)
     off = np.asarray(settled.error) / largest_error(settled, is_switched)
     if is_switched:

@@ -201,7 +201,7 @@ def _undecided_text(scenario: Scenario, samples: int, error: float | None) -> st
     ``error`` is the RMS error of a run that ends on its ramp, None for a run with too few samples.
     """
     run, controlled = scenario.run, CONTROLLED[scenario.controlled]
-    reason = f"{samples} samples are too few to judge it"
+    reason = f"{samples} samples are too few"
     if error is not None:
         reason = (
             f"the run ends on the ramp of its reference, with an RMS error of {change_text(controlled.name, error)}"
