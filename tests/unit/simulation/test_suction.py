@@ -270,7 +270,7 @@ def test_a_verdict_asks_for_a_deeper_vacuum_where_one_gives_the_torque() -> None
 def test_a_linear_model_names_the_chamber_that_is_evacuated() -> None:
     model = linearise(TASK, overrides=(*SUCTION, "reference.level=0.5 N m"))
     assert "evacuates chamber 2" in str(model)
-    with pytest.raises(PpafoError, match=r"the actuator comes to 0\.8702 N m"):
+    with pytest.raises(PpafoError, match=r"the actuator reaches 0\.8702 N m"):
         linearise(TASK, overrides=(*SUCTION, "reference.level=2 N m"))
 
 
