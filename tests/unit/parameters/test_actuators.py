@@ -219,7 +219,11 @@ def test_a_table_must_hold_at_supply_pressure(tmp_path: Path, lines: tuple[str, 
 @pytest.mark.parametrize(
     ("lines", "pressures", "said"),
     [
-        (GOOD_TO_110, (60.0, 900.0), "actuator: its volume table covers pressures up to 66 kPa_g, but the supply has 900"),
+        (
+            GOOD_TO_110,
+            (60.0, 900.0),
+            "actuator: its volume table covers pressures up to 66 kPa_g, but the supply has 900",
+        ),
         (SHRINKING, (490.0, 65.0), "chamber 1 must grow with the angle, and grows by -"),
     ],
 )
