@@ -15,6 +15,7 @@ from ppafo.simulation.gains import terms_of
 from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chambers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import LARGEST_SHARE, SettledPart
+from ppafo.units import without_exponent
 from ppafo.wording import override_text
 
 FASTEST_FIRST = (
@@ -71,13 +72,13 @@ def level_text(unit: str, number: float) -> str:
     """Value with its display unit, from a number in an SI unit; pressures as gauge pressures, or as differences."""
     value, shown = metric_level(float(number), unit)
     # As it can be pasted: a difference of pressures is told from a level by its unit.
-    return f"{value:.3g} {shown}{'_d' if unit == 'Pa_d' else ''}".rstrip()
+    return f"{without_exponent(value, '.3g')} {shown}{'_d' if unit == 'Pa_d' else ''}".rstrip()
 
 
 def change_text(controlled: str, number: float) -> str:
     """Difference of two values of the controlled quantity, with its display unit."""
     value, unit = metric_change(number, CONTROLLED[controlled].difference)
-    return f"{value:.3g} {unit}"
+    return f"{without_exponent(value, '.3g')} {unit}"
 
 
 def speed_settings(scenario: Scenario, law: ControllerKind | None) -> dict[str, Quantity]:
