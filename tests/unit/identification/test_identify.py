@@ -13,7 +13,7 @@ from ppafo.analyses.identify.answer import Identification, finding_of
 from ppafo.analyses.identify.question import identify
 from ppafo.cli.main import main
 from ppafo.errors import IdentificationError, PpafoError
-from ppafo.identification.estimate import Estimate
+from ppafo.identification.estimate import UNKNOWN, Estimate, relative_half_width
 from ppafo.identification.new_set import with_estimates
 from ppafo.identification.problem import json_schema, parse_problem
 from ppafo.identification.procedures import FreeDecayProblem, ProcedureContext, VaneLeakProblem
@@ -102,7 +102,7 @@ def test_drop_outs_within_a_decay_are_left_out_before_the_push_is_looked_for(ben
     lost = np.where(np.arange(len(one)) % 101 == 50, 0.0, one["angle"])
     write_csv(bench / "lost.csv", one.with_channel("angle", lost, "rad"))
     result = solved(DECAY.replace("decay.csv", "lost.csv")).results[0]
-    assert result.remarks[0].startswith("left out: 16 of 1600 samples with 'angle' far off")
+    assert result.remarks[0].startswith("left out: 16 of 1600 samples where 'angle' is an outlier")
     for estimate, right in zip(result.estimates, base, strict=True):
         assert estimate.value == pytest.approx(right.value, rel=0.02)
         assert estimate.verdict == "identified"
@@ -112,7 +112,7 @@ def test_a_valve_map_that_was_swept_one_way_tells_what_its_dead_band_holds(bench
     one = planted.sweep().recording
     write_csv(bench / "rising.csv", one.between(0.0, 10.0))
     remarks = solved(MAP.replace("sweep.csv", "rising.csv")).results[0].remarks
-    assert any("half of its width is in the dead band" in remark for remark in remarks)
+    assert any("half the width of any hysteresis is included in the dead band" in remark for remark in remarks)
     both = solved(MAP).results[0].remarks
     assert not any("half of its width" in remark for remark in both)
 
@@ -122,7 +122,7 @@ def test_a_discharge_coefficient_above_one_is_doubted(bench: Path, solved: Solve
     write_csv(bench / "minutes.csv", one.with_channel("mass_flow", 60.0 * one["mass_flow"], "kg/s"))
     result = solved(FLOW.replace("flow.csv", "minutes.csv")).results[0]
     assert result.remarks[0].startswith("Cd = ")
-    assert "a flow per minute is 60 times one per second" in result.remarks[0]
+    assert "a flow per minute is 60 times a flow per second" in result.remarks[0]
     assert result.estimates[0].verdict == "holds for this model only"
 
 
@@ -469,6 +469,27 @@ def test_a_value_that_could_not_be_told_may_be_no_number() -> None:
     assert not nothing.is_usable
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "verdict", "text"),
+    [
+        (1.9, 2.1, "identified", "identified"),
+        (1.12, 2.5, "identified", "identified, +-44 %"),
+        (1.7, 2.6, "holds for this model only", "holds for this model only, +-30 %"),
+        (0.0, 5.0, "not identifiable", "not identifiable"),
+    ],
+)
+def test_the_verdict_states_the_half_width_of_a_wide_interval(low: float, high: float, verdict: str, text: str) -> None:
+    assert estimate(2.0, low, high, verdict).verdict_text == text
+
+
+def test_an_interval_that_holds_zero_or_twice_the_value_does_not_identify_it() -> None:
+    assert relative_half_width(2.0, 0.1, 3.9) < UNKNOWN
+    assert relative_half_width(2.0, 0.0, 2.5) >= UNKNOWN
+    assert relative_half_width(2.0, 1.5, 4.0) >= UNKNOWN
+    # The zero of a sensor is known although it may be zero.
+    assert relative_half_width(0.0, -0.1, 0.1, 10.0) == pytest.approx(0.01)
+
+
 def test_an_unknown_verdict_is_refused() -> None:
     with pytest.raises(IdentificationError, match="'fine' is not a verdict"):
         estimate(2.0, 1.0, 3.0, "fine")
@@ -504,5 +525,5 @@ def test_a_tolerance_that_is_anew_in_each_recording_but_common_in_a_procedure_is
 
     remarks = solved(f"bench.each_recording = ['gain']\n{two}").results[0].remarks
 
-    assert any("bench.each_recording: 'gain' acts in a [trajectory]" in one for one in remarks)
+    assert any("bench.each_recording: 'gain' has no effect in" in one for one in remarks)
     assert solved(two).results[0].remarks == ()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.estimate import Estimate, Verdict
+from ppafo.identification.estimate import UNKNOWN, Estimate, Verdict, relative_half_width
 from ppafo.identification.fit import Fit
 from ppafo.identification.fit import fit as fit_residuals
 from ppafo.identification.residuals import ResidualBlock
@@ -188,8 +188,8 @@ def _remarks(fitted: Fit, scenarios: Sequence[Scenario], estimates: Sequence[Est
             inside = estimate.value - side * _INSIDE * abs(estimate.value)
             bounds.append(f'{"high" if side > 0 else "low"} = "{_in_unit(inside, estimate)}" of {estimate.path}')
         remarks.append(
-            f"the recordings favour {' and '.join(wanted)}, where no run succeeds; check recordings, scenario and set, "
-            f"or give {' and '.join(bounds)}, and the fit ends there as at a bound"
+            f"the recordings favour {' and '.join(wanted)}, where every run fails; check recordings, "
+            f"scenario and set, or give {' and '.join(bounds)} as a bound"
         )
     elif not fitted.has_converged:
         starts = ", ".join(f'start = "{_in_unit(item.value, item)}" of {item.path}' for item in estimates)
@@ -207,7 +207,7 @@ def _outlier_remarks(fitted: Fit, blocks: Sequence[ResidualBlock], times: Mappin
         if samples:
             is_one = len(samples) == 1
             count, first = "1 sample" if is_one else f"{len(samples)} samples", times[block.recording][samples[0]]
-            verb = "stands out by itself and was" if is_one else "stand out by themselves and were"
+            verb = "is an outlier and was" if is_one else "are outliers and were"
             yield f"experiment '{block.recording}': {count} of {block.channel}, at {first:.6g} s first, {verb} left out"
 
 
@@ -265,12 +265,14 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
     bound = next((end for end in (free.low, free.high) if abs(value - end) <= _AT_BOUND * abs(end or 1.0)), None)
     combination = next((weights for weights in fitted.unidentified if abs(weights.get(name, 0.0)) >= _OWN_SHARE), None)
     verdict: Verdict = "identified"
+    # Of a quantity of either sign, such as the zero of a sensor, the value may be zero.
+    size = free.scale if free.low < 0.0 < free.high else None
+    remedy = "fix it, give a prior, or make another recording"
     if combination is not None:
         verdict = "not identifiable"
         # So far from where it was linearised the interval of a straight line means nothing.
         low, high = min(low, free.low), max(high, free.high)
         others = [other for other in combination if other != name]
-        remedy = "fix it, give a prior, or make another recording"
         text = f"trades off against {' and '.join(others)}; {remedy}"
         if not others:
             # Where the model lacks something, that may be what moves a number so far from its start.
@@ -278,6 +280,9 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
     elif bound is not None:
         end, unit = in_shown_unit(bound, number.unit)
         verdict, text = "at its bound", f"the recordings favour a value at or beyond {end:.6g} {unit}".rstrip(" -")
+    elif relative_half_width(value, low, high, size) >= UNKNOWN:
+        verdict = "not identifiable"
+        text = f"{widened_by(fitted, name)}; the interval holds zero or twice the value; {remedy}"
     elif conflict:
         # Said of every number: which of them the missing physics moves is not known.
         verdict, text = "holds for this model only", conflict
@@ -288,7 +293,7 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
         for experiment in problem.experiments
         if number.acts_in(experiment.label)
     )
-    return Estimate(name, value, number.unit, low, high, verdict, text, recordings, problem.confidence)
+    return Estimate(name, value, number.unit, low, high, verdict, text, recordings, problem.confidence, size)
 
 
 def _channel(fitted: Fit, experiment: str, measured: FitChannel, model: Floats) -> ChannelFit:

@@ -166,7 +166,7 @@ def test_a_remedy_that_is_said_was_tried() -> None:
     beyond = ppafo.load_scenario("torque-task-proportional", ["reference.level=9 N m"])
     remarks = compare({"beyond": beyond, "paper": ppafo.load_scenario("torque-task-proportional")}).found.remarks
     said = next(text for text in remarks if text.startswith("beyond"))
-    assert "with `supply.pressure = " in said
+    assert "with overrides=['supply.pressure=" in said
     assert "it follows, as a further run shows; it is not among the best" in said
 
 
