@@ -7,7 +7,7 @@ power of the volume.
 
 import functools
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -175,10 +175,8 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
         for other in other_forms(path, FILLS):
             entries.pop(other, None)
         entries[path] = Entry(value=value, unit=unit, origin="assumed", source=SOURCE)
-    if changes:
-        changed = ", ".join(map(str, changes.values()))
-        parsed = parsed.model_copy(update={"title": f"{parsed.title} (values changed: {changed})"})
-    return _build(parsed, entries, file)
+    bottle, changed = _build(parsed, entries, file), ", ".join(map(str, changes.values()))
+    return replace(bottle, title=f"{bottle.title} (values changed: {changed})") if changes else bottle
 
 
 def _entries_of(parsed: Any) -> dict[str, Entry]:
