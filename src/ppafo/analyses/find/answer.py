@@ -6,8 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.analyses.find.solve import FindResult
-from ppafo.metrics.tracking import ONE_INSTANT
-from ppafo.report.display_units import metric_words
 from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import Kind, of_metric, of_path
 from ppafo.report.panels import Mark, Panel
@@ -21,8 +19,8 @@ class FindSample:
 
     ``value``: tried value [SI]
     ``metric``: metric at this value [SI]; nan if the run failed
-    ``judged``: number compared with the limit [SI]: the metric, or the RMS error on the hold if that is larger and the
-        loop oscillates there; nan if the loop oscillates throughout
+    ``judged``: number compared with the limit [SI]: the metric, or the RMS error in the second half of the hold if that
+        is larger and the value swings there; nan if the loop oscillates throughout
     ``is_of_grid``: True if the value belongs to the initial grid
     """
 
@@ -40,8 +38,8 @@ class Threshold:
     ``not_met_at``: next tried value on the outer side, which does not meet the condition; None at the end of the range
     ``changes``: number of changes between met and not met along the tried values
     ``met``: first and last value of each interval in which the condition is met
-    ``unsettled``: number of runs whose loop oscillates at the instant of the metric, so that their RMS error on the
-        hold must meet the condition too
+    ``unsettled``: number of runs that swing at the instant of the metric, so that their RMS error in the second half of
+        the hold must meet the condition too
     """
 
     scenario: str
@@ -172,8 +170,8 @@ def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
         yield noise
     if unsettled := int(tried["unsettled"].sum()):
         yield (
-            f"in {unsettled} runs the loop oscillates on the hold, and {condition.metric} is one sample of it: in "
-            f"these runs the condition must also hold for {ONE_INSTANT[condition.metric][0]}"
+            f"in {unsettled} runs the loop still swings in the second half of the hold, and {condition.metric} is one "
+            "sample of that: in these runs the condition must also hold for the RMS error there"
         )
     if oscillating := int(tried["oscillating"].sum()):
         yield f"in {oscillating} of {runs.count} runs the loop oscillates: they count as not met"
@@ -190,11 +188,11 @@ def _panel(outcome: FindResult, kind: Kind) -> Panel:
     dots, dashes = {"linestyle": "", "marker": "o", "markersize": 3}, {"linestyle": "--", "linewidth": 1.0}
     grid_samples = tried[tried["is_of_grid"]]
     marks = [Mark("line", values, metrics), Mark("line", grid_samples["value"], grid_samples["metric"], style=dots)]
-    # The RMS error on the hold where that is larger, and what the condition is asked of.
+    # The RMS error where that is larger, and what the condition is asked of.
     larger = np.where(judged > metrics, judged, np.nan)
     if np.isfinite(larger).any():
         crosses = {"linestyle": "", "marker": "x", "markersize": 4}
-        label = f"{metric_words(ONE_INSTANT[condition.metric][0])}, of a loop that oscillates"
+        label = "RMS error in the second half of the hold, where it swings"
         marks.append(Mark("line", values, larger, label=label, colour=GREY, style=crosses))
     marks.append(Mark("level", (), condition.limit, label="limit", colour=BLACK, style=dashes))
     marks += [

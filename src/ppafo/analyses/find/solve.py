@@ -76,11 +76,11 @@ TRIED = np.dtype(
 )
 """Row of a tried value [SI] with its metric [SI], nan if the run failed, and the ``spread`` over the noise streams.
 
-``judged``: number compared with the limit: the metric, or the RMS error on the hold if that is larger and the loop
-    oscillates there; nan if the loop oscillates throughout
+``judged``: number compared with the limit: the metric, or the RMS error in the second half of the hold if that is
+    larger and the value swings there; nan if the loop oscillates throughout
 ``follows``: True if the reference is followed in all streams
 ``is_of_grid``: True for values of the initial grid, False for values of a bracket
-``unsettled``, ``oscillating``: number of runs that oscillate on the hold, and throughout
+``unsettled``, ``oscillating``: number of runs that swing in the second half of the hold, and oscillate throughout
 """
 
 
@@ -127,7 +127,7 @@ class FindResult:
         if seeds.size:
             columns[NOISE] = np.repeat(seeds, values.size)
         rows = self.runs.run(columns)
-        # One instant of a loop that oscillates may meet the condition by chance.
+        # One instant of a value that swings may meet the condition by chance.
         judged = settled(rows, metric)
         # A loop whose command turns all the time meets no condition that anybody would build on.
         turns = oscillating(rows, base)
