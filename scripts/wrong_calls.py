@@ -162,7 +162,9 @@ ARGUMENTS: Mapping[str, str] = {
         "baseline? draws? check"
     ),
     "compare_walks": "scenario minutes? progress",
-    "design": ("problem:object? threads? mass? stature? torque? pressure? minutes? toes? catalogue? bottle? progress?"),
+    "design": (
+        "problem:object? threads? mass? stature? gait? torque? pressure? minutes? toes? catalogue? bottle? progress?"
+    ),
     "endurance_of_walk": "result bottle?",
     "estimate": (
         "overrides seed? threads? progress? confidence maximum_failed study metric statistic width? also "

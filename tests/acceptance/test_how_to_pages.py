@@ -47,7 +47,7 @@ MUSCLES = Path(__file__).parents[2] / "src" / "ppafo" / "examples" / "add-an-act
 PUBLICATION = """\
 schema_version = 1
 name = "mine"
-title = "what it is about"
+title = "subject of the publication"
 citation = "Somebody, Journal, 2020"
 
 [[claims]]

@@ -60,7 +60,7 @@ def test_its_files_are_recognised_and_imported(tmp_path: Path, capsys: pytest.Ca
         assert np.abs(away).max() < 1e-5
     assert main(["gait", "import", str(path), "--body-mass", "62 kg"]) == 0
     assert main(["gait", "import", str(path), "--body-mass", "62 kg", "--form", "goniometre"]) == 2
-    assert "there is no gait form 'goniometre', did you mean 'goniometer'?" in capsys.readouterr().err
+    assert "there is no gait format 'goniometre', did you mean 'goniometer'?" in capsys.readouterr().err
 
 
 def test_it_can_be_named_by_its_module_without_an_entry_point(site: Path, capsys: pytest.CaptureFixture[str]) -> None:

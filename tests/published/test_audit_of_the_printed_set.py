@@ -99,7 +99,7 @@ def test_the_volume_of_chamber_2_is_negative_within_figure_7() -> None:
     finding = FOUND["volume-2"]
     assert finding.severity == "error"
     assert side(finding, "V2 at the end of the range") == pytest.approx(-35.6e-6, abs=0.05e-6)
-    assert side(finding, "part of the range without volume") == pytest.approx(40.0 / 110.0)
+    assert side(finding, "part of the range with no volume") == pytest.approx(40.0 / 110.0)
 
 
 def test_the_ideal_gas_law_under_counts_by_2_3_percent() -> None:

@@ -8,6 +8,7 @@ import ppafo
 from ppafo.cli.command_line import CommandGroup
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import main
+from ppafo.wording import read_by
 
 FEWEST_ANALYSES = 14
 
@@ -17,10 +18,12 @@ def test_a_printed_run_is_what_its_command_prints(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
     assert main(["simulate", name, "--out", str(tmp_path / "run")]) == 0
-    result = ppafo.simulate(name)
+    with read_by("command line"):
+        result = ppafo.simulate(name)
+        text = str(result)
     printed = capsys.readouterr()
     # The command tells of coarse valves before the run, beside its output.
-    lines = "\n".join(line for line in str(result).splitlines() if not line or line not in caplog.text)
+    lines = "\n".join(line for line in text.splitlines() if not line or line not in caplog.text)
     assert printed.out.startswith(f"{lines}\n\n{result.error().sentence}\n\nwritten: ")
 
 

@@ -27,7 +27,7 @@ class DeviceProblem(StrictTable):
 
     set: Text = Field(description="name of a parameter set, or a path relative to this file")
     valve: Text | None = Field(None, description="name of a valve of the set; default: the chosen one")
-    overrides: Texts = Field((), description="changes to the set, kept in the new one")
+    overrides: Texts = Field((), description="overrides of the set, kept in the new set")
 
 
 class ProblemFile(StrictTable):
@@ -37,13 +37,17 @@ class ProblemFile(StrictTable):
     name: str = Field(pattern=NAME, max_length=100, description="name of the new parameter set")
     title: str = Field("", description="title of the new parameter set")
     device: DeviceProblem = Field(description="the set to start from")
-    citation: Citation | None = Field(None, description="who measured; default: the set's to start from")
-    columns: dict[str, ColumnMap] = Field({}, description="column maps by name, for files from elsewhere")
-    bench: BenchSection | None = Field(None, description="what the bench does not know exactly")
+    citation: Citation | None = Field(
+        None, description="authors of the measurements; default: those of the set to start from"
+    )
+    columns: dict[str, ColumnMap] = Field({}, description="column maps by name, for files with columns of other names")
+    bench: BenchSection | None = Field(None, description="tolerances of the bench")
     procedure: tuple[Annotated[ProcedureProblem, Field(discriminator="kind")], ...] = Field(
         (), strict=False, min_length=1, description="bench procedures to apply"
     )
-    trajectory: TrajectorySection | None = Field(None, description="a fit to recordings of motion, after the bench")
+    trajectory: TrajectorySection | None = Field(
+        None, description="fit to recordings of motion, after the bench procedures"
+    )
 
 
 def load_problem(path: str | Path) -> ProblemFile:

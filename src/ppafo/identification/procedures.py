@@ -170,7 +170,7 @@ class OpenValveFlowProblem(StrictTable):
     gas: _Gas = None
     temperature: _Temperature = None
     valve: _Valve = None
-    law: Annotated[Law, Field(description="law of the flow; it is written into the set in this form")] = "orifice"
+    law: Annotated[Law, Field(description="flow law, also the form in which the set gives it")] = "orifice"
 
     def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
         """Return the result of the procedure for recordings."""
@@ -200,7 +200,8 @@ class VaneLeakProblem(StrictTable):
     end: _End = None
     angle: Text | None = Field(None, description="vane angle, from which the set's volumes follow")
     law: Literal["orifice", "laminar", "both"] = Field(
-        "orifice", description="an orifice is written as the set has it; both: a laminar gap beside it"
+        "orifice",
+        description="flow law; an orifice in the form of the set; 'both': orifice and laminar gap in parallel",
     )
     volume_1: Text | None = Field(None, description="volume of chamber 1 with its line, such as '40 cm^3'")
     volume_2: Text | None = Field(None, description="volume of chamber 2 with its line")
@@ -296,8 +297,8 @@ def run_procedure(
     if not idle or len(sources) == 1:
         return result
     remark = (
-        f"bench.each_recording: {' and '.join(idle)} acts in a [trajectory], and 'zero' in static-torque; here it is "
-        f"common to all {len(sources)} recordings: give each mounting of the sensors its own [[procedure]]"
+        f"bench.each_recording: {' and '.join(idle)} has no effect in {problem.kind}: one value is "
+        f"estimated for all {len(sources)} recordings; give each mounting of the sensors its own [[procedure]]"
     )
     return replace(result, remarks=(*result.remarks, remark))
 

@@ -59,41 +59,53 @@ _LARGEST_FRACTION = 0.5
 class BenchSection(StrictTable):
     """Tolerances of the bench as limits (+-); 0 for an exact value."""
 
-    load: Annotated[Text | None, Field(description="of the external torque, of each recording; default 2 %")] = None
-    supply: Annotated[Text | None, Field(description="of each supply pressure, of each recording; 1 psi_d")] = None
-    zero_of_angle: Annotated[Text | None, Field(description="of the zero of the angle sensor; 0.5 deg")] = None
-    zero_of_pressure: Annotated[Text | None, Field(description="of each pressure sensor; 0.3 psi_d")] = None
+    load: Annotated[
+        Text | None, Field(description="tolerance of the external torque, for each recording; default 2 %")
+    ] = None
+    supply: Annotated[
+        Text | None, Field(description="tolerance of each supply pressure, for each recording; default 1 psi_d")
+    ] = None
+    zero_of_angle: Annotated[
+        Text | None, Field(description="tolerance of the zero of the angle sensor; default 0.5 deg")
+    ] = None
+    zero_of_pressure: Annotated[
+        Text | None, Field(description="tolerance of the zero of each pressure sensor; default 0.3 psi_d")
+    ] = None
     gain: Annotated[
-        Text | None, Field(description="of the gain of each sensor; 0.5 %, but 0 % of the angle sensor")
+        Text | None, Field(description="tolerance of the gain of each sensor; default 0.5 %, 0 % for the angle sensor")
     ] = None
     start_of_angle: Annotated[
-        Text | None, Field(description="of the angle at the start of each recording; 0.05 deg where it is read there")
+        Text | None,
+        Field(description="tolerance of the initial angle of each recording; default 0.05 deg if it is measured"),
     ] = None
     start_of_pressure: Annotated[
         Text | None,
-        Field(description="of both pressures at the start; the noise of a sample where they are read there"),
+        Field(description="tolerance of both initial pressures; default: the noise of a sample if they are measured"),
     ] = None
     each_recording: Annotated[
         tuple[Sensed, ...],
-        Field(strict=False, description="'zero', 'gain': anew in each recording; default: the same in all of them"),
+        Field(strict=False, description="sensor errors that differ between recordings: 'zero', 'gain'; default: none"),
     ] = ()
     gas_temperature: Annotated[
-        Text | None, Field(description="of the gas temperature; default: what the set states, else 15 K")
+        Text | None, Field(description="tolerance of the gas temperature; default: that of the set, else 15 K")
     ] = None
-    gas_law: Annotated[Text | None, Field(description="departure of the gas from the ideal gas law; 1 %")] = None
-    stribeck_velocity: Annotated[
-        Text | None,
-        Field(description="up to which friction at rest lasts in a motion, where no effect says it; 0.5 rad/s"),
-    ] = None
-    zero_of_flow: Annotated[Text | None, Field(description="zero of the flow meter, of its largest reading; 5 %")] = (
+    gas_law: Annotated[Text | None, Field(description="deviation of the gas from the ideal gas law; default 1 %")] = (
         None
     )
+    stribeck_velocity: Annotated[
+        Text | None,
+        Field(description="speed up to which static friction may last, unless an effect gives it; default 0.5 rad/s"),
+    ] = None
+    zero_of_flow: Annotated[
+        Text | None,
+        Field(description="tolerance of the zero of the flow meter, relative to its largest reading; default 5 %"),
+    ] = None
     friction: Annotated[
         Text | None,
-        Field(description="of friction, from one recording to another; 5 % where a procedure has several"),
+        Field(description="variation of friction between recordings; default 5 % if a procedure has several"),
     ] = None
     held: Annotated[
-        Text | None, Field(description="of a number without an uncertainty of its own; default: 1 to 50 % by kind")
+        Text | None, Field(description="uncertainty of values of the set that state none; default: 1 to 50 % by kind")
     ] = None
 
 

@@ -68,7 +68,7 @@ def _actuator_section(kind: str) -> Any:
         "leak": optional(leak, "leak from chamber 1 to chamber 2"),
     }
     if ACTUATORS[kind].model.table is not None:
-        extra["file"] = (str, Field(min_length=1, description="its file, seen from the folder of the set"))
+        extra["file"] = (str, Field(min_length=1, description="file name, relative to the folder of the set"))
     name = "Actuator" if kind == VANE else f"{_capital(kind)}Actuator"
     return _section(name, declaration.actuator_quantities(kind), extra)
 
@@ -78,7 +78,7 @@ def _sections() -> dict[str, Any]:
     valve_reports = _section("ReportedOfAValve", declaration.REPORTED_OF_A_VALVE)
     reported = {
         declaration.REPORTED_FORMULA: optional(TextEntry, "exponent inside C1, a formula in k"),
-        "valves": optional(_by_name(valve_reports), "what was reported for each valve, by its name"),
+        "valves": optional(_by_name(valve_reports), "reported values of the valves, by valve name"),
     }
     return {
         "gas": _section("Gas", declaration.GAS, {"species": optional(TextEntry, "name of the gas")}),
@@ -141,8 +141,7 @@ def _parameter_file(_kinds: Any) -> type[BaseModel]:
             str,
             Field(
                 "",
-                description="set that this one began as: a name, or a path from the folder of this file; the audit "
-                "shows what changed",
+                description="parent set, a name or a path relative to this file; the audit lists the changes",
             ),
         ),
         "default_valve": (str, Field(description="name of the valve that a device has by default")),

@@ -183,7 +183,7 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Overrides, *, valve:
     (``links_of_set``) is set with it, unless it is given too.
 
     Arguments:
-        parameter_set: the set, which stays as it is
+        parameter_set: the set, which is not modified
         overrides: texts such as ``valve.area=12.6mm^2``, in any order, or a dictionary of paths with numbers in SI
         valve: name of the valve that ``valve.X`` means; default: the set's default valve
 

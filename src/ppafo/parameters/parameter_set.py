@@ -46,8 +46,8 @@ class Entry(StrictTable):
 
     value: Annotated[float, Field(description="the number, in the unit beside it")]
     unit: Annotated[str, Field(description="such as 'mm^2', 'psi_g' (gauge), 'psi_a' (absolute); '' for a number")]
-    origin: Annotated[Origin, Field(description="how the value came to be known")]
-    source: Annotated[Text, Field(description="where to look it up: page, equation, data sheet, recording")]
+    origin: Annotated[Origin, Field(description="origin of the value")]
+    source: Annotated[Text, Field(description="source: page, equation, data sheet, recording")]
     note: Annotated[str, Field(description="reason, conflict or remark")] = ""
     uncertainty: Annotated[float | None, Field(ge=0.0, description="half width of the 95 % interval, same unit")] = None
     key: Annotated[
@@ -63,8 +63,8 @@ class TextEntry(StrictTable):
     """Name or formula in a parameter set, with origin and source."""
 
     value: Text
-    origin: Annotated[Origin, Field(description="how the value came to be known")]
-    source: Annotated[Text, Field(description="where to look it up")]
+    origin: Annotated[Origin, Field(description="origin of the value")]
+    source: Annotated[Text, Field(description="source of the value")]
     note: Annotated[str, Field(description="reason, conflict or remark")] = ""
 
 
@@ -72,8 +72,8 @@ class FlagEntry(StrictTable):
     """True or false in a parameter set, with origin and source."""
 
     value: Annotated[bool, Field(description="true or false")]
-    origin: Annotated[Origin, Field(description="how the value came to be known")]
-    source: Annotated[Text, Field(description="where to look it up")]
+    origin: Annotated[Origin, Field(description="origin of the value")]
+    source: Annotated[Text, Field(description="source of the value")]
     note: Annotated[str, Field(description="reason, conflict or remark")] = ""
 
 

@@ -202,7 +202,7 @@ def tracking_violation(
 
 
 def oscillating(rows: Mapping[str, Floats], scenario: Scenario) -> NDArray[np.bool_]:
-    """Tell for each run whether its command turns as that of an oscillating loop; False without its reversals."""
+    """Tell for each run whether its loop oscillates, from the reversals of its command; False if these are unknown."""
     return np.asarray(command_turning(scenario, rows, most_reversals(scenario)) > 1.0)
 
 

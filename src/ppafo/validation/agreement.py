@@ -182,7 +182,7 @@ def compare_recording(measured: MeasuredRecording, device: Device, settings: Rep
     remarks = [*measured.remarks, *_remarks(measured, device, settings)]
     if delay.is_at_limit:
         limit = settings.longest_delay
-        remarks.append(f"model and measurement are more than {limit:g} s apart in time; no delay was removed")
+        remarks.append(f"model and measurement differ in time by more than {limit:g} s; no delay was removed")
     return RecordingAgreement(
         file=measured.file,
         sha256=measured.sha256,
@@ -236,7 +236,7 @@ def _curves(
                 )
             )
     if not curves:
-        needed = "pressure_1" if settings.volume is not None else "anything beside the prescribed angle"
+        needed = "pressure_1" if settings.volume is not None else "a channel other than the prescribed angle"
         raise DataError(f"{measured.file}: has nothing to compare; it needs {needed}")
     return curves
 
@@ -248,10 +248,10 @@ def _remarks(measured: MeasuredRecording, device: Device, settings: ReplaySettin
     gauge_of_set = device.supply.pressure - device.supply.atmospheric_pressure
     recorded_gauge = supply_gauge(measured.recording, device)
     if SUPPLY in measured.recording and abs(recorded_gauge - gauge_of_set) > _OTHER_SUPPLY * gauge_of_set:
-        relation = "pressure, other than"
+        relation = "not"
         if gauge_of_set > 0.0:
             relation = f"{recorded_gauge / gauge_of_set:.3g} times the gauge pressure of"
-        remarks.append(f"the recorded supply has {relation} supply.pressure; the recorded supply was used")
+        remarks.append(f"the recorded supply pressure is {relation} supply.pressure; the recorded values were used")
     if SUPPLY not in measured.recording:
         # Shown as values, for they may be the set's or given in its place.
         used = {"supply.pressure": device.supply.pressure}

@@ -160,7 +160,7 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
     for name in sensors if len(sensors) > 1 else ():
         yield CandidateCause(
             f"delay of {name}",
-            f"{name} seems to be later than the other channels by {{:.3g}} ms",
+            f"{name} seems to lag the other channels by {{:.3g}} ms",
             partial(_sensed, (name,), "delay", 0.0),
             _DELAYS,
             shown=1.0e3,
@@ -168,7 +168,7 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
         )
     yield CandidateCause(
         "delay of all sensors",
-        "all sensors seem to be later than the command by {:.3g} ms",
+        "all sensors seem to lag the command by {:.3g} ms",
         lambda delay: ModelChange(delay=delay),
         _LONG_DELAYS,
         shown=1.0e3,
@@ -289,7 +289,7 @@ _EFFECTS = (
     ),
     _UnknownEffect(
         name="spool_play",
-        words="the spool seems to have a play of {:.2g} of its command",
+        words="the spool seems to have a play of {:.2g} of full command",
         scaled=("width",),
         lowest=0.005,
         highest=0.4,

@@ -291,7 +291,7 @@ def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[Candid
     angles = [record.values[record.channels.index(ANGLE)] for record in records if ANGLE in record.channels]
     if not angles or any(float(np.std(angle)) >= _AT_REST for angle in angles):
         return []
-    words = f"the vane seems to be locked, for its recorded angle rests ({argument_text('motion', 'locked')})"
+    words = f"the vane seems to be locked, as its recorded angle is constant ({argument_text('motion', 'locked')})"
     return [CandidateCause("motion", words, lambda _: ModelChange(motion="locked"))]
 
 

@@ -218,7 +218,7 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
             str, "name of a gait, or the path of a gait file; its subject walks; the built-in one unless given"
         ),
         "task_sequence": optional(
-            str, "name of a task sequence, or the path of its file; stride after equal stride unless one is given"
+            str, "name of a task sequence, or the path of its file; equal strides unless one is given"
         ),
     }
     timings = [

@@ -216,7 +216,7 @@ def test_a_run_that_diverges_stops_the_reproduction_with_its_name(
         return dataclasses.replace(reproduction.step, status=Status("diverged", 0.1, "diverged at t = 0.1 s"))
 
     monkeypatch.setattr(study, "simulate", diverged)
-    with pytest.raises(SimulationError, match="step-response: diverged at t"):
+    with pytest.raises(SimulationError, match="step-response' failed: diverged at t"):
         reproduce()
 
 

@@ -143,7 +143,7 @@ def test_one_answer_again_and_again_does_not_keep_the_plant_from_venting() -> No
     found = run_on(VirtualWire(stuck))
     assert found.traffic.vent_reason == SILENT
     assert found.traffic.vented_at == pytest.approx(0.029)
-    assert found.traffic.ignored["doubled or overtaken"] >= 190 - 10
+    assert found.traffic.ignored["repeated or out of order"] >= 190 - 10
 
 
 def test_answers_that_are_always_30_ms_old_vent() -> None:
@@ -160,7 +160,11 @@ def test_a_controller_that_is_not_sound_is_vented_at_once_and_for_good() -> None
 
 @pytest.mark.parametrize(
     ("run", "shift", "why"),
-    [(RUN + 1, 0, "of another run"), (RUN, 1, "ahead of its sample"), (RUN, -1, "doubled or overtaken")],
+    [
+        (RUN + 1, 0, "of another run"),
+        (RUN, 1, "with a sequence number not yet sent"),
+        (RUN, -1, "repeated or out of order"),
+    ],
 )
 def test_an_answer_to_something_else_does_nothing_but_be_counted(run: int, shift: int, why: str) -> None:
     partner = ProportionalPartner()
@@ -289,7 +293,7 @@ class BreakingWire(VirtualWire):
     def send(self, data: bytes) -> None:
         super().send(data)
         if len(self.sent) == 61:
-            self.failure = "the serial port broke: it is gone"
+            self.failure = "the serial port failed: it is gone"
             self.under_way.clear()
 
 
@@ -298,7 +302,7 @@ def test_a_wire_that_is_pulled_out_vents_at_once_and_the_log_goes_on() -> None:
     assert found.traffic.vent_reason == BROKEN
     assert found.traffic.vented_at == pytest.approx(0.060)
     assert len(rows_of(found)) == 200
-    assert found.text().endswith("port       the serial port broke: it is gone")
+    assert found.text().endswith("port       the serial port failed: it is gone")
     assert replayed_is_same(found)
 
 

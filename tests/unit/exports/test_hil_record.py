@@ -244,7 +244,7 @@ def test_whoever_sends_first_is_not_the_bench_unless_it_sends_a_packet(
 def test_where_the_bench_fell_silent_before_its_first_sample_strangers_are_named() -> None:
     tape = Tape([answer_bytes(Answer(0, 7, 5, 5, 5))])
     tape.strangers = 3
-    with pytest.raises(DataError, match=r"1 no sample, 3 of somebody else$"):
+    with pytest.raises(DataError, match=r"1 no sample, 3 from another sender$"):
         record(tape, "bench", None, 1.0, clock=tape.clock)
 
 

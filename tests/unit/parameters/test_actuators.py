@@ -182,7 +182,7 @@ def test_the_audit_says_by_how_much_a_rounded_table_is_moved(tmp_path: Path) -> 
     assert "rounded-table" not in {finding.id for finding in findings_of(load_parameter_set(path))}
     table.write_text("\n".join([HEADER, *ROUNDED]), encoding="utf-8")
     (found,) = (finding for finding in findings_of(load_parameter_set(path)) if finding.id == "rounded-table")
-    assert "within the steps of 0.1 mL" in found.paragraph
+    assert "within the rounding step of 0.1 mL" in found.paragraph
 
 
 def test_columns_and_lines_may_stand_in_any_order(tmp_path: Path) -> None:
@@ -204,7 +204,7 @@ def test_columns_and_lines_may_stand_in_any_order(tmp_path: Path) -> None:
     [
         (
             ("20,0,100", "20,60,130", "110,0,150", "110,60,200"),
-            "measured up to 161.3 kPa_a, and the supply has 166.8",
+            "covers pressures up to 161.3 kPa_a, but the supply has 166.8",
         ),
         (("20,0,1000", "20,500,1100", "110,0,500", "110,500,1600"), "chamber 1 must grow with the angle, and grows by"),
     ],
@@ -219,7 +219,11 @@ def test_a_table_must_hold_at_supply_pressure(tmp_path: Path, lines: tuple[str, 
 @pytest.mark.parametrize(
     ("lines", "pressures", "said"),
     [
-        (GOOD_TO_110, (60.0, 900.0), "actuator: its file was measured up to 66 kPa_g, and the supply has 900"),
+        (
+            GOOD_TO_110,
+            (60.0, 900.0),
+            "actuator: its volume table covers pressures up to 66 kPa_g, but the supply has 900",
+        ),
         (SHRINKING, (490.0, 65.0), "chamber 1 must grow with the angle, and grows by -"),
     ],
 )
@@ -249,7 +253,7 @@ def test_of_another_actuator_no_torque_ceiling_and_no_lower_bound_is_known() -> 
 def test_stops_beyond_what_was_measured_are_refused(tmp_path: Path) -> None:
     measured(tmp_path, HEADER, *GOOD).rename(tmp_path / "measured-bladder.csv")
     (tmp_path / "set.toml").write_bytes((EXAMPLE / "measured-bladder.toml").read_bytes())
-    with pytest.raises(ParameterError, match="was measured from 20 to 100 deg, and the stops are at 20 to 110 deg"):
+    with pytest.raises(ParameterError, match="volume table covers 20 to 100 deg, but the stops are at 20 to 110 deg"):
         load_device(tmp_path / "set.toml")
 
 

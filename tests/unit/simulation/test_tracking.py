@@ -433,7 +433,7 @@ def test_valves_whose_set_limits_nothing_are_told_how_often_they_switch() -> Non
     assert remark in str(quick)
     for limited in ("valve.switching_interval=20 ms", "valve.opening_delay=5 ms"):
         told = simulate("torque-task-solenoid", [*changes[1:], limited])
-        assert not any("a second, and no number" in said for said in told.warnings)
+        assert not any("a second, and no value" in said for said in told.warnings)
     assert simulate(TASK, ["reference.level=4 N m"]).warnings == ()
 
 

@@ -56,7 +56,7 @@ def rig_record(
 ) -> CommandOutput:
     """Record a bench that speaks the protocol of 'ppafo hil'.
 
-    Exit code 1 where the port broke, 130 where Ctrl-C stopped it.
+    Exit code 1 where the port failed, 130 where Ctrl-C stopped it.
 
     port: where the bench sends: udp:HOST:PORT or serial:DEVICE (extra 'hil'); UDP listens at the address
     baud: bits per second of a serial line; default 921600

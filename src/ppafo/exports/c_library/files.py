@@ -29,7 +29,7 @@ UNITS = {"1": "-", "Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
 _FILES = {"Makefile": "Makefile", "CMakeLists.txt": "CMakeLists.txt", "check.c": "check.c"}
 """Templates of the files in every library, with their names in the library."""
 _IS_WHOLE = """
-/* True for a number that is a whole one but for rounding. */
+/* True for a whole number, within rounding. */
 static bool is_whole(double count)
 {
     return fabs(count - floor(count + 0.5)) <= 1.0e-9 * count;
@@ -48,7 +48,7 @@ def library_files(library: Library) -> dict[str, bytes]:
     texts = {target: filled(template(_FOLDER, source), words) for source, target in sources.items()}
     texts["LICENSE"] = template(_FOLDER, "LICENSE")
     head = f'#include "{name}.h"\n\n#include <string.h>\n\n'
-    title = f"{library.title}: the functions of ppafo {__version__} that a run is made of. Not to be edited."
+    title = f"{library.title}: functions of a run in ppafo {__version__}. Generated: do not edit."
     further = [add for add in (library.further, library.following) if add is not None]
     settings = [setting.name for setting in library.settings]
     # The interface is written around the functions, whose names must not hide its own.

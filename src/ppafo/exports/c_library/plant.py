@@ -37,7 +37,7 @@ class Input:
 COMMAND = Input("command", "-", "command to the valve, clipped to -1 to 1; above 0 feeds chamber 1", 0.0, -1.0, 1.0)
 _WALKING = "command to the valve, clipped to -1 to 2; above 0 feeds chamber 1, above 1.5 vents both"
 WALKING_COMMAND = Input("command", "-", _WALKING, VENT, -1.0, VENT)
-_STOPS = "assistance level, 0 to 3; at 3, where the controller has stopped, the shut-off valve shuts"
+_STOPS = "assistance level, 0 to 3; at 3 the controller has stopped and the shut-off valve closes"
 SAFE_STATE = Input("safe_state", "-", _STOPS, 0.0, 0.0, 3.0)
 
 
@@ -127,7 +127,7 @@ def plant_of(scenario: Scenario) -> _PlantAlone:
 @singledispatch
 def _drive_of(motion: Motion, _settings: Mapping[str, ExportParameter]) -> _Drive:
     """Return the external drive of a plant with this motion, within the ranges of its settings: here a walk."""
-    walks = _Drive(motion="The leg walks on by its gait.", command=WALKING_COMMAND)
+    walks = _Drive(motion="The leg follows its gait.", command=WALKING_COMMAND)
     if not (isinstance(motion, WalkMotion) and motion.shut_off):
         return walks
     safe_state = ("controller.safe_state", "{safe_state}")
@@ -142,7 +142,7 @@ _FIRST_RAMP = 0.0078125
 def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParameter]) -> _Drive:
     """Return the drive of a prescribed joint: inputs angle and rate if locked, no input if on a path."""
     if motion.locked_angle is None:
-        return _Drive(motion="The ankle goes along the path that the scenario has.")
+        return _Drive(motion="The ankle follows the prescribed motion of the scenario.")
     stop_1, stop_2 = settings["actuator.angle_min"].value, settings["actuator.angle_max"].value
     # So fast that the short ramp of the first angle still ends within what a level may be.
     fastest = (settings["motion.profile.level"].quantity.maximum - max(abs(stop_1), abs(stop_2))) / _FIRST_RAMP
@@ -150,8 +150,8 @@ def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParamete
     summary = "angle of the ankle, 90 deg neutral, growing in plantarflexion"
     return _Drive(
         motion=(
-            "From there on the angle goes on with the angular velocity that is given; the next step begins at the next "
-            "angle."
+            "Within a step the angle changes at the given angular velocity; the next step starts at the "
+            "next given angle."
         ),
         inputs=(
             Input("angle", "rad", summary, start, stop_1, stop_2),
@@ -183,7 +183,7 @@ def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -
     limits = settings[f"motion.{name}"].quantity
     torque = Input(name, "N m", f"torque on the ankle, {summary}", start, limits.minimum, limits.maximum)
     return _Drive(
-        motion="The torque is constant until the next one.",
+        motion="The torque is held until the next value.",
         inputs=(torque,),
         settings=((c_identifier(f"motion.{name}"), f"{{{name}}}"),),
         parameters=(("plant.external_torque", f"{load}{{{name}}}"),),
@@ -277,7 +277,7 @@ def _commanded(_motion: Motion, scenario: Scenario) -> Scenario:
     return replace(
         scenario,
         name=f"{scenario.name}-plant",
-        description=f"The plant alone of this scenario: {scenario.description}",
+        description=f"Plant without controller of this scenario: {scenario.description}",
         run=replace(scenario.run, step=step, output_interval=step),
         controller=Control("constant", {"command": 0.0}, step),
         # What a sensor sees reaches nothing here, but when it looks divides a step of the engine, and so does its lag.
@@ -307,7 +307,7 @@ def _commanded_walk(motion: WalkMotion, walk: Scenario) -> Scenario:
     return replace(
         walk,
         name=f"{walk.name}-plant",
-        description=f"The plant alone of this walk, on its leg: {walk.description}",
+        description=f"Plant without controller of this walk, on its leg: {walk.description}",
         controller=control,
         run=replace(walk.run, step=step, output_interval=period),
         # Which samples a controller misses is drawn by the same seed.

@@ -135,14 +135,14 @@ def c_text_of_run(
 
 _DOCUMENTS = {
     "Readings": Readings.__doc__ or "",
-    "run_states": "What changes in a run, group by group.",
-    "run_parameters": "What a run is made of and does not change.",
-    "run_counts": "Numbers of the steps; times in steps of the engine.",
-    "advance": "Take a run some steps further, with the samples that are due.",
-    "run_samples": "The last sample, and the one before.",
-    "metrics": "The metrics of a run, from its last states.",
-    "prepare": "From the settings, in SI units, to the numbers of a run.",
-    "follow": "Let settings that still have their default follow others.",
+    "run_states": "State of a run, by group.",
+    "run_parameters": "Parameters of a run, constant over the run.",
+    "run_counts": "Step counts and intervals, in engine steps.",
+    "advance": "Advance a run by some steps and record the samples that are due.",
+    "run_samples": "The last two samples.",
+    "metrics": "Metrics of a run, from its final state.",
+    "prepare": "Parameters of a run from settings in SI units.",
+    "follow": "Update settings at their default that depend on other settings.",
 }
 
 
@@ -224,15 +224,19 @@ def c_text(exported: ExportedProgram, composed: ComposedLibrary, title: str, set
         "found": [f"METRIC_{kind.name.upper()}" for kind in exported.metrics],
     }
     counted = [
-        _enumeration("Places of all numbers of a run: states, then parameters.", [*state, *parameter]),
+        _enumeration("Indices of all numbers of a run: states, then parameters.", [*state, *parameter]),
         *(
-            _enumeration(f"Places of what a step of {name} hands on.", stepping, len(state) + len(parameter))
+            _enumeration(
+                f"Indices of the values that a step of {name} passes to the next.",
+                stepping,
+                len(state) + len(parameter),
+            )
             for name, stepping in steps.items()
         ),
-        _enumeration("Places of the parameters alone.", alone),
-        _enumeration("Places of the numbers of the steps.", places["counts"]),
-        _enumeration("Places of the settings.", places["settings"]),
-        _enumeration("Places of the metrics.", places["found"]),
+        _enumeration("Indices of the parameters.", alone),
+        _enumeration("Indices of the step counts.", places["counts"]),
+        _enumeration("Indices of the settings.", places["settings"]),
+        _enumeration("Indices of the metrics.", places["found"]),
     ]
     return "\n".join([*counted, c_source(walk_module(composed.text), composed.documents, title, places)])
 

@@ -25,12 +25,12 @@ They are means over the strides with help, from the third on, and counts; of a t
 digits. Not here, since they need the mean stride or the healthy one: `healthy_positive_work`, `push_off_share`,
 `lowest_toes`, `angle_difference`, `dorsiflexor_moment`; nor safety events and the segments of a task sequence."""
 _FOLLOWS = """\
-- As in ppafo, these follow others as long as they have their default, also where that is given: {followers}."""
+- As in ppafo, these settings depend on others while they equal their default, even if it is given: {followers}."""
 _TRAPS_OF_WALK = """\
-- `sensors_angle_bandwidth` and `sensors_pressure_bandwidth` 0 are sensors that follow at once.
+- `sensors_angle_bandwidth` and `sensors_pressure_bandwidth` 0 are sensors without lag.
 - `run_duration` is what `ppafo walk` calls `--minutes`, here in seconds and up to 10^6.
-- `..._bad_setting` looks at ranges and at contradictions of two settings. A walk file is also refused where a setting
-  contradicts the gait, or several others at once."""
+- `..._bad_setting` checks ranges and conflicts between two settings. A walk file is also refused if a setting
+  conflicts with the gait or with several others at once."""
 
 
 def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
@@ -58,16 +58,16 @@ def words_of_walk(walk: Scenario, links: Graph, failing: "Mapping[str, FaultSett
 
     faults = [f"{sensor} `{fault.kind}`" for sensor, fault in failing.items()]
     gait, sequence = walk_of(walk).gait, walk_of(walk).task_sequence
-    strides = "stride after equal stride"
+    strides = "equal strides"
     if sequence is not None:
-        strides = f"the task sequence `{sequence.name}`, which stays as it is"
+        strides = f"the task sequence `{sequence.name}`, which is fixed"
     fixed = [
         f"the gait, `{gait.name}`: its series, its events and its stride of {gait.stride_time:.4g} s are numbers in "
         f"the source",
-        f"how it is walked: {strides}",
+        f"the walk: {strides}",
         f"the valve, `{walk.device.valve.kind}`, and the controller, `{walk.controller.kind}`",
         *_fixed_of_device(walk),
-        f"which sensors fail, and how: {', '.join(faults) or 'none'}; and whether one is late",
+        f"the sensor faults, {', '.join(faults) or 'none'}, and whether a sensor is delayed",
         _at_zero(walk.device, () if has_ideal_sensors(walk) else (1.0,)),
     ]
     return {
@@ -110,7 +110,7 @@ def _fixed_of_device(scenario: Scenario) -> list[str]:
             else f"the form of the {name}, `area, discharge_coefficient`"
             for name, orifice in forms.items()
         ),
-        f"the gas, `{gas}`; {lines}, which {verb} gas back in from a chamber above them",
+        f"the gas, `{gas}`; {lines}, which {verb} gas flow back from a chamber at higher pressure",
         *([f"the effects, {effects}, none of which can be switched off"] if effects else []),
     ]
 
@@ -118,9 +118,9 @@ def _fixed_of_device(scenario: Scenario) -> list[str]:
 def _at_zero(device: Device, flaws: Sequence[float]) -> str:
     """Return the README text on parameters that select functions and are 0."""
     zero = [f"`valve_{name}`" for name in choosing(device) if not device.valve.settings[name] > 0.0]
-    flawless = [] if any(flaws) else ["what makes a sensor of `sensors_` less than ideal"]
+    flawless = [] if any(flaws) else ["the sensor errors of `sensors_`"]
     names = ", ".join([*zero, *flawless]) or "none"
-    return f"which of the settings of the valve and of the sensors are 0: here 0 are {names}"
+    return f"which settings of valve and sensors are 0 (here {names})"
 
 
 def _listed(items: Sequence[str]) -> str:

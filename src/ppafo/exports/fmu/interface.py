@@ -9,21 +9,21 @@ from ppafo.exports.c_library.plant import Input, follow_lines, half_open, plant_
 from ppafo.simulation.scenario import Scenario
 
 _LOOP_TIME = (
-    "The unit goes from sample to sample, <code>run.output_interval</code> apart, and shows the last one that is due. "
-    "Any communication step is taken. The run ends at <code>run.duration</code>: a longer one is set before the start."
+    "Outputs are samples taken every <code>run.output_interval</code>; the latest one is shown. Any "
+    "communication step is accepted. The run ends at <code>run.duration</code>; set a longer one before the start."
 )
 """Time stepping of the closed loop, for the page of the unit."""
 _LOOP_TUNING = (
-    "The controller takes them at its next sample, the plant one step of the engine later. Of a reference that changes "
-    "under way, metrics of ramp and hold keep the times of the first one."
+    "The controller reads them at its next sample, the plant one engine step later. If the reference changes during "
+    "the run, the metrics of ramp and hold keep the times of the initial reference."
 )
 """When the closed loop takes a changed parameter, for the page of the unit."""
 _PLANT_TIME = (
-    "Inputs are taken at the beginning of a communication step. It is a multiple of <code>{clock}</code>; the engine "
-    "divides it further where its error asks for that. {motion} There is no end."
+    "Inputs are read at the beginning of a communication step. It is a multiple of <code>{clock}</code>; the engine "
+    "divides it further where its error asks for that. {motion} There is no stop time."
 )
 """Time stepping of the plant, for the page of the unit; ``motion`` is the motion of its vane."""
-_PLANT_TUNING = "They are taken at the next communication step."
+_PLANT_TUNING = "They take effect at the next communication step."
 """When the plant takes a changed parameter, for the page of the unit."""
 
 
@@ -65,7 +65,7 @@ def closed_loop(scenario: Scenario) -> Interface:
         step=times["run.output_interval"],
         duration=times["run.duration"],
         is_step_fixed=False,
-        clock="ticks when the controller decides, every controller.period",
+        clock="clock of the controller, ticks every controller.period",
         hidden=frozenset(),
         inputs=(),
         words={},

@@ -32,7 +32,7 @@ SILENT, NOT_SOUND, STOPPED, BROKEN = (
     "no answer for 20 ms",
     "the controller reported a fault",
     "stopped",
-    "the port broke",
+    "the port failed",
 )
 """Reasons for venting the plant."""
 
@@ -71,13 +71,13 @@ class _AnswerFilter:
     def take(self, packet: wire.Packet) -> None:
         """Process a valid packet."""
         if not isinstance(packet, wire.Answer):
-            self.ignored["no answer"] += 1
+            self.ignored["not an answer"] += 1
         elif packet.run != self.run:
             self.ignored["of another run"] += 1
         elif packet.sequence > self.sent:
-            self.ignored["ahead of its sample"] += 1
+            self.ignored["with a sequence number not yet sent"] += 1
         elif packet.sequence <= self.answered:
-            self.ignored["doubled or overtaken"] += 1
+            self.ignored["repeated or out of order"] += 1
         # An answer older than the watchdog allows would act on a state that is long gone.
         elif self.sent - packet.sequence >= self.patience:
             self.ignored["too late"] += 1

@@ -116,7 +116,7 @@ class _SerialPort:
             with contextlib.suppress(serial.SerialTimeoutException):
                 yield
         except (OSError, TypeError) as error:  # pyserial on a device that is gone: SerialException is an OSError
-            self.failure = f"the serial port broke: {one_line(error)}"
+            self.failure = f"the serial port failed: {one_line(error)}"
 
     def close(self) -> None:
         """Close the device."""

@@ -46,7 +46,7 @@ class CollectedRecording:
 
     def text(self) -> str:
         """Return the numbers of recorded, lost and discarded samples as text."""
-        recording, others = self.recording, [*self.ignored.items(), ("of somebody else", self.strangers)]
+        recording, others = self.recording, [*self.ignored.items(), ("from another sender", self.strangers)]
         samples = f"{len(recording)} samples over {recording.duration:.6g} s"
         return "\n".join(
             [
@@ -284,7 +284,7 @@ def record(
     if not collector:
         if is_stopped():
             raise KeyboardInterrupt("interrupted before the first sample; no file was written")
-        others = [*collector.ignored.items(), ("of somebody else", port.strangers)]
+        others = [*collector.ignored.items(), ("from another sender", port.strangers)]
         came = wire.described_refusals(reader.refused, others)
         raise DataError(f"no sample received within {patience:g} s; received: {came}")
     recording, lost = collector.recording(label)

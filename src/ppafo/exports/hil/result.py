@@ -103,7 +103,7 @@ class HardwareRun:
     def text(self) -> str:
         """Summary of the run as text."""
         traffic, machine, late, after = self.traffic, self.machine, self.delays, self.response_times
-        others = [*traffic.ignored.items(), ("of somebody else", traffic.strangers)]
+        others = [*traffic.ignored.items(), ("from another sender", traffic.strangers)]
         silence = longest_silence(traffic.rows) * self.plant.period
         loads = "".join(
             f", load {load:.2f} {when}"
@@ -111,7 +111,7 @@ class HardwareRun:
             if load is not None
         )
         pauses = traffic.pauses
-        pause_text = f"stood still {len(pauses)} times, {sum(pauses):.3g} s in all" if pauses else "never stood still"
+        pause_text = f"paused {len(pauses)} times, {sum(pauses):.3g} s in total" if pauses else "never paused"
         times = []
         for label, values in (("answers", after), ("sent late", late)):
             numbers = spread(values)
@@ -167,7 +167,7 @@ class HardwareRun:
         )
         remark = vented if status.is_completed else status.message
         with shown_in(self.plant.scenario.device.shown):
-            return recording_figure(self.result.recording, f"{self.plant.scenario.name}, at the wire", remark)
+            return recording_figure(self.result.recording, f"{self.plant.scenario.name}, hardware in the loop", remark)
 
     def plot(self) -> "Figure":
         """Histograms of sending delays and response times."""
@@ -176,11 +176,11 @@ class HardwareRun:
         beside = "" if load is None else f"; load {load:.2f} on {self.machine.cores} cores"
         missed = f"{len(delays) - len(response_times)} of {len(delays)} samples missed"
         panels = [
-            _histogram(delays, period, "Samples, after they were due"),
-            _histogram(response_times, period, "Answers, after their sample"),
+            _histogram(delays, period, "Sample delay after its due time"),
+            _histogram(response_times, period, "Answer delay after its sample"),
         ]
-        note = f"Dashed: one sample, {period:g} ms. {missed}{beside}"
-        return draw_panels(panels, 2, (3.4, 2.4), f"{self.plant.scenario.name}: the link", note, "measured")
+        note = f"Dashed: one sample period, {period:g} ms. {missed}{beside}"
+        return draw_panels(panels, 2, (3.4, 2.4), f"{self.plant.scenario.name}: timing of the link", note, "measured")
 
 
 def spread(values: Sequence[float]) -> dict[str, float] | None:

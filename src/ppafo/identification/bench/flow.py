@@ -39,13 +39,13 @@ NEXT_LAW: Mapping[Law, str] = {
     "orifice": "try law = 'both', or for a valve 'iso6358'",
     "laminar": "try law = 'both'",
     "iso6358": "try law = 'both'",
-    "both": "neither an orifice nor a laminar gap nor both explain them",
+    "both": "no orifice, laminar gap or combination of both explains the readings",
 }
 """Remedy, by law, if the readings do not fit one opening; the law ``both`` contains each of its parts."""
 
 TEMPERATURE, GAS_LAW, METER, SENSORS = "gas temperature", "gas law", "gain of the flow meter", "gain of the pressures"
 ZERO = "zero of the flow meter"
-APPARENT = "gap that a gain of the flow meter looks like"
+APPARENT = "laminar gap equivalent to a gain error of the flow meter"
 """Names of the tolerances of a flow bench."""
 
 

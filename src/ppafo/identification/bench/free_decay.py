@@ -229,7 +229,9 @@ def _readings(sources: tuple[RecordingSource, ...], decays: tuple[FreeDecay, ...
                 series.append(values)
                 sensors += [sensor] * values.size
                 # A law that is wrong parts the fast from the slow.
-                halves += ["the first half of the way"] * half + ["the second half of the way"] * (values.size - half)
+                halves += ["the first half of the travel"] * half + ["the second half of the travel"] * (
+                    values.size - half
+                )
     counts = [decay.time.size * (1 if decay.velocity is None else 2) for decay in decays]
     return PooledReadings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
 

@@ -103,8 +103,8 @@ def open_valve_flow(
     if area is None or coefficient.unit or coefficient.low <= _LARGEST_COEFFICIENT:
         return result
     doubt = (
-        f"Cd = {coefficient.value:.3g} is above 1, which no opening has: the unit of mass_flow or of a pressure is "
-        f"another one (a flow per minute is 60 times one per second), or the valve is larger than the set's "
+        f"Cd = {coefficient.value:.3g} is above 1, which is impossible: mass_flow or a pressure has "
+        f"another unit (a flow per minute is 60 times a flow per second), or the valve is larger than the set's "
         f"{area * 1e6:.4g} mm^2; Cd A is {coefficient.value * area * 1e6:.4g} mm^2"
     )
     doubted = replace(coefficient, verdict="holds for this model only")

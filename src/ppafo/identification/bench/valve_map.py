@@ -132,7 +132,7 @@ def valve_map(
     scatter = np.std(residuals) / np.abs(sweep.flow).max()
     is_clear = bool((sweep.command > _CLEAR_COMMAND).any() and (sweep.command < -_CLEAR_COMMAND).any())
     one_way = "only one direction was recorded: whether the other behaves the same is unknown"
-    no_play = "the command went one way only, so no hysteresis shows: half of its width is in the dead band"
+    no_play = "the command was swept one way only: half the width of any hysteresis is included in the dead band"
     axes = Kind("Command"), Kind("Flow", "kg/s", "mass flow")
     return result_of(
         PROCEDURE,
@@ -171,13 +171,15 @@ def _sought(sources: tuple[RecordingSource, ...], sweep: _Sweep, areas: Floats, 
 def _reported(sweep: _Sweep, band: str, saturation: float) -> list[ReportedNumber]:
     """Return the quantities to report; no saturation [-] near the highest command, no backlash for one-way commands."""
     reported = [
-        ReportedNumber(band, "", "Command below which nothing flows, in both directions", _SMALL_COMMAND),
+        ReportedNumber(band, "", "Dead band: command below which no gas flows, in both directions", _SMALL_COMMAND),
         ReportedNumber(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band"),
     ]
     if saturation < sweep.highest_command - _SATURATES:
-        reported.append(ReportedNumber(_SATURATION, "", "Command from which the valve opens no further"))
+        reported.append(ReportedNumber(_SATURATION, "", "Saturation: command beyond which the opening is constant"))
     if sweep.is_two_way:
-        reported.append(ReportedNumber(_PLAY, "", "Width between a rising and a falling command", _SMALL_COMMAND))
+        reported.append(
+            ReportedNumber(_PLAY, "", "Hysteresis: width between rising and falling command", _SMALL_COMMAND)
+        )
     return reported
 
 

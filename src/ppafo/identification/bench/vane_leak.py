@@ -331,7 +331,7 @@ def _decaying_leak(
     names = [opening.law, *[""] * (len(times) - 1)]
     marks += [curve_mark(*curve) for curve in zip(names, times, models, strict=True)]
     is_room = all(decay.room is not None for decay in decays)
-    room = (f"the pressure in chamber {3 - chamber} is constant, so it is treated as a room",) if is_room else ()
+    room = (f"the pressure in chamber {3 - chamber} is constant, so it is treated as a reservoir",) if is_room else ()
     fall = max(1.0 - last / first for first, last in (decay.ends for decay in decays))
     return result_of(
         PROCEDURE,

@@ -60,8 +60,8 @@ def without_wrong_samples(
                 _refuse_outlier(source, procedure, name, inside[wrong].tolist(), float(values[first]), around)
             is_right[inside[wrong]] = False
             remarks.append(
-                f"left out: {wrong.size} of {inside.size} samples with '{name}' far off those around them; the first "
-                f"is sample {inside[first] + 1} of {source.name}, {source.shown(name, values[first])}"
+                f"left out: {wrong.size} of {inside.size} samples where '{name}' is an outlier; the "
+                f"first is sample {inside[first] + 1} of {source.name}, {source.shown(name, values[first])}"
             )
         channels = {
             name: replace(channel, values=channel.values[is_right]) for name, channel in recording.channels.items()
@@ -163,7 +163,7 @@ def meter_readings(
     against = counted & (direction * flow < 0.0) & (np.abs(flow) > (zero * largest if has_sign else 0.0))
     many = _MOST_IMPOSSIBLE * np.count_nonzero(counted)
     if not has_sign and np.count_nonzero(against) > many:
-        remark = f"{procedure}: the flow meter has no sign; the flow has the direction that the other channels give it"
+        remark = f"{procedure}: the flow meter gives no direction; it is taken from the other channels"
         return np.where(direction < 0.0, -flow, flow), counted, (remark,)
     wrong = np.flatnonzero(against)
     if wrong.size > many:
@@ -175,8 +175,8 @@ def meter_readings(
         return flow, counted, ()
     source, before = _recording_with(sources, int(wrong[0]))
     remark = (
-        f"left out: {wrong.size} of {np.count_nonzero(counted)} readings with a flow against the direction that "
-        f"pressures and command give it, which no opening has; the first is sample {int(wrong[0]) - before + 1} of "
+        f"left out: {wrong.size} of {np.count_nonzero(counted)} readings with flow against the pressures "
+        f"and the command, which no valve can pass; the first is sample {int(wrong[0]) - before + 1} of "
         f"{source.name}"
     )
     return flow, counted & ~against, (remark,)

@@ -188,8 +188,8 @@ def _remarks(fitted: Fit, scenarios: Sequence[Scenario], estimates: Sequence[Est
             inside = estimate.value - side * _INSIDE * abs(estimate.value)
             bounds.append(f'{"high" if side > 0 else "low"} = "{_in_unit(inside, estimate)}" of {estimate.path}')
         remarks.append(
-            f"the recordings favour {' and '.join(wanted)}, where no run succeeds; check recordings, scenario and set, "
-            f"or give {' and '.join(bounds)}, and the fit ends there as at a bound"
+            f"the recordings favour {' and '.join(wanted)}, where every run fails; check recordings, "
+            f"scenario and set, or give {' and '.join(bounds)} as a bound"
         )
     elif not fitted.has_converged:
         starts = ", ".join(f'start = "{_in_unit(item.value, item)}" of {item.path}' for item in estimates)
@@ -207,7 +207,7 @@ def _outlier_remarks(fitted: Fit, blocks: Sequence[ResidualBlock], times: Mappin
         if samples:
             is_one = len(samples) == 1
             count, first = "1 sample" if is_one else f"{len(samples)} samples", times[block.recording][samples[0]]
-            verb = "stands out by itself and was" if is_one else "stand out by themselves and were"
+            verb = "is an outlier and was" if is_one else "are outliers and were"
             yield f"experiment '{block.recording}': {count} of {block.channel}, at {first:.6g} s first, {verb} left out"
 
 

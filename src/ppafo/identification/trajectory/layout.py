@@ -11,7 +11,9 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.keys import Columns, Confidence
 from ppafo.identification.trajectory.experiment import ALL_INPUTS
 
-_Label = Annotated[str, Field(pattern=NAME, max_length=60, description="its name, also in the names of files")]
+_Label = Annotated[
+    str, Field(pattern=NAME, max_length=60, description="name of the experiment, also used in file names")
+]
 _Noise = dict[str, Text]
 
 
@@ -54,10 +56,12 @@ class ExperimentSection(StrictTable):
     )
     step: Text | None = Field(None, description="longest step of time in the run, such as '0.1 ms'")
     channels: Texts | None = Field(
-        None, description="compared; default: angle and pressures, unless locked or followed"
+        None, description="compared channels; default: angle and pressures, unless locked or prescribed"
     )
     noise: _Noise = Field({}, description="least standard deviation by channel, '0.1 deg', '500 Pa_d'; default: none")
-    inputs: Texts | None = Field(None, description=f"recorded channels that the run follows: {', '.join(ALL_INPUTS)}")
+    inputs: Texts | None = Field(
+        None, description=f"recorded channels used as inputs of the run: {', '.join(ALL_INPUTS)}"
+    )
     locked: Text | None = Field(
         None, description="angle at which the vane is locked, such as '75 deg'; without a scenario"
     )

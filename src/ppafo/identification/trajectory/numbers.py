@@ -25,9 +25,9 @@ ZERO_OF, GAIN_OF = "recording.zero_of_", "recording.gain_of_"
 """Prefixes of the paths of zero error and gain error of a sensor; the name of the channel follows."""
 
 RECORDING = (
-    Quantity("time_offset", "s", "time by which the samples are later than the run, a late trigger", 0.0, -1.0, 1.0),
+    Quantity("time_offset", "s", "delay of the samples behind the run, such as a late trigger", 0.0, -1.0, 1.0),
     *(
-        Quantity(f"zero_of_{name}", unit, f"what the sensor of {name} adds to its samples", 0.0, -size, size)
+        Quantity(f"zero_of_{name}", unit, f"zero of the sensor of {name}", 0.0, -size, size)
         for name, unit, size in (
             ("angle", "rad", 1.0),
             *((name, "Pa_d", 1.0e6) for name in ("pressure_1", "pressure_2", SUPPLY, DORSIFLEXION_SUPPLY)),
@@ -94,9 +94,9 @@ def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
 def broken_rule(device: Device) -> str:
     """Return a sentence on a rule that the parameters of a device violate; empty for a valid device."""
     if device.friction.dynamic_torque > device.friction.static_torque:
-        return "friction.dynamic_torque came out above friction.static_torque"
+        return "friction.dynamic_torque was fitted above friction.static_torque"
     if device.actuator.angle_min >= device.actuator.angle_max:
-        return "actuator.angle_min came out above actuator.angle_max"
+        return "actuator.angle_min was fitted above actuator.angle_max"
     return ""
 
 
@@ -199,7 +199,7 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
         (not low <= start <= high, f"start {start:.6g} must lie between the bounds {bounds}"),
         (start == 0.0 and not has_size, "a start at 0 needs bounds, because they define what a small step is"),
         (not parameter.deviation > 0.0, "the standard deviation of a prior must be above 0"),
-        (not is_allowed, f"the bounds {bounds} exceed what is allowed, {allowed}"),
+        (not is_allowed, f"the bounds {bounds} exceed the allowed range, {allowed}"),
     )
     if parameter.is_logarithm:
         start, low, high = math.log(start), math.log(low), math.log(high)

@@ -124,8 +124,8 @@ def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_p
         values=evidence.values_of(_SLOPE, stop_path, dead_path, end_path),
         sides=(
             ComparedNumber(f"V{chamber} at the end of the range", smallest, "m^3"),
-            ComparedNumber("dead volume that is needed at least", -slope * travel, "m^3"),
-            ComparedNumber("part of the range without volume", empty / turn if turn else 1.0, ""),
+            ComparedNumber("smallest sufficient dead volume", -slope * travel, "m^3"),
+            ComparedNumber("part of the range with no volume", empty / turn if turn else 1.0, ""),
         ),
         paragraph=(
             f"At {end} the volume of chamber {chamber} is {1e6 * smallest:.3g} cm^3; it is not positive over the last "
@@ -159,7 +159,7 @@ def check_rotation(evidence: Evidence) -> Iterator[AuditFinding]:
             ComparedNumber("rotation by the designation", rated, "rad"),
         ),
         paragraph=(
-            f"The range of angles is {math.degrees(turn):.3g} deg, the actuator turns by {math.degrees(rated):.3g} "
+            f"The range of angles is {math.degrees(turn):.3g} deg, the rated rotation is {math.degrees(rated):.3g} "
             "deg. Either another actuator or a gear was used, or the angle is not the vane's; volumes and torque "
             "constant then belong to another shaft. The designation of the part on the bench would settle it."
         ),
@@ -230,8 +230,8 @@ def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
         paragraph=(
             f"In the middle of its range chamber 1 has {1e6 * volume:.3g} cm^3, dead volume included, and takes "
             f"{evidence.in_set_unit(path, filled)} of gas from atmosphere to supply; measured is "
-            f"{evidence.in_set_unit(path, used)}, which also covers what leaks across the vane. How the volume is "
-            f"divided into swept and dead volume makes no difference to this."
+            f"{evidence.in_set_unit(path, used)}, which also covers what leaks across the vane. The division "
+            f"into swept and dead volume does not affect this check."
             + (
                 ""
                 if agrees
@@ -262,8 +262,8 @@ def check_rounded_table(evidence: Evidence) -> Iterator[AuditFinding]:
             values=(),
             sides=(ComparedNumber("largest move", moved, "m^3"), ComparedNumber("last digit", digit, "m^3")),
             paragraph=(
-                f"Between the angles of {parameter_set.actuator_file} the curves through its numbers would fit no "
-                f"chamber: negative, or falling with the pressure. They are moved by {1e6 * moved:.2g} mL at most, "
-                f"within the steps of {1e6 * digit:.2g} mL in which they are written. More digits would need no move."
+                f"Between the angles of {parameter_set.actuator_file} the curves through its numbers would be "
+                f"negative or fall with the pressure. They are shifted by {1e6 * moved:.2g} mL at most, "
+                f"within the rounding step of {1e6 * digit:.2g} mL of the file. Give more digits to avoid this."
             ),
         )

@@ -91,7 +91,7 @@ def _one_inertia(
     reconciling_text = evidence.in_set_unit(_INERTIA, reconciling)
     slip = (
         f" {reconciling_text} is the reported {evidence.in_set_unit(_INERTIA, reported)} with the decimal point moved: "
-        "either the inertia or both products carry the slip, and only a weighing can tell which."
+        "either the inertia or both products are wrong, and only a measurement of the inertia can decide."
         if shifted
         else ""
     )

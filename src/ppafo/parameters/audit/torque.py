@@ -162,8 +162,8 @@ def check_published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
             ),
             paragraph=(
                 f"At {evidence.in_set_unit(paths[1], pressure)} the vane gives {evidence.torque(at_rest)}, published "
-                f"are {evidence.torque(torque)}. This speaks of the torque constant alone: "
-                f"a vane at rest has any volume. {note}"
+                f"are {evidence.torque(torque)}. This checks the torque constant "
+                f"alone, as the volume has no influence at rest. {note}"
             ).rstrip(),
         )
         if name == "walking":

@@ -44,7 +44,7 @@ REGULATOR = (
 
 def _passage(component: str, short_name: str) -> tuple[Quantity, ...]:
     """Return the quantities of a component in the gas path, in the order of ``Passage``."""
-    warming = f"share of the way to the {short_name}'s temperature that the gas warms"
+    warming = f"effectiveness of the {short_name}: gas temperature rise over the initial difference"
     conductance = f"heat conductance from the room to the {short_name}"
     return (
         Quantity("heat_capacity", "J/K", f"heat capacity of the {component}", minimum=1e-3, maximum=1e6),

@@ -29,25 +29,25 @@ class ClaimEntry(StrictTable):
     """Statement in the file of a publication."""
 
     id: str = Field(pattern=_IDENTIFIER, description="name of the statement, unique in the file")
-    statement: Text = Field(description="what is stated, one sentence")
+    statement: Text = Field(description="statement, in one sentence")
     published: float | None = Field(
-        None, allow_inf_nan=False, description="published number in 'unit'; left out where only words are"
+        None, allow_inf_nan=False, description="published number in 'unit'; omitted for a statement in words"
     )
     unit: str = Field("", description="unit of the published and of our number")
-    words: str = Field("", description="what is published where it is no number, or the range of it")
-    own: str = Field("", description="own arithmetic on published numbers, where nothing is published itself")
+    words: str = Field("", description="published text or range, where it is no single number")
+    own: str = Field("", description="calculation from published numbers, where the result itself is not published")
     direction: Literal["equal", "maximum", "less", "more"] = Field(
-        "equal", description="what is stated: a number, a maximum ('up to'), or less or more, which needs a limit"
+        "equal", description="kind of statement: a number, a maximum ('up to'), or less or more, which needs a limit"
     )
-    where: Text = Field(description="where it was read")
-    source: str = Field("", description="publication, where it is not the file's")
+    where: Text = Field(description="page, section or figure of the source")
+    source: str = Field("", description="publication, if other than that of the file")
     computation: str = Field("", description="name of a computation of 'ppafo reproduce'")
     arguments: dict[str, str] = Field(default_factory=dict, description="arguments of the computation, with units")
     at_least: float | None = Field(None, allow_inf_nan=False, description="lowest value that agrees, in 'unit'")
     at_most: float | None = Field(None, allow_inf_nan=False, description="highest value that agrees, in 'unit'")
-    assumed: Texts = Field((), description="what our number rests on beside what is published")
-    note: str = Field("", description="why the verdict is what it is")
-    not_testable: str = Field("", description="why nothing is computed, in place of a computation")
+    assumed: Texts = Field((), description="assumptions of our number beyond the publication")
+    note: str = Field("", description="reason for the verdict")
+    not_testable: str = Field("", description="reason for no computation, in place of one")
 
 
 class PublicationFile(StrictTable):
@@ -55,7 +55,7 @@ class PublicationFile(StrictTable):
 
     schema_version: SchemaVersion
     name: str = Field(pattern=NAME)
-    title: Text = Field(description="what it is about")
+    title: Text = Field(description="subject of the publication")
     citation: Text = Field(description="authors, journal, year, doi where known")
     claims: list[ClaimEntry] = Field(min_length=1)
 

@@ -57,8 +57,8 @@ def unlimited_switching(result: "RecordedResult") -> str:
         return ""
     missing = ", ".join(f"`valve.{name}`" for name in limits)
     return (
-        f"its valves are reversed {often:.3g} times a second, and no number of the set limits that ({missing} are 0): "
-        f"give the values of the valve, or a lower `controller.rate`"
+        f"its valves are reversed {often:.3g} times a second, and no value of the parameter set limits the "
+        f"rate ({missing} are 0): give the values of the valve, or a lower `controller.rate`"
     )
 
 

@@ -58,7 +58,7 @@ def test_a_valve_map_by_a_meter_without_sign_is_the_map(has_sign: bool, tmp_path
     found = {estimate.path.rpartition(".")[2]: estimate for estimate in result.estimates}
     assert found["dead_band"].value == pytest.approx(0.04, abs=0.002)
     assert found["dead_band"].is_identified
-    assert any("has no sign" in remark for remark in result.remarks) is not has_sign
+    assert any("gives no direction" in remark for remark in result.remarks) is not has_sign
 
 
 def rise(volume: float, hours: float = 0.03) -> list[tuple[float, float]]:
@@ -87,7 +87,7 @@ def test_a_leak_into_an_evacuated_chamber_is_identified_on_either_side(exchanged
     # The set's discharge coefficient is 0.113.
     assert 0.113 * result.estimates[0].value == pytest.approx(1.0e-8, rel=0.02)
     assert result.estimates[0].is_identified
-    assert any("is treated as a room" in remark for remark in result.remarks)
+    assert any("is treated as a reservoir" in remark for remark in result.remarks)
 
 
 @pytest.mark.parametrize(("unit", "scale"), [("kPa", 1.0e-3), ("bar", 1.0e-5), ("bar_g", 1.0e-5), ("Pa", 1.0)])

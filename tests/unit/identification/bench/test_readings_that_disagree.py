@@ -92,7 +92,7 @@ def test_a_reading_of_ten_times_its_value_is_named_before_a_fit(solved: dict[str
     values[at] *= 10.0
     wrong = changed(source, name, values)
     if kind in OVER_TIME:
-        assert_close(solved[kind]((wrong,)), solved[kind]((source,)), f"left out: 1 of .* samples with '{name}'")
+        assert_close(solved[kind]((wrong,)), solved[kind]((source,)), f"left out: 1 of .* samples where '{name}'")
         return
     with pytest.raises(IdentificationError, match=f"'{name}' is .* at sample {at + 1}, where its neighbours are at"):
         solved[kind]((wrong,))
@@ -112,7 +112,7 @@ def test_one_sample_in_a_hundred_that_is_wrong_is_left_out_and_one_in_twenty_ref
     values = source.recording[name].copy()
     places = np.arange(40, values.size - 40, 100)
     values[places] += 2.0 * np.ptp(values) * (-1.0) ** places
-    said = f"left out: {places.size} of .* samples with '{name}' .* the first is sample 41"
+    said = f"left out: {places.size} of .* samples where '{name}' .* the first is sample 41"
     assert_close(solved[kind]((changed(source, name, values),)), solved[kind]((source,)), said)
     values[10::20] *= 30.0
     with pytest.raises(IdentificationError, match=f"'{name}' is .*: a wrong reading, and so are samples"):
@@ -125,7 +125,7 @@ def test_a_step_of_the_converter_near_rest_is_no_wrong_reading(solved: dict[str,
     room = np.full(len(source.recording), 101_325.0)
     room[:: int(1.0 / share)] += 250.0
     remarks = solved["leak"]((changed(source, "pressure_2", room),)).remarks
-    assert any("is treated as a room" in remark for remark in remarks)
+    assert any("is treated as a reservoir" in remark for remark in remarks)
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def test_a_search_that_ends_where_no_run_succeeds_says_which_bound_keeps_it_from
     monkeypatch.setattr(fitting, "fit_residuals", lambda *_arguments, **_settings: ended)
     (remark,) = fit(three.problem).remarks
     value = three.estimate("foot_plate.inertia").value
-    assert f"the recordings favour foot_plate.inertia above {value:.4g} kg m^2, where no run succeeds" in remark
+    assert f"the recordings favour foot_plate.inertia above {value:.4g} kg m^2, where every run fails" in remark
     assert f'give high = "{0.999 * value:.4g} kg m^2" of foot_plate.inertia' in remark
     assert "before it converged" not in remark
 

@@ -40,7 +40,7 @@ def test_bounds_and_scale_follow_from_the_declaration(experiment: FittedExperime
     ("parameter", "message"),
     [
         (FreeParameter("foot_plate.inertia", low=1.0, high=2.0), "must lie between the bounds"),
-        (FreeParameter("foot_plate.inertia", high=5.0e3), "exceed what is allowed"),
+        (FreeParameter("foot_plate.inertia", high=5.0e3), "exceed the allowed range"),
         (FreeParameter("actuator.torque_constant", start=0.0, low=0.0), "a start at 0 needs bounds"),
         (FreeParameter("foot_plate.inertia", start=float("nan")), "must be finite"),
         (FreeParameter("foot_plate.inertia", deviation=0.0), "standard deviation of a prior"),

@@ -60,7 +60,7 @@ void @name@_read_outputs(const @name@_run *run, @name@_outputs *outputs);
 /* The metrics of all samples so far. */
 void @name@_read_metrics(const @name@_run *run, @name@_metrics *metrics);
 
-/* Make another run, in memory of at least the same size, what this one is. */
+/* Copy this run into another one, in memory of at least the same size. */
 void @name@_copy(@name@_run *to, const @name@_run *from);
 
 #if defined(__cplusplus)

@@ -52,7 +52,7 @@ typedef struct {
 /* The plant after the last step. */
 void @name@_read_outputs(const @name@_run *run, @name@_outputs *outputs);
 
-/* Make another run, in memory of at least the same size, what this one is. */
+/* Copy this run into another one, in memory of at least the same size. */
 void @name@_copy(@name@_run *to, const @name@_run *from);
 
 #if defined(__cplusplus)
