@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.analyses.find.solve import FindResult
+from ppafo.analyses.find.solve import FOLLOWS, FindResult
 from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import Kind, of_metric, of_path
 from ppafo.report.panels import Mark, Panel
@@ -69,6 +69,7 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
     # In the unit of the range that was given.
     kind = of_path(path.path, path.quantity.unit, given=path.given)
     met, (index, neighbour) = outcome.met_intervals, outcome.found
+    limit = "" if condition.text == FOLLOWS else "dashed: the limit; "
     columns = [Column(title, [kind.text(ends[end]) for ends in met]) for end, title in enumerate(("from", "to"))]
     remarks = list(_remarks(outcome, kind))
     # In more digits than are shown, so that the value that is pasted meets the condition.
@@ -76,7 +77,7 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
     return Finding(
         name="find",
         kicker="Search",
-        title=f"The {wanted} {path.path} such that {condition.text}",
+        title=f"The {wanted} {path.path} such that {'the run ' if condition.text == FOLLOWS else ''}{condition.text}",
         said=(_verdict(outcome, kind), *remarks),
         parts=(
             Section("Met in the range that was tried", columns),
@@ -85,7 +86,7 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
                 "Metric over the value",
                 panels=(_panel(outcome, kind),),
                 name="find",
-                caption="The metric over the value; dashed: the limit; shaded: where the condition is met.",
+                caption=f"The metric over the value; {limit}shaded: where the condition is met.",
             ),
         ),
         found=Threshold(
@@ -122,17 +123,20 @@ def _verdict(outcome: FindResult, kind: Kind) -> str:
     path, condition, tried = outcome.path.path, outcome.condition, outcome.tried
     of_condition, (index, neighbour) = of_metric(condition.metric), outcome.found
     wanted, further = ("highest", "higher") if outcome.highest else ("lowest", "lower")
+    is_verdict = condition.text == FOLLOWS
+    meets = "lets the run follow its reference" if is_verdict else f"meets {condition.text}"
+    nearest = f"{condition.metric} of " if is_verdict else ""
     if index is None:
         # The nearest one says whether a wider range could.
         row = int((np.nanargmin if condition.is_most else np.nanargmax)(tried["judged"]))
         return (
-            f"no {path} from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])} meets {condition.text}; "
-            f"the nearest is {of_condition.text(tried['judged'][row])} at {kind.text(tried['value'][row])}"
+            f"no {path} from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])} {meets}; "
+            f"the nearest is {nearest}{of_condition.text(tried['judged'][row])} at {kind.text(tried['value'][row])}"
         )
     value = float(tried["value"][index])
     # Beyond it the condition may be met by a loop that does not follow its reference.
-    follows = " and follows its reference" if _not_followed(outcome) else ""
-    lead = f"{path} = {kind.text(value)} is the {wanted} value that meets {condition.text}{follows}"
+    follows = " and follows its reference" if _not_followed(outcome) and not is_verdict else ""
+    lead = f"{path} = {kind.text(value)} is the {wanted} value that {meets}{follows}"
     there = f"{condition.metric} is {of_condition.text(float(tried['metric'][index]))} there"
     if neighbour is None:
         return f"{lead}, and the end of the range: {there}; a wider range may have a {further} one"
@@ -175,7 +179,7 @@ def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
         )
     if oscillating := int(tried["oscillating"].sum()):
         yield f"in {oscillating} of {runs.count} runs the loop oscillates: they count as not met"
-    if missed := _not_followed(outcome):
+    if (missed := _not_followed(outcome)) and condition.text != FOLLOWS:
         yield f"at {missed} values the condition is met, but the reference is not followed: they count as not met"
     if runs.failures:
         yield f"{runs.failures} of {runs.count} runs failed and count as not met; the first: {runs.reason}"
@@ -194,7 +198,8 @@ def _panel(outcome: FindResult, kind: Kind) -> Panel:
         crosses = {"linestyle": "", "marker": "x", "markersize": 4}
         label = "RMS error in the second half of the hold, where it swings"
         marks.append(Mark("line", values, larger, label=label, colour=GREY, style=crosses))
-    marks.append(Mark("level", (), condition.limit, label="limit", colour=BLACK, style=dashes))
+    if condition.text != FOLLOWS:
+        marks.append(Mark("level", (), condition.limit, label="limit", colour=BLACK, style=dashes))
     marks += [
         Mark("span", ends, label="" if row else "condition met", colour=GREEN)
         for row, ends in enumerate(outcome.met_intervals)

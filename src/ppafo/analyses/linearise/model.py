@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -81,7 +82,8 @@ class LinearModel:
     """Linear plant model of a scenario, x' = A x + B u, y = C x + D u, for deviations from the operating point in SI.
 
     ``time``: time of the operating point [s]; None for a steady state
-    ``a`` (states, states), ``b`` (states, inputs), ``c`` (outputs, states), ``d`` (outputs, inputs): matrices
+    ``a`` (states, states), ``b`` (states, inputs), ``c`` (outputs, states), ``d`` (outputs, inputs): matrices, also
+        named as in the equations: ``A``, ``B``, ``C``, ``D``
     ``rates`` (states,): x' at the operating point, 0 in a steady state
     ``sides``: side of each limit of the plant, in words
     ``edges``: kinks on which the operating point lies
@@ -103,6 +105,8 @@ class LinearModel:
     edges: tuple[SlopeKink, ...]
     delays: OmittedDelays
     margins: LoopMargins | None = None
+
+    A, B, C, D = (property(attrgetter(name)) for name in "abcd")
 
     @property
     def is_steady(self) -> bool:

@@ -246,6 +246,21 @@ def test_a_step_that_has_settled_is_judged_as_its_run_is_whatever_its_first_reve
     assert found.tried[0].judged == pytest.approx(alone.metrics["final_error"].value)
 
 
+def test_a_run_that_follows_is_a_condition_of_its_own(tmp_path: Path) -> None:
+    answer = find(TASK, vary="supply.pressure=50..60 psi_g", such_that="follows", grid=5)
+    found = answer.found
+    assert answer.said[0].startswith("supply.pressure = 57.1")
+    assert "is the lowest value that lets the run follow its reference: rms_error is" in answer.said[0]
+    for value, follows in ((found.value, True), (found.not_met_at, False)):
+        assert (ppafo.simulate(TASK, [f"supply.pressure={value!r} Pa_a"]).tracking is None) == follows
+    answer.save(tmp_path / "out")
+    assert json.loads((tmp_path / "out" / "find.json").read_text())["condition"] == "follows"
+    with pytest.raises(StudyError, match="'follows': scenario 'step-response' has no reference to follow"):
+        find("step-response", vary="supply.pressure=50..60 psi_g", such_that="follows")
+    with pytest.raises(StudyError, match="nor 'follows', for a run that follows its reference"):
+        find(TASK, vary="supply.pressure=50..60 psi_g", such_that="following")
+
+
 def test_a_number_of_the_other_form_of_an_orifice_names_the_form_and_the_scenario_once() -> None:
     """The cylinder's valve is given by a sonic conductance."""
     message = (
