@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -106,7 +105,12 @@ class LinearModel:
     delays: OmittedDelays
     margins: LoopMargins | None = None
 
-    A, B, C, D = (property(attrgetter(name)) for name in "abcd")
+    def __getattr__(self, name: str) -> Floats:
+        """Matrix under its name in the equations: ``A``, ``B``, ``C`` or ``D``."""
+        if name not in ("A", "B", "C", "D"):
+            raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'", name=name, obj=self)
+        matrix: Floats = getattr(self, name.lower())
+        return matrix
 
     @property
     def is_steady(self) -> bool:
