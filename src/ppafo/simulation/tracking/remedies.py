@@ -94,7 +94,7 @@ def speed_settings(scenario: Scenario, law: ControllerKind | None) -> dict[str, 
     return {term: items[term] for term in FASTEST_FIRST if term in items}
 
 
-def gain_of_device(scenario: Scenario, law: ControllerKind | None) -> Remedy | None:
+def default_gain_remedy(scenario: Scenario, law: ControllerKind | None) -> Remedy | None:
     """Remedy that sets the first gain that differs from the device's default to that default; None if none differs."""
     if law is None:
         return None
@@ -108,7 +108,7 @@ def gain_of_device(scenario: Scenario, law: ControllerKind | None) -> Remedy | N
     return None
 
 
-def integral_of_device(scenario: Scenario, law: ControllerKind | None) -> list[Remedy]:
+def default_integral_remedy(scenario: Scenario, law: ControllerKind | None) -> list[Remedy]:
     """Remedy that sets an integral gain of 0 to the device's default; empty without such a gain."""
     if law is None:
         return []
