@@ -209,7 +209,8 @@ def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
     # How the torque follows what is requested, and the gains in force with their origin.
     in_force = gains_of(configuration, law_of(configuration))
     torque = worn.torque_sentence(verdict)
-    first_lines = [benefit_sentence(comparison), torque, "" if in_force is None else in_force.sentence]
+    gains = "" if in_force is None else in_force.sentence
+    first_lines = [benefit_sentence(comparison), torque, configuration.origin.replaced, gains]
     gait, overrides = motion.gait, configuration.origin.overrides
     title = f" ({gait.title})" if gait.title else ""
     set_up = (
