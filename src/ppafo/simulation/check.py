@@ -23,6 +23,7 @@ from ppafo.signals.recording import Recording
 from ppafo.simulation.at_hand import RecordedResult
 from ppafo.units import without_exponent
 from ppafo.units.shown import in_units, units_in_force
+from ppafo.wording import argument_text
 
 SHORTER = 4
 """Factor by which the finer run shortens the steps; its allowed error is smaller by the square of this factor."""
@@ -173,11 +174,12 @@ class Check:
         inexact = [row.name for row in sensitive if not row.changed_by & _PERTURBATIONS]
         sentences = []
         if perturbed:
+            sweep = argument_text("ppafo.sweep(..., statistic=...)", option="ppafo sweep --statistic")
             kinds = {name.split()[0] for row in sensitive for name in row.changed_by & _PERTURBATIONS}
             sentences.append(
                 f"{', '.join(perturbed)}: a {' or '.join(sorted(kinds, reverse=True))} moved by {MOVE:.0e} of its "
                 "range, far below what can be measured, changes them. One run is no evidence of their values; give "
-                "the spread over many (ppafo sweep --statistic)."
+                f"the spread over many runs ({sweep})."
             )
         if inexact:
             sentences.append(

@@ -23,7 +23,7 @@ from ppafo.parameters.parameter_set import (
 from ppafo.simulation.document import DocumentReader, ScenarioRequest, value_at
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Origin
-from ppafo.wording import nearest_name, one_line
+from ppafo.wording import nearest_name, one_line, override_text
 
 logger = logging.getLogger("ppafo")
 
@@ -52,8 +52,8 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
         if valve is not None and valve not in kinds and not nearest_name(valve, kinds):
             # The scenario names the valve of another device.
             raise ParameterError(
-                f"{parameter_set.file}: there is no valve '{valve}'; it has {', '.join(kinds)}: "
-                f"--set device.valve={parameter_set.default_valve}"
+                f"{parameter_set.file}: there is no valve '{valve}'; it has {', '.join(kinds)}: give "
+                f"{override_text((f'device.valve={parameter_set.default_valve}',))}"
             )
         name = chosen_valve(parameter_set, valve)
         is_own = section["set"] == in_file.get("set")
