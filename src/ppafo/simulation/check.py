@@ -103,7 +103,7 @@ class ErrorEstimate:
         beyond = ""
         if self.over_promise > 1.0:
             remedy = f": `run.tolerance = {self.tolerance:.1g}` reduces it" if self.tolerance else ""
-            beyond = f" That is {self.over_promise:.2g} times what a run promises{remedy}."
+            beyond = f" That is {self.over_promise:.2g} times the accuracy that a run promises{remedy}."
         return f"Estimated error of the steps: at most {over_time} over time{of_metrics}.{beyond}"
 
 
@@ -206,7 +206,7 @@ class Check:
             changes = [without_exponent(metric_change(row.changes[name], row.unit)[0], "+.1e") for name in names]
             verdict = "" if row.is_determined else "sensitive"
             rows.append([row.name, f"{value:.4g} {unit}".rstrip(), *changes, verdict])
-        head = f"Check of '{self.scenario}': what changes in runs that should be the same"
+        head = f"Check of '{self.scenario}': differences between runs that should be equal"
         return "\n".join([head, *align_columns(rows), "", self.sentence])
 
     def document(self) -> dict[str, Any]:

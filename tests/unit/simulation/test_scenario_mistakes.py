@@ -332,7 +332,7 @@ def test_plain_values_of_a_wrong_type_are_clean_errors(change: dict[Any, Any]) -
 def test_a_parameter_set_that_is_given_as_a_scenario_is_called_what_it_is() -> None:
     with pytest.raises(
         ScenarioError,
-        match=r"^bench\.toml: is a parameter set, not a scenario; .*overrides=\['device\.set=bench\.toml', 'device\.valve=main'\]$",
+        match=r"^bench\.toml: is a parameter set, .*overrides=\['device\.set=bench\.toml', 'device\.valve=main'\]$",
     ):
         parse_scenario(b'name = "bench"\ndefault_valve = "main"\n', "bench.toml")
 

@@ -206,7 +206,7 @@ def test_a_joint_that_is_flung_at_the_start_is_told_so_with_pressures_that_carry
     scenario = load_scenario("cylinder-servo", changes)
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
-    assert "at the start its chambers give 0 N m for a load of 4 N m: the joint is flung 19" in verdict.sentence
+    assert "at the start its chambers give 0 N m for a load of 4 N m: the joint moves 19" in verdict.sentence
     assert [text.partition("=")[0] for text in verdict.mended] == ["initial.pressure_1", "initial.pressure_2"]
     again = simulate("cylinder-servo", [*changes, *verdict.mended])
     assert again.tracking is None
@@ -475,7 +475,7 @@ LEVEL = "reference.level=3 N m"
         (
             TASK,
             [LEVEL, "controller.proportional_gain=95 1/(N m)"],
-            "its gains are not this device's",
+            "its gains do not suit this device",
             "proportional_gain",
         ),
         (
