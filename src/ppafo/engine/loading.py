@@ -99,7 +99,8 @@ def runs_by_python() -> bool:
 def _load_by(source: str, compilers: tuple[Compiler, ...], effort: Effort) -> ModuleType | None:
     """Return the module of a text compiled by the first working compiler; None if there is none.
 
-    If the compiler named by ``PPAFO_BACKEND`` fails, raises SimulationError, or ProgramError for a law without C.
+    The only place that recovers from a failed compiler: it is left out for a day, and the next one is tried. If the
+    compiler named by ``PPAFO_BACKEND`` fails, raises SimulationError, or ProgramError for a law without C.
     """
     if not compilers:
         return None

@@ -6,6 +6,7 @@ from statistics import NormalDist
 from typing import Literal, get_args
 
 from ppafo.errors import IdentificationError
+from ppafo.units import percentage
 
 Verdict = Literal["identified", "holds for this model only", "not identifiable", "at its bound"]
 """Verdict of the recordings on a value.
@@ -17,10 +18,30 @@ into a set with the origin ``fitted``, and is not to be taken as a property of t
 _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 _USABLE: tuple[Verdict, ...] = ("identified", "holds for this model only")
 
+UNKNOWN = 1.0
+"""Half-width of an interval, relative to the value [-], from which the value is not identifiable: zero or twice the
+value lies in the interval."""
+_WIDE = 0.1
+"""Half-width of an interval, relative to the value [-], above which the verdict states it."""
+
 
 def interval_factor(confidence: float) -> float:
     """Return the half-width of a confidence interval in standard errors [-], 1.96 for a confidence of 95 %."""
     return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
+
+
+def relative_half_width(value: float, low: float, high: float, size: float | None = None) -> float:
+    """Return the wider half of an interval as a fraction of the value [-].
+
+    ``size`` is a typical magnitude that takes the place of the value of a quantity that may be zero. A side cut off at
+    a bound is too narrow, so that the wider one counts.
+
+    >>> relative_half_width(0.4, 0.24, 0.5)
+    0.4
+    """
+    wider = max(high - value, value - low)
+    size = abs(value) if size is None else size
+    return wider / size if size > 0.0 else math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +51,8 @@ class Estimate:
     ``path`` is a dotted path in a parameter set, such as ``actuator.torque_constant``; a quantity without an entry in
     sets has a path of its own. An estimate that could not be made has NaN for value and interval. ``explanation`` is
     one sentence: the sources of the uncertainty, the quantities that the value trades off against, or the limits of its
-    validity. ``recordings`` names each source with its hash: ``static.csv sha256:0123abcd...``.
+    validity. ``recordings`` names each source with its hash: ``static.csv sha256:0123abcd...``. ``size`` is a typical
+    magnitude [``unit``] of a quantity that may be zero, such as the zero of a sensor.
     """
 
     path: str
@@ -42,6 +64,7 @@ class Estimate:
     explanation: str
     recordings: tuple[str, ...]
     confidence: float = 0.95
+    size: float | None = None
 
     def __post_init__(self) -> None:
         if self.verdict not in _VERDICTS:
@@ -63,6 +86,14 @@ class Estimate:
     def is_identified(self) -> bool:
         """True if the recordings determine the value and the model explains the recordings."""
         return self.verdict == "identified"
+
+    @property
+    def verdict_text(self) -> str:
+        """Verdict, with the half-width of a wide interval relative to the value: ``identified, +-44 %``."""
+        width = relative_half_width(self.value, self.low, self.high)
+        if not self.is_usable or self.size is not None or width <= _WIDE:
+            return self.verdict
+        return f"{self.verdict}, +-{percentage(width, 2)}"
 
     @property
     def half_width(self) -> float:

@@ -37,8 +37,9 @@ class Fit:
     of the confidence intervals at ``confidence``. ``noise``: standard deviation by channel. ``correlation``: order of
     the noise autoregression by channel. ``residuals``: measured - model. ``outliers``: rows of residuals left out as
     isolated outliers. ``conflict``: part of the data that contradicts the rest, if any. ``unidentified``: combinations
-    that the recordings do not determine, as weights of scaled variables. ``shares``: for each variable, the tolerances
-    that contribute to its variance, with fractions [-], largest first. ``evaluations``: number of model runs.
+    that the recordings do not determine, as weights of variables relative to their values. ``shares``: for each
+    variable, the tolerances that contribute to its variance, with fractions [-], largest first. ``evaluations``: number
+    of model runs.
     ``sensors``: noise model by channel. ``jacobian``: whitened Jacobian [1/SI]. ``edge``: unknowns that the search
     drives to values at which no run succeeds, with the direction, 1 upwards or -1 downwards; such a search has not
     converged.
@@ -161,6 +162,8 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
     near = _AT_BOUND * np.maximum(1.0, np.abs(point))
     is_at_bound = ((point - runs.low < near) & (gradient > 0.0)) | ((runs.high - point < near) & (gradient < 0.0))
     names = [number.name for number in runs.numbers]
+    # Against the value that was found: against the start a far start would make a known number unknown.
+    typical = np.where((runs.low > 0.0) & (runs.prior == 0.0), point, 1.0)
     # What is assumed of each number widens the interval of every one by its share of the variance [-].
     fractions = np.square(covariance * runs.prior) / np.diag(covariance)[:, None]
     shares = {
@@ -178,7 +181,7 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
         residuals=end.residuals,
         outliers=tuple(outliers.tolist()),
         conflict=conflict_of(runs, linear.rows, point, ~is_at_bound, freedom) or too_smooth(sensors),
-        unidentified=tuple(unidentified(covariance, names)),
+        unidentified=tuple(unidentified(covariance / np.outer(typical, typical), names)),
         shares=shares,
         evaluations=runs.evaluations,
         # Where every step leaves the region in which runs succeed nothing says that this is the least.

@@ -36,7 +36,7 @@ _BENT = 1.1
 _SHOWN_WEIGHT = 0.1
 """Least weight of a variable in a combination [-] for which it is listed."""
 _UNKNOWN = 0.5
-"""Standard error of a combination of scaled variables [-] above which it is not identifiable."""
+"""Standard error of a combination of relative variables [-] above which it is not identifiable."""
 
 
 def interval_ends(runs: FitRuns, point: Floats, linear: Linear, times: float) -> tuple[Floats, Floats]:
@@ -164,7 +164,10 @@ def _least_along(runs: FitRuns, point: Floats, number: int, linear: Linear) -> t
 
 
 def unidentified(covariance: Floats, names: Sequence[str]) -> Iterator[dict[str, float]]:
-    """Yield combinations of scaled variables whose standard error is above half their scale, as weights by name."""
+    """Yield combinations of variables whose standard error is above half their size, as weights by name.
+
+    ``covariance`` is relative to the size of each variable.
+    """
     variances, vectors = np.linalg.eigh(covariance)
     for variance, vector in zip(variances[::-1].tolist(), vectors.T[::-1], strict=True):
         if math.sqrt(max(variance, 0.0)) > _UNKNOWN:

@@ -68,7 +68,7 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
         from_si(number, unit, si_unit, atmosphere) for number in (estimate.value, estimate.low, estimate.high)
     )
     previous = "no value" if before is None else f"{number_text(before)} ({before.origin}: {before.source})"
-    interval = f"{100.0 * estimate.confidence:g}% interval {low:.6g} to {high:.6g} {unit}".rstrip()
+    said = f"{estimate.verdict_text}, {100.0 * estimate.confidence:g}% interval {low:.6g} to {high:.6g} {unit}".rstrip()
     # An interval that is cut at a bound is too narrow on that side.
     wider = max(high - value, value - low)
     half_width = wider * interval_factor(CONFIDENCE) / interval_factor(estimate.confidence)
@@ -77,7 +77,7 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
         unit=unit,
         origin="identified" if estimate.is_identified else "fitted",
         source="; ".join(estimate.recordings),
-        note=f"{estimate.verdict}, {interval}; {estimate.explanation.rstrip('.')}. Before, the set had {previous}.",
+        note=f"{said}; {estimate.explanation.rstrip('.')}. Before, the set had {previous}.",
         uncertainty=_in_digits_of(half_width, half_width),
     )
     # An orifice that is given as an area has no sonic conductance any more, and the other way round.

@@ -43,6 +43,16 @@ def with_error(value: float, error: float) -> str:
     return f"({text})e{power:+03d}" if power else text
 
 
+def digits_of(number: float, error: float) -> str:
+    """Return a number rounded to two significant digits of an error, ``9.77`` for 9.7701 and an error of 0.22."""
+    if not (math.isfinite(number) and math.isfinite(error) and error > 0.0):
+        return f"{number:.4g}"
+    decimals = 1 - math.floor(math.log10(error))
+    if number == 0.0 or _SMALLEST <= max(abs(number), error) < _LARGEST:
+        return f"{round(number, decimals) + 0.0:.{max(decimals, 0)}f}" if number else "0"
+    return f"{number:.{max(math.floor(math.log10(abs(number))) + decimals, 1)}e}"
+
+
 def widened_by(fitted: Fit, name: str) -> str:
     """Return a phrase on the tolerances that widen the interval of a variable, largest first."""
     named = [

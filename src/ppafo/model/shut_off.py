@@ -8,7 +8,7 @@ NEVER = 1.0e9
 """Time [s] of an event that does not occur."""
 
 SHUT_OFF = (
-    Quantity("area", "m^2", "flow area of the shut-off valve, 0 for none", 0.0, 0.0, 1.0e-3),
+    Quantity("area", "m^2", "flow area of the shut-off valve", None, 0.0, 1.0e-3, minimum_allowed=False),
     Quantity("discharge_coefficient", "1", "discharge coefficient of the shut-off valve", 0.7, 0.01, 1.0),
     Quantity("delay", "s", "time from the alarm until the line is vented", 0.02, 0.0, 1.0),
     Quantity(

@@ -197,6 +197,11 @@ def csv_bytes(recording: Recording) -> bytes:
     return buffer.getvalue().encode()
 
 
+def _separator_of(header: str) -> str:
+    # A unit may contain a semicolon: a tab or a semicolon separates only where all cells then are columns.
+    return next((mark for mark in "\t;" if mark in header and all(map(_HEADER.fullmatch, header.split(mark)))), ",")
+
+
 def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
     """Return the recording in a CSV file, in SI units, labelled with the file name by default.
 
@@ -213,8 +218,7 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
         lines = text.splitlines()
         first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
         head = next(islice(lines, first, None), "")
-        # A tab or a semicolon only where all cells then are columns.
-        mark = next((mark for mark in "\t;" if mark in head and all(map(_HEADER.fullmatch, head.split(mark)))), ",")
+        mark = _separator_of(head)
         rows: Iterator[list[str]] = csv.reader(islice(lines, first, None), delimiter=mark, strict=True)
         header: list[str] = []
         for cell in next(rows, []):

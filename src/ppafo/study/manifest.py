@@ -17,6 +17,7 @@ from ppafo.parameters.declaration import fits
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
+from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, chunk_size
 from ppafo.study.controller_document import DIGITS, controller_document
@@ -120,7 +121,7 @@ class _Named(_Part):
 class _StoredSample(_Part):
     method: str
     runs: int
-    seed: int = 1
+    seed: int = DEFAULT_SEED
 
 
 class _StoredVaried(_Part):

@@ -140,8 +140,6 @@ def _motion(
     is_named = "gait" in request.instead or "gait" in reading.document
     faults = {sensor: _fault(reading, sensor) for sensor in FAULTY}
     shut_off = reading.section("shut_off", SHUT_OFF) if "shut_off" in reading.document else {}
-    if shut_off and shut_off["area"] <= 0.0:
-        raise reading.refusal("shut_off.area", "must be above 0; leave [shut_off] out where none is fitted")
     broken = {part: fault for part in PLANT_FAULTS if (fault := _fault(reading, part)).kind}
     for part in broken:
         if line is not None and part.startswith(("regulator", "bottle")):

@@ -13,7 +13,7 @@ from ppafo.analyses.identify.answer import Identification, finding_of
 from ppafo.analyses.identify.question import identify
 from ppafo.cli.main import main
 from ppafo.errors import IdentificationError, PpafoError
-from ppafo.identification.estimate import Estimate
+from ppafo.identification.estimate import UNKNOWN, Estimate, relative_half_width
 from ppafo.identification.new_set import with_estimates
 from ppafo.identification.problem import json_schema, parse_problem
 from ppafo.identification.procedures import FreeDecayProblem, ProcedureContext, VaneLeakProblem
@@ -467,6 +467,27 @@ def test_an_identified_value_outside_its_interval_is_refused() -> None:
 def test_a_value_that_could_not_be_told_may_be_no_number() -> None:
     nothing = estimate(math.nan, math.nan, math.nan, "not identifiable")
     assert not nothing.is_usable
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "verdict", "text"),
+    [
+        (1.9, 2.1, "identified", "identified"),
+        (1.12, 2.5, "identified", "identified, +-44 %"),
+        (1.7, 2.6, "holds for this model only", "holds for this model only, +-30 %"),
+        (0.0, 5.0, "not identifiable", "not identifiable"),
+    ],
+)
+def test_the_verdict_states_the_half_width_of_a_wide_interval(low: float, high: float, verdict: str, text: str) -> None:
+    assert estimate(2.0, low, high, verdict).verdict_text == text
+
+
+def test_an_interval_that_holds_zero_or_twice_the_value_does_not_identify_it() -> None:
+    assert relative_half_width(2.0, 0.1, 3.9) < UNKNOWN
+    assert relative_half_width(2.0, 0.0, 2.5) >= UNKNOWN
+    assert relative_half_width(2.0, 1.5, 4.0) >= UNKNOWN
+    # The zero of a sensor is known although it may be zero.
+    assert relative_half_width(0.0, -0.1, 0.1, 10.0) == pytest.approx(0.01)
 
 
 def test_an_unknown_verdict_is_refused() -> None:

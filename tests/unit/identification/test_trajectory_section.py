@@ -202,8 +202,15 @@ def test_the_fit_starts_from_what_the_bench_found_and_keeps_the_rest_of_it(solve
 
 
 def test_a_value_that_both_found_is_that_of_the_fit_in_the_new_set(solve: Solve) -> None:
+    outcome = solve(f"{STATIC}{FIT}[[trajectory.parameters]]\npath = 'actuator.torque_constant'\n")
+    assert outcome.new_set.parameter_set.numbers["actuator.torque_constant"].source.startswith("step.csv")
+
+
+def test_a_value_that_the_fit_cannot_tell_leaves_what_the_bench_found(solve: Solve) -> None:
     outcome = solve(f"{STATIC}{FIT}[[trajectory.parameters]]\npath = 'friction.static_torque'\n")
-    assert outcome.new_set.parameter_set.numbers["friction.static_torque"].source.startswith("step.csv")
+    assert outcome.trajectory is not None
+    assert outcome.trajectory.fit.estimate("friction.static_torque").verdict == "not identifiable"
+    assert outcome.new_set.parameter_set.numbers["friction.static_torque"].source.startswith("static.csv")
 
 
 def test_the_interval_of_the_bench_can_be_the_prior_of_the_fit(solve: Solve) -> None:

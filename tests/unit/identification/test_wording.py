@@ -2,7 +2,7 @@
 
 import pytest
 
-from ppafo.identification.wording import in_shown_unit, with_error
+from ppafo.identification.wording import digits_of, in_shown_unit, with_error
 
 
 @pytest.mark.parametrize(
@@ -19,6 +19,20 @@ from ppafo.identification.wording import in_shown_unit, with_error
 )
 def test_a_value_has_as_many_digits_as_its_error_allows(value: float, error: float, text: str) -> None:
     assert with_error(value, error) == text
+
+
+@pytest.mark.parametrize(
+    ("number", "error", "text"),
+    [
+        (9.7701, 0.22, "9.77"),
+        (520.12, 5.1, "520.1"),
+        (0.0047, 1.28, "0.0"),
+        (2.594e-7, 2.5e-7, "2.6e-07"),
+        (0.0, 1, "0"),
+    ],
+)
+def test_the_ends_of_an_interval_have_two_digits_of_its_half_width(number: float, error: float, text: str) -> None:
+    assert digits_of(number, error) == text
 
 
 def test_a_number_is_shown_as_everywhere_else_and_in_the_unit_of_its_file_where_that_states_one() -> None:

@@ -126,7 +126,7 @@ def test_a_metric_that_is_not_there_is_answered_with_the_nearest(name: str, near
 def test_a_run_that_is_useless_says_so_where_it_is_printed() -> None:
     good = ppafo.simulate("torque-task-proportional", {"run.duration": 0.5})
     assert good.warnings == ()
-    assert str(good).splitlines()[:2] == ["torque-task-proportional: completed", ""]
+    assert str(good).splitlines()[:3] == ["torque-task-proportional: completed", good.following, ""]
     wild = ppafo.simulate("torque-task-proportional", {"run.duration": 0.5, "controller.proportional_gain": 40.0})
     (warning,) = wild.warnings
     assert "the torque loop oscillates" in warning
@@ -137,7 +137,9 @@ def test_a_run_that_follows_its_reference_says_so_in_its_second_line() -> None:
     result = ppafo.simulate("torque-task-proportional", {"reference.level": 4.0})
     verdict, blank = str(result).splitlines()[1:3]
     assert (verdict, blank) == (result.following, "")
-    words = r"the torque follows its reference: RMS error [\d.]+ N m from [\d.]+ s on, 0.2 N m allowed"
+    words = (
+        r"the torque follows its reference: RMS error [\d.]+ N m \(0.2 N m allowed\), swing [\d.]+ N m from [\d.]+ s on"
+    )
     assert re.fullmatch(words, verdict)
     assert result.tracking is None
     assert ppafo.simulate("step-response").following == ""

@@ -1,5 +1,6 @@
 """A run that does not follow its reference says so, with what hinders it; one that does is left alone."""
 
+import ast
 import math
 import re
 from pathlib import Path
@@ -10,7 +11,7 @@ import pytest
 import ppafo
 from ppafo.cli.main import main
 from ppafo.errors import PpafoError
-from ppafo.loading import load_scenario
+from ppafo.loading import load_scenario, reloaded
 from ppafo.metrics.metric import hold_start
 from ppafo.parameters.reach import supply_for, torque_reach
 from ppafo.running import most_reversals, simulate, tried
@@ -170,7 +171,7 @@ def test_a_valve_that_opens_away_from_the_reference_is_not_called_too_small() ->
 
     told = simulate(load_scenario(TASK, ["reference.level=2 N m"]).controlled_by(Opens())).tracking
     assert told is not None
-    assert "away from the reference for 100 % of it; turn the sign" in told.sentence
+    assert "away from the reference for 100 % of it; reverse the sign" in told.sentence
 
 
 @pytest.mark.parametrize(
@@ -439,8 +440,49 @@ def test_valves_whose_set_limits_nothing_are_told_how_often_they_switch() -> Non
 
 def test_a_reference_just_beyond_reach_that_is_followed_within_the_limit_is_told_the_reach() -> None:
     told = simulate(TASK, ["reference.level=5.1 N m", "run.duration=6 s"]).following
-    assert told.endswith("N m allowed; at 75 deg and 50 psi_g the actuator gives 5 N m at most")
+    assert re.search(r" from [\d.]+ s on; at 75 deg and 50 psi_g the actuator gives 5 N m at most$", told)
     assert "at most" not in simulate(TASK, ["reference.level=4 N m"]).following
+
+
+def test_a_verdict_has_the_limits_by_which_it_was_judged_and_the_swing() -> None:
+    """The wide limit of valves without gradual openings is given its reason."""
+    torque = simulate("torque-task-solenoid", ["reference.level=3 N m", "valve.area=3.45 mm^2"]).following
+    allowed = r"\(0.75 N m allowed, as its valves are only open or shut\)"
+    assert re.fullmatch(
+        rf"the torque follows its reference: RMS error 0.\d+ N m {allowed}, swing 1?[.]?\d+ N m from 2 s on", torque
+    )
+    assert "0.15 bar allowed), swing 0 bar from" in simulate("pressure-loop").following
+    angle = simulate("cylinder-servo").following
+    assert re.search(r"RMS error [\d.]+ deg \(2 deg allowed\), largest error [\d.]+ deg \(2 deg allowed\) from", angle)
+    still = ["reference.kind=constant", "reference.level=60 deg", "motion.angle=55 deg"]
+    assert re.search(r"swing [\d.e-]+ deg \(1 deg allowed\) from", simulate("cylinder-servo", still).following)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        (["run.output_interval=1 s"], "4 samples are too few"),
+        (["run.duration=2 ms"], "3 samples are too few"),
+        (["run.output_interval=1 s", "reference.ramp_time=20 s"], "4 samples are too few"),
+        (["reference.ramp_time=20 s"], "the run ends on the ramp of its reference, with an RMS error of 0.00"),
+        (["run.duration=0.9 s"], "the run ends on the ramp of its reference, with an RMS error of 0."),
+    ],
+)
+def test_a_run_without_a_verdict_says_why_and_its_remedy_gives_one(changes: list[str], reason: str) -> None:
+    given = ["reference.level=4 N m", *changes]
+    told = simulate(TASK, given).following
+    found = re.search(r"; overrides=(.*) gives one$", told)
+    assert found is not None
+    assert told.startswith(f"no verdict on the torque: {reason}")
+    again = simulate(reloaded(load_scenario(TASK, given), ast.literal_eval(found[1])))
+    assert again.tracking is None
+    assert again.following.startswith("the torque follows its reference: RMS error ")
+
+
+def test_a_verdict_writes_thousands_without_an_exponent() -> None:
+    verdict = simulate(TASK, ["reference.level=3000 N m"]).tracking
+    assert verdict is not None
+    assert verdict.sentence.startswith("the torque loop does not move: 5 of 3000 N m wanted")
 
 
 LEVEL = "reference.level=3 N m"

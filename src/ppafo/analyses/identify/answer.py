@@ -16,7 +16,7 @@ from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.source import kind_of
 from ppafo.identification.trajectory.fitting import NuisanceParameter, TrajectoryFit
 from ppafo.identification.trajectory.section import TrajectoryOutcome
-from ppafo.identification.wording import in_shown_unit, with_error
+from ppafo.identification.wording import digits_of, in_shown_unit, with_error
 from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure
 from ppafo.report.finding import Finding, Section, columns_of
@@ -33,8 +33,6 @@ _FAR = 2.0
 """Number of standard deviations above which a tolerance counts as contradicted."""
 _SHOWN = 0.05
 """Smallest share of a variance that is shown."""
-_MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
-"""Range of the number of digits; more than the minimum only for narrow intervals."""
 _FAR_FROM_SET = 5.0
 """Ratio to the previous value above which a wrong unit is suspected: 6.89 is psi read as kPa, 8.85 N m as lbf in."""
 _ROW_HEAD = ("",) * 4
@@ -89,7 +87,7 @@ class Identification:
                 "procedure": result.procedure,
                 "summary": result.summary,
                 "recordings_are": result.kind,
-                "estimates": [plain(estimate) for estimate in result.estimates],
+                "estimates": [_estimate_data(estimate) for estimate in result.estimates],
                 "conflict": result.conflict,
                 "remarks": list(result.remarks),
             }
@@ -256,7 +254,7 @@ def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[f
 def estimate_row(estimate: Estimate, before: ParameterSet) -> tuple[str, ...]:
     """Return path, value, interval and verdict of an estimate in the unit of the set.
 
-    The number of digits resolves the ends of the interval.
+    Value and ends have two significant digits of the half-width.
     """
     if math.isnan(estimate.value):
         return estimate.path, "no value", "", estimate.verdict
@@ -264,13 +262,14 @@ def estimate_row(estimate: Estimate, before: ParameterSet) -> tuple[str, ...]:
         _shown(number, estimate.path, estimate.unit, before) for number in (estimate.value, estimate.low, estimate.high)
     ]
     (value, unit), (low, _), (high, _) = numbers
-    half_width, digits = 0.5 * abs(high - low), _MINIMUM_DIGITS
-    if half_width > 0.0 and math.isfinite(half_width) and value != 0.0:
-        # One digit more than the interval has, so that its ends differ from the value.
-        needed = math.ceil(math.log10(abs(value) / half_width)) + 1
-        digits = min(max(needed, _MINIMUM_DIGITS), _MAXIMUM_DIGITS)
-    text = f"{value:#.{digits}g} {unit}".removesuffix(" -").rstrip()
-    return estimate.path, text, f"{low:#.{digits}g} to {high:#.{digits}g}", estimate.verdict
+    wider = max(abs(high - value), abs(value - low))
+    text, low_text, high_text = (digits_of(number, wider) for number in (value, low, high))
+    return (
+        estimate.path,
+        f"{text} {unit}".removesuffix(" -").rstrip(),
+        f"{low_text} to {high_text}",
+        estimate.verdict_text,
+    )
 
 
 def _figures(identification: Identification) -> list[Section]:
@@ -301,6 +300,11 @@ def kind_of_fit(fit: TrajectoryFit) -> RecordingKind:
     return kind_of([recording.kind for recording in fit.measurements])
 
 
+def _estimate_data(estimate: Estimate) -> dict[str, Any]:
+    """Return an estimate as plain data in SI, with its verdict as it is printed."""
+    return {**plain(estimate), "verdict_text": estimate.verdict_text}
+
+
 def _trajectory_data(outcome: TrajectoryOutcome) -> dict[str, Any]:
     """Return a trajectory fit as plain data in SI; rows and columns of matrices follow the estimates."""
     fit = outcome.fit
@@ -322,7 +326,7 @@ def _trajectory_data(outcome: TrajectoryOutcome) -> dict[str, Any]:
         "confidence": fit.problem.confidence,
         "evaluations": fit.fit.evaluations,
         "has_converged": fit.fit.has_converged,
-        "estimates": [plain(estimate) for estimate in fit.estimates],
+        "estimates": [_estimate_data(estimate) for estimate in fit.estimates],
         "covariance": fit.covariance.tolist(),
         "correlation": fit.correlation.tolist(),
         "tolerances": [plain(tolerance) for tolerance in fit.known],

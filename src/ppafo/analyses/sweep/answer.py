@@ -13,6 +13,7 @@ from ppafo.arguments import checked
 from ppafo.documents.models import validate
 from ppafo.errors import DataError, at_fault
 from ppafo.report.finding import Finding, Section, columns_of, facts, files_of
+from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.study.folder import study_folder
 from ppafo.study.manifest import MANIFEST, read_manifest
 from ppafo.units.shown import in_units
@@ -91,7 +92,7 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
     ]
     sample = document["study"].get("sample")
     if sample:
-        method, seed = sample["method"].replace("_", " "), sample.get("seed", 1)
+        method, seed = sample["method"].replace("_", " "), sample.get("seed", DEFAULT_SEED)
         sampling.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
     return Finding(
         name="sweep",

@@ -42,6 +42,11 @@ def lines_of(path: str | Path) -> list[str]:
     return text.splitlines()
 
 
+def delimiter_of(line: str) -> str:
+    """Return the delimiter that occurs most often in a line: comma, semicolon or tab; a comma for a tie."""
+    return max(",;\t", key=line.count)
+
+
 def cells_of(line: str, delimiter: str) -> list[str]:
     """Return the cells of a line without surrounding blanks and quotation marks."""
     return [cell.strip().strip('"').strip() for cell in line.split(delimiter)]

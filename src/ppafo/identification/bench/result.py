@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from ppafo.identification.estimate import Estimate, Verdict
+from ppafo.identification.estimate import UNKNOWN, Estimate, Verdict, relative_half_width
 from ppafo.identification.fit import Fit
 from ppafo.identification.source import RecordingSource, kind_of, remarks_on_readings
 from ppafo.identification.wording import conflict_in_words, widened_by
@@ -91,24 +91,24 @@ def _estimate(fitted: Fit, reported: ReportedNumber, origin: tuple[str, ...]) ->
     index = [*fitted.by_name].index(reported.path)
     value, low, high = (float(column[index]) for column in (fitted.values, fitted.low, fitted.high))
     number = fitted.numbers[index]
-    size, half_width = abs(value) if reported.size is None else reported.size, 0.5 * (high - low)
+    width = relative_half_width(value, low, high, reported.size)
     bound = next((end for end in (number.low, number.high) if abs(value - end) <= _AT_BOUND * number.scale), None)
     # Not 1e-17 where 0 is meant.
     value = value if bound is None else bound
     verdict: Verdict = "identified"
     sentence = f"{reported.text}; {widened_by(fitted, reported.path)}."
-    if bound == 0.0 and reported.size is not None and half_width < size:
+    if bound == 0.0 and reported.size is not None and width < UNKNOWN:
         sentence = f"{reported.text}: none; {widened_by(fitted, reported.path)}."
         verdict = "identified" if fitted.conflict is None else "holds for this model only"
     elif bound is not None:
         verdict = "at its bound"
         sentence = f"{sentence} The readings favour a value at or beyond {value:.4g}; the interval ends there."
-    # Then zero, or twice the value, is inside the interval as well.
-    elif half_width >= size:
-        verdict, sentence = "not identifiable", f"{sentence} The interval is as wide as the value."
+    elif width >= UNKNOWN:
+        verdict, sentence = "not identifiable", f"{sentence} The interval holds zero or twice the value."
     elif fitted.conflict is not None:
         verdict = "holds for this model only"
-    return Estimate(reported.path, value, reported.unit, low, high, verdict, sentence, origin, fitted.confidence)
+    path, unit, size = reported.path, reported.unit, reported.size
+    return Estimate(path, value, unit, low, high, verdict, sentence, origin, fitted.confidence, size)
 
 
 _SIZE = (3.1, 2.7)

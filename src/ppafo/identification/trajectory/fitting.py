@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.estimate import Estimate, Verdict
+from ppafo.identification.estimate import UNKNOWN, Estimate, Verdict, relative_half_width
 from ppafo.identification.fit import Fit
 from ppafo.identification.fit import fit as fit_residuals
 from ppafo.identification.residuals import ResidualBlock
@@ -265,12 +265,14 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
     bound = next((end for end in (free.low, free.high) if abs(value - end) <= _AT_BOUND * abs(end or 1.0)), None)
     combination = next((weights for weights in fitted.unidentified if abs(weights.get(name, 0.0)) >= _OWN_SHARE), None)
     verdict: Verdict = "identified"
+    # Of a quantity of either sign, such as the zero of a sensor, the value may be zero.
+    size = free.scale if free.low < 0.0 < free.high else None
+    remedy = "fix it, give a prior, or make another recording"
     if combination is not None:
         verdict = "not identifiable"
         # So far from where it was linearised the interval of a straight line means nothing.
         low, high = min(low, free.low), max(high, free.high)
         others = [other for other in combination if other != name]
-        remedy = "fix it, give a prior, or make another recording"
         text = f"trades off against {' and '.join(others)}; {remedy}"
         if not others:
             # Where the model lacks something, that may be what moves a number so far from its start.
@@ -278,6 +280,9 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
     elif bound is not None:
         end, unit = in_shown_unit(bound, number.unit)
         verdict, text = "at its bound", f"the recordings favour a value at or beyond {end:.6g} {unit}".rstrip(" -")
+    elif relative_half_width(value, low, high, size) >= UNKNOWN:
+        verdict = "not identifiable"
+        text = f"{widened_by(fitted, name)}; the interval holds zero or twice the value; {remedy}"
     elif conflict:
         # Said of every number: which of them the missing physics moves is not known.
         verdict, text = "holds for this model only", conflict
@@ -288,7 +293,7 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
         for experiment in problem.experiments
         if number.acts_in(experiment.label)
     )
-    return Estimate(name, value, number.unit, low, high, verdict, text, recordings, problem.confidence)
+    return Estimate(name, value, number.unit, low, high, verdict, text, recordings, problem.confidence, size)
 
 
 def _channel(fitted: Fit, experiment: str, measured: FitChannel, model: Floats) -> ChannelFit:

@@ -18,8 +18,8 @@ from ppafo.simulation.tracking.remedies import (
     Remedy,
     change_text,
     dead_band,
-    gain_of_device,
-    integral_of_device,
+    default_gain_remedy,
+    default_integral_remedy,
     larger_gains,
     level_text,
     remedy,
@@ -90,7 +90,7 @@ def _shut_valve(case: Case) -> TrackingCause | None:
     # A law that knows the band asks for more openings than it gets, and errs by what its gain lacks.
     gain_factor = band / typical if known_band < band else settled.error / (LARGEST_SHARE * settled.wanted)
     remedies += larger_gains(scenario, case.law, (1.5 * gain_factor, 3.0 * gain_factor))
-    remedies += integral_of_device(scenario, case.law)
+    remedies += default_integral_remedy(scenario, case.law)
     if torque_asked(scenario, case.law, settled.error) is not None:
         remedies += stiffer_laws(scenario, float(scenario.device.friction.static_torque), settled)
     relation = "stays within" if known_band < band else "hardly opens the valve beyond"
@@ -225,11 +225,11 @@ def _lag(case: Case) -> TrackingCause | None:
 
 def gains_of_another_device(case: Case) -> TrackingCause | None:
     """Cause: a gain differs from the default gain of the device."""
-    default_gain = gain_of_device(case.scenario, case.law)
+    default_gain = default_gain_remedy(case.scenario, case.law)
     if default_gain is None:
         return None
     # Without its integral a loop rests beside its reference with any gain.
-    others = () if case.oscillates else integral_of_device(case.scenario, case.law)
+    others = () if case.oscillates else default_integral_remedy(case.scenario, case.law)
     return TrackingCause("its gains do not suit this device", (default_gain, *others))
 
 
@@ -276,7 +276,7 @@ def _not_settled(case: Case) -> TrackingCause:
         return TrackingCause("it has not settled at the end", (*longer, *quicker), "give it a longer `run.duration`")
     integral = next((name for name in settings if "integral" in name and settings[name] == 0.0), "")
     if integral:
-        remedies = tuple(integral_of_device(case.scenario, case.law))
+        remedies = tuple(default_integral_remedy(case.scenario, case.law))
         return TrackingCause(
             "the remaining error needs integral action, whose gain is 0", remedies, f"set `{integral}` above 0"
         )

@@ -15,6 +15,7 @@ from ppafo.simulation.gains import terms_of
 from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chambers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import LARGEST_SHARE, SettledPart
+from ppafo.units import without_exponent
 from ppafo.wording import override_text
 
 FASTEST_FIRST = (
@@ -71,13 +72,13 @@ def level_text(unit: str, number: float) -> str:
     """Value with its display unit, from a number in an SI unit; pressures as gauge pressures, or as differences."""
     value, shown = metric_level(float(number), unit)
     # As it can be pasted: a difference of pressures is told from a level by its unit.
-    return f"{value:.3g} {shown}{'_d' if unit == 'Pa_d' else ''}".rstrip()
+    return f"{without_exponent(value, '.3g')} {shown}{'_d' if unit == 'Pa_d' else ''}".rstrip()
 
 
 def change_text(controlled: str, number: float) -> str:
     """Difference of two values of the controlled quantity, with its display unit."""
     value, unit = metric_change(number, CONTROLLED[controlled].difference)
-    return f"{value:.3g} {unit}"
+    return f"{without_exponent(value, '.3g')} {unit}"
 
 
 def speed_settings(scenario: Scenario, law: ControllerKind | None) -> dict[str, Quantity]:
@@ -93,7 +94,7 @@ def speed_settings(scenario: Scenario, law: ControllerKind | None) -> dict[str, 
     return {term: items[term] for term in FASTEST_FIRST if term in items}
 
 
-def gain_of_device(scenario: Scenario, law: ControllerKind | None) -> Remedy | None:
+def default_gain_remedy(scenario: Scenario, law: ControllerKind | None) -> Remedy | None:
     """Remedy that sets the first gain that differs from the device's default to that default; None if none differs."""
     if law is None:
         return None
@@ -107,7 +108,7 @@ def gain_of_device(scenario: Scenario, law: ControllerKind | None) -> Remedy | N
     return None
 
 
-def integral_of_device(scenario: Scenario, law: ControllerKind | None) -> list[Remedy]:
+def default_integral_remedy(scenario: Scenario, law: ControllerKind | None) -> list[Remedy]:
     """Remedy that sets an integral gain of 0 to the device's default; empty without such a gain."""
     if law is None:
         return []

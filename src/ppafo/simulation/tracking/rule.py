@@ -288,23 +288,34 @@ def largest_error(settled: SettledPart, is_switched: bool) -> Floats:
     return limit
 
 
+def largest_deviation(settled: SettledPart) -> Floats:
+    """Largest range of the error of an angle whose reference rests [rad], or largest error while that moves [rad].
+
+    The numbers of ``settled`` may be arrays (runs,).
+    """
+    # Degrees count for an angle, however far it goes.
+    rests, way = np.asarray(settled.rests), np.asarray(settled.way)
+    swing, error = LARGEST_SWING_SHARE * way, LARGEST_ANGLE_SHARE * way
+    limit: Floats = np.where(rests, np.maximum(LARGEST_ANGLE_SWING, swing), np.maximum(LARGEST_ANGLE_ERROR, error))
+    return limit
+
+
 def excess_of_task(settled: SettledPart, is_switched: bool) -> _TaskExcess:
     """Numbers of a task divided by their limits, apart from command reversals: the task follows if none is above 1.
 
     ``is_switched`` is true for a valve without gradual openings. The numbers of ``settled`` may be arrays
     (runs,).
     """
-    rests, share, way = np.asarray(settled.rests), np.asarray(settled.share), np.asarray(settled.way)
-    # Degrees count for an angle, however far it goes.
-    worst = settled.worst / np.maximum(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * way)
-    span = np.where(way > 0.0, settled.span / np.maximum(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * way), 0.0)
+    rests, share = np.asarray(settled.rests), np.asarray(settled.share)
+    deviation: Floats = np.where(rests, settled.span, settled.worst) / largest_deviation(settled)
+    deviation = np.where(np.asarray(settled.way) > 0.0, deviation, 0.0)
     off = np.asarray(settled.error) / largest_error(settled, is_switched)
     if is_switched:
         # It swings about its reference by design: its mean error is to be less.
         beside = np.abs(settled.missing) / (LARGEST_MEAN_SWITCHED * settled.wanted)
         off = np.where(rests, np.maximum(off, beside), off)
     else:
-        off = np.maximum(off, np.where(rests, span, np.where(way > 0.0, worst, 0.0)))
+        off = np.maximum(off, deviation)
     # A run that ends on its ramp has no settled part: every loop is behind there.
     off = np.where(settled.ends_on_ramp, 0.0, off)
     if is_switched:
@@ -313,7 +324,7 @@ def excess_of_task(settled: SettledPart, is_switched: bool) -> _TaskExcess:
         swings = np.where(rests | (off > 1.0), np.asarray(settled.turns) / (SUSTAINED - 1), 0.0)
         # A joint that creeps has a range of its error, too, and is no loop that swings.
         is_swing = rests & (settled.swing > np.abs(settled.missing))
-        swings = np.where(is_swing, np.maximum(swings, span), swings)
+        swings = np.where(is_swing, np.maximum(swings, deviation), swings)
     is_counted = rests & (not is_switched)
     peak = np.where(is_counted, settled.peak / (LARGEST_PEAK * settled.wanted), 0.0)
     is_still = (share > LARGEST_SHARE) & (settled.moved <= SMALLEST_MOVE * settled.wanted)

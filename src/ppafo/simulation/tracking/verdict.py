@@ -4,8 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED
+from ppafo.simulation.profiles import profile_values
+from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.causes import CAUSES_OF_TASK
 from ppafo.simulation.tracking.load_causes import torque_beyond_reach
@@ -18,6 +22,7 @@ from ppafo.simulation.tracking.rule import (
     failure_of_task,
     failure_of_walk,
     is_noisy,
+    largest_deviation,
     largest_error,
     most_reversals,
     only_switches,
@@ -27,12 +32,15 @@ from ppafo.simulation.tracking.rule import (
 )
 from ppafo.simulation.tracking.walk_causes import CAUSES_OF_WALK
 from ppafo.units.shown import in_units, units_in_force
+from ppafo.wording import override_text
 
 if TYPE_CHECKING:
     from ppafo.simulation.at_hand import RecordedResult
 
-_FEWEST_SAMPLES = 8
-"""Smallest number of samples of a recording for a verdict."""
+_FEWEST_SAMPLES, _SAMPLES_ADVISED = 8, 100
+"""Smallest number of samples of a recording for a verdict, and number of samples that a remedy gives it."""
+_MOST_DOUBLINGS = 11
+"""Number of durations that are looked at for a reference that rests, each twice the one before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,23 +158,65 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
 
 @in_units(lambda result: result.scenario.device.shown)
 def following_text(result: "RecordedResult") -> str:
-    """Sentence on a result that follows its reference, with the RMS error; "" if not following or not judged."""
-    judged, controlled = _judged(result), CONTROLLED[result.scenario.controlled]
-    # On a ramp every loop is behind, and a walk whose law requests no torque has a peak alone.
-    if judged is None or judged[0].failure is not None or controlled_in(result.recording) is None:
+    """Sentence on a result that follows its reference, with errors and their limits, or the reason for no verdict.
+
+    Returns "" for a result that does not follow, and for one without a reference.
+    """
+    scenario, controlled = result.scenario, CONTROLLED[result.scenario.controlled]
+    if scenario.controller.is_open_loop or controlled_in(result.recording) is None:
         return ""
+    judged = _judged(result)
+    # A walk without a requested torque has nothing to follow.
+    if judged is None:
+        return _undecided_text(scenario, len(result.recording), None) if scenario.follows_reference else ""
     case = judged[0]
-    settled = case.settled
-    if settled.ends_on_ramp:
+    settled, is_task = case.settled, scenario.follows_reference
+    if case.failure is not None:
         return ""
-    is_task = case.scenario.follows_reference
-    largest = float(largest_error(settled, case.only_switches)) if is_task else LARGEST_SHARE_OF_WAVE * settled.wanted
-    error, allowed = (change_text(controlled.name, each) for each in (settled.error, largest))
-    since = time_text(settled.start)
+    if settled.ends_on_ramp:
+        return _undecided_text(scenario, len(result.recording), settled.error)
+
+    def judged_text(name: str, number: float, limit: float | None, why: str = "") -> str:
+        allowed = "" if limit is None else f" ({change_text(controlled.name, limit)} allowed{why})"
+        return f"{name} {change_text(controlled.name, number)}{allowed}"
+
+    if not is_task:
+        rms = judged_text("RMS error", settled.error, LARGEST_SHARE_OF_WAVE * settled.wanted)
+        return f"the {controlled.words} follows its reference: {rms}"
+    # The limit of valves without gradual openings is several times wider, and the swing tells what it hides.
+    why = ", as its valves are only open or shut" if case.only_switches else ""
+    rms = judged_text("RMS error", settled.error, float(largest_error(settled, case.only_switches)), why)
+    is_limited = settled.way > 0.0 and not case.only_switches
+    name, number = ("swing", settled.span) if settled.rests else ("largest error", settled.worst)
+    deviation = judged_text(name, number, float(largest_deviation(settled)) if is_limited else None)
     # A reference just beyond reach is missed by no more than is allowed.
-    beyond = torque_beyond_reach(case) if is_task else None
+    beyond = torque_beyond_reach(case)
     short = "" if beyond is None else f"; {beyond.text}"
-    return f"the {controlled.words} follows its reference: RMS error {error}{since}, {allowed} allowed{short}"
+    return f"the {controlled.words} follows its reference: {rms}, {deviation}{time_text(settled.start)}{short}"
+
+
+def _undecided_text(scenario: Scenario, samples: int, error: float | None) -> str:
+    """Reason why a task has no verdict, and times with which it has one.
+
+    ``error`` is the RMS error of a run that ends on its ramp, None for a run with too few samples.
+    """
+    run, controlled = scenario.run, CONTROLLED[scenario.controlled]
+    reason = f"{samples} samples are too few"
+    if error is not None:
+        reason = (
+            f"the run ends on the ramp of its reference, with an RMS error of {change_text(controlled.name, error)}"
+        )
+    for times in (2.0**power for power in range(_MOST_DOUBLINGS)):
+        duration = times * run.duration
+        reference = profile_values(scenario.reference, np.linspace(0.0, duration, _SAMPLES_ADVISED))[0]
+        ways = np.diff(reference) * (reference[-1] - reference[0])
+        if duration < _SAMPLES_ADVISED * run.step or (np.all(ways >= 0.0) and ways[_SAMPLES_ADVISED // 2 :].any()):
+            continue
+        changes = [f"run.duration={duration:.12g} s"] if times > 1.0 else []
+        if run.output_interval > duration / _SAMPLES_ADVISED:
+            changes.append(f"run.output_interval={duration / _SAMPLES_ADVISED:.12g} s")
+        return f"no verdict on the {controlled.words}: {reason}; {override_text(changes)} gives one"
+    return f"no verdict on the {controlled.words}: {reason}; a shorter ramp gives one"
 
 
 def time_text(since: float) -> str:

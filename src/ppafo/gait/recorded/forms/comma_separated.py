@@ -7,15 +7,13 @@ import re
 from pathlib import Path
 
 from ppafo.errors import DataError, UnitError, refused_as
-from ppafo.gait.recorded.delimited import NumberBlock, lines_of, table_of
+from ppafo.gait.recorded.delimited import NumberBlock, delimiter_of, lines_of, table_of
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.mapping import Side, package_map, setting_text
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.storage.comma_separated import kind_of_comments
 from ppafo.units import to_si
 from ppafo.wording import one_line
-
-_DELIMITERS = ",;\t"
 
 _NAME = re.compile(r"(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?")
 
@@ -46,18 +44,13 @@ def plain_names(path: str | Path) -> list[str]:
     A plain file has a foreign delimiter, or a column without a unit in square brackets.
     """
     header = _header(path)
-    is_plain = _delimiter(header) != "," or not all("[" in cell for cell in header.split(","))
+    is_plain = delimiter_of(header) != "," or not all("[" in cell for cell in header.split(","))
     return [name for name, _ in _named_columns(header)] if is_plain else []
 
 
 def _named_columns(header: str) -> list[tuple[str, str]]:
-    cells = [cell.strip().strip('"').strip() for cell in header.split(_delimiter(header))]
+    cells = [cell.strip().strip('"').strip() for cell in header.split(delimiter_of(header))]
     return [(match[1], match[2] or "") for cell in cells if (match := _NAME.fullmatch(cell))]
-
-
-def _delimiter(header: str) -> str:
-    # The most frequent one; a tie goes to the comma, which stands first.
-    return max(_DELIMITERS, key=header.count)
 
 
 def read_plain_csv(path: str | Path) -> MotionTable:
@@ -69,7 +62,7 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     lines = lines_of(path)
     first = next((number for number, line in enumerate(lines) if line.strip() and not line.startswith("#")), 0)
     header = _header(path)
-    delimiter, pairs = _delimiter(header), _named_columns(header)
+    delimiter, pairs = delimiter_of(header), _named_columns(header)
     names, units = [name for name, _ in pairs], [unit for _, unit in pairs]
     at = next((place for place, name in enumerate(names) if name.lower() in _TIMES), 0)
     if not all(name.lower() in _COUNTERS for name in names[:at]):

@@ -16,6 +16,7 @@ from ppafo.errors import DataError
 from ppafo.gait.recorded.delimited import (
     NumberBlock,
     cells_of,
+    delimiter_of,
     lines_of,
     rows_of,
     table_of,
@@ -105,7 +106,7 @@ def _joined(table: MotionTable, columns: Mapping[str, Floats], units: Mapping[st
 def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBlock:
     """Return the block whose kind is on line ``start``; raises DataError for an invalid header."""
     head = lines[start + 1 : start + 5]
-    delimiter = max(",;\t", key=head[2].count) if len(head) == 4 else ","
+    delimiter = delimiter_of(head[2]) if len(head) == 4 else ","
     axes = cells_of(head[2], delimiter) if len(head) == 4 else []
     if [axis.lower() for axis in axes[:2]] != ["frame", "sub frame"]:
         raise DataError(
