@@ -99,9 +99,10 @@ def stepped(file: str, samples: Floats) -> tuple[dict[str, Floats], dict[str, fl
 
 
 def of_both_versions() -> list[Any]:
-    """Every case with both versions of FMI, of which every other short one is short with each."""
+    """Every case with both versions of FMI, in turn: one in the suite of the case, the other in a later one."""
+    later = {"short": "long", "long": "thorough", "thorough": "thorough"}
     return [
-        parameter(case, fmi, suite="long" if case.suite == "short" and number % 2 != fmi - 2 else "")
+        parameter(case, fmi, suite=case.suite if number % 2 == fmi - 2 else later[case.suite])
         for number, case in enumerate(EXPORTED)
         for fmi in (2, 3)
     ]

@@ -86,6 +86,7 @@ def test_a_result_that_was_stored_is_read_with_its_bits(case: Case, tmp_path: Pa
 def test_a_result_and_a_scenario_that_were_pickled_are_the_same(case: Case) -> None:
     answer = python_answer(case)
     result = pickle.loads(pickle.dumps(compiled_result(case)))
+    assert str(result) == str(compiled_result(case))
     with run_by(""):
         again = simulate(pickle.loads(pickle.dumps(scenario_of(case))))
     for found in (answer_of(result), answer_of(again)):

@@ -84,11 +84,12 @@ class _RunReport:
 
     @property
     def verdict(self) -> list[str]:
-        """Sentences on following the reference, and on how often valves switch; empty for a run without a reference."""
+        """Sentences on following the reference, on how often valves switch, and on replaced values of the set."""
         from ppafo.simulation.tracking.pair_step import unlimited_switching
 
         sentence = self.result.following if self.tracking is None else self.tracking.sentence
-        return [said for said in (sentence, unlimited_switching(self.result)) if said]
+        replaced = self.result.scenario.origin.replaced
+        return [said for said in (sentence, unlimited_switching(self.result), replaced) if said]
 
     @property
     def usage(self) -> list[str]:

@@ -209,10 +209,10 @@ def _set(document: dict[str, Any], path: str, text: str, file: str, declared: De
             raise ScenarioError(f"override '{path}={text}': must be a whole number") from error
         return
     # Papers print gains on the torque without units, so one without gets its SI unit; 0 is the same in any unit.
-    quantity = declared.quantities(document).get(path)
-    is_bare = quantity is not None and path.startswith("controller.") and _NUMBER.fullmatch(text)
-    if quantity is not None and is_bare and ("(N m" in quantity.unit or ("/" in quantity.unit and float(text) == 0.0)):
-        text = f"{text} {quantity.unit}"
+    if path.startswith("controller.") and _NUMBER.fullmatch(text):
+        quantity = declared.quantities(document).get(path)
+        if quantity is not None and ("(N m" in quantity.unit or ("/" in quantity.unit and float(text) == 0.0)):
+            text = f"{text} {quantity.unit}"
     table[name] = text
 
 

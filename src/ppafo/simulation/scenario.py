@@ -334,13 +334,17 @@ class Assumption:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Origin of a scenario: file, parameter set, valve, overrides and the document of the file."""
+    """Origin of a scenario: file, parameter set, valve, overrides and the document of the file.
+
+    ``replaced`` is a sentence on values of the file that replace those of a set other than its own, else "".
+    """
 
     file: str | None
     parameter_set: str
     valve: str
     overrides: tuple[str, ...]
     content: dict[str, Any]
+    replaced: str = ""
 
 
 @dataclass(frozen=True, slots=True, repr=False)

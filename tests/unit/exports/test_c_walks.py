@@ -1,11 +1,11 @@
 """A walk as a library in C: from settings to the numbers of a run, and every sample of it, with the bits of Python."""
 
 import ctypes
+import functools
 import itertools
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -22,11 +22,10 @@ from ppafo.engine.run import batch_of
 from ppafo.errors import ParameterError, ScenarioError
 from ppafo.exports.c_library import c_library, library_of, walk_library
 from ppafo.exports.c_library.files import library_files
-from ppafo.exports.c_library.library import ExportParameter, c_identifier
+from ppafo.exports.c_library.library import ExportParameter, Library
 from ppafo.exports.c_library.walk_preparation import settings_of_walk
 from ppafo.loading import load_scenario
 from ppafo.simulation.motion_kind import VANE, WALK
-from ppafo.simulation.scenario import Scenario
 from ppafo.walking import list_walks, load_walk
 from ppafo.walking.loading import FILE
 from ppafo.walking.motion import walk_of
@@ -83,19 +82,27 @@ def choose_compiler(name: str, overrides: tuple[str, ...], monkeypatch: pytest.M
         monkeypatch.setenv(BACKEND_VARIABLE, PYTHON)
 
 
-def written(walked: Scenario, folder: Path) -> str:
+@functools.cache
+def exported(name: str, overrides: tuple[str, ...] = ()) -> tuple[Library, dict[str, bytes]]:
+    """The library of a walk, and its files, composed once for all tests."""
+    item = walk_library(load_walk(name, overrides))
+    return item, library_files(item)
+
+
+def written(name: str, overrides: tuple[str, ...], folder: Path) -> str:
     """Write the library of a walk; its name in C."""
-    for name, content in c_library(walked).items():
-        (folder / name).write_bytes(content)
-    return c_identifier(walked.name)
+    item, files = exported(name, overrides)
+    for file, content in files.items():
+        (folder / file).write_bytes(content)
+    return item.name
 
 
-def built(walked: Scenario, folder: Path) -> ctypes.CDLL:
+def built(name: str, overrides: tuple[str, ...], folder: Path) -> ctypes.CDLL:
     """The library of a walk, with the function from settings to numbers to be called from outside.
 
     Its own calls stay inside of it: other libraries have functions of these names too.
     """
-    source = folder / f"{written(walked, folder)}.c"
+    source = folder / f"{written(name, overrides, folder)}.c"
     flags = ("-O0", "-ffp-contract=off", "-Dstatic=", "-Wl,-Bsymbolic", "-w")
     return ctypes.CDLL(str(shared_library(source, *flags)))
 
@@ -137,14 +144,15 @@ def numbers_in_c(library: ctypes.CDLL, values: Values, rows: tuple[int, int]) ->
     return parameters, states, counts
 
 
-def batches(
-    name: str, overrides: tuple[str, ...], settings: tuple[ExportParameter, ...]
-) -> Iterator[tuple[Values, Batch]]:
+@functools.cache
+def batches(name: str, overrides: tuple[str, ...]) -> list[tuple[Values, Batch]]:
     """Settings as they are, then drawn ones, each with what Python plans of them."""
+    settings = exported(name, overrides)[0].settings
     draw = np.random.default_rng(15)
     kinds = [text for text in overrides if "kind=" in text or text.startswith(("task_sequence", "device.set"))]
     values = {item.path: item.value for item in settings}
-    while True:
+    found: list[tuple[Values, Batch]] = []
+    while len(found) < DRAWS:
         try:
             walked = load_walk(name, [*kinds, *as_overrides(settings, values)])
         except (ScenarioError, ParameterError):
@@ -154,15 +162,15 @@ def batches(
                 walked,
                 run=replace(walked.run, duration=values["run.duration"], output_interval=values["run.output_interval"]),
             )
-            yield values, batch_of(plan_walk(plan))
+            found.append((values, batch_of(plan_walk(plan))))
         values = drawn(settings, draw)
+    return found
 
 
 @pytest.mark.parametrize(("name", "overrides"), VARIED)
 def test_c_makes_the_numbers_of_a_walk_that_python_makes(name: str, overrides: tuple[str, ...], tmp_path: Path) -> None:
-    settings = walk_library(load_walk(name, overrides)).settings
-    library = built(load_walk(name, overrides), tmp_path)
-    for values, batch in itertools.islice(batches(name, overrides, settings), DRAWS):
+    library = built(name, overrides, tmp_path)
+    for values, batch in batches(name, overrides):
         parameters, states, counts = numbers_in_c(library, values, (len(batch.parameters), len(batch.states)))
         assert parameters.tobytes() == batch.parameters[:, 0].tobytes()
         assert states.tobytes() == batch.states[:, 0].tobytes()
@@ -193,8 +201,8 @@ def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
     name: str, overrides: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     choose_compiler(name, overrides, monkeypatch)
-    item = walk_library(load_walk(name, overrides))
-    library = built(load_walk(name, overrides), tmp_path)
+    item, _ = exported(name, overrides)
+    library = built(name, overrides, tmp_path)
     paths = {"angle": "state.angle", "angular_velocity": "state.angular_velocity", "command": "result.command"}
     program = item.program.program
     paths |= {name: f"state.{name}" for name in ("supplied_mass", "leaked_mass") if name in item.program.outputs}
@@ -203,7 +211,7 @@ def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
         for output, path in program.traces.items()
         if output not in TRACED and path in row_numbers(program.state_rows())
     }
-    for values, batch in itertools.islice(batches(name, overrides, item.settings), 1, 1 + RUNS):
+    for values, batch in batches(name, overrides)[1 : 1 + RUNS]:
         found = samples_in_c(library, item.name, values, len(item.program.outputs))
         record = run_batch(batch, 1).record[:, :, 0]
         rows = row_numbers(batch.program.state_rows())
@@ -225,9 +233,9 @@ def shown(folder: Path, name: str, *command: str) -> tuple[list[str], Samples, d
     return lines[0].split(","), samples, {key: float(value or "nan") for key, value in found.items()}
 
 
-def shortened(walked: Scenario, folder: Path, seconds: float) -> str:
+def shortened(walk_name: str, overrides: tuple[str, ...], folder: Path, seconds: float) -> str:
     """Write the library of a walk with an example that lasts some seconds; its name in C."""
-    name = written(walked, folder)
+    name = written(walk_name, overrides, folder)
     main = folder / "main.c"
     text, changes = re.subn(
         r"(_defaults\(&settings\);\n)", rf"\1    settings.run_duration = {seconds!r};\n", main.read_text()
@@ -246,7 +254,7 @@ def test_every_sample_of_a_walk_has_the_bits_of_python(
 ) -> None:
     choose_compiler(name, overrides, monkeypatch)
     walked = load_walk(name, overrides)
-    heads, samples, metrics = shown(tmp_path, shortened(walked, tmp_path, 8.0), "gcc", "-std=c99", "-O1")
+    heads, samples, metrics = shown(tmp_path, shortened(name, overrides, tmp_path, 8.0), "gcc", "-std=c99", "-O1")
     result = walk(walked, minutes=8.0 / 60.0)
     recording = result.recording
     compared = [head for head in heads if head in recording.names]
@@ -262,7 +270,7 @@ def test_every_sample_of_a_walk_has_the_bits_of_python(
 
 
 def test_a_walk_of_every_feature_is_clean_under_the_sanitizers_and_the_same_in_c_plus_plus(tmp_path: Path) -> None:
-    name = shortened(load_walk("proportional-regulators", EVERYTHING), tmp_path, 1.0)
+    name = shortened("proportional-regulators", EVERYTHING, tmp_path, 1.0)
     checked = ("gcc", "-std=c99", "-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
     first = shown(tmp_path, name, *checked)
     assert len(first[1]) > 300
@@ -287,8 +295,8 @@ def test_a_file_is_a_scenario_or_a_walk_by_its_sections(tmp_path: Path) -> None:
 
 
 def test_a_setting_that_contradicts_another_is_refused_by_name_and_a_flaw_needs_other_functions(tmp_path: Path) -> None:
-    library = built(load_walk("proportional"), tmp_path)
-    names = [item.name for item in walk_library(load_walk("proportional")).settings]
+    library = built("proportional", (), tmp_path)
+    names = [item.name for item in exported("proportional")[0].settings]
     settings = (ctypes.c_double * len(names))()
     library.proportional_defaults(settings)
     library.proportional_bad_setting.restype = ctypes.c_char_p

@@ -47,7 +47,8 @@ def rig_simulate(
     files = write_rig_recording(out, rig_recording)
     recording = rig_recording.recording
     samples = f"{len(recording)} samples of {', '.join(recording.names)}"
-    text = f"{experiment}: {NOTICE}\n{samples}\nwritten: {out} ({', '.join(files)})"
+    lines = (f"{experiment}: {NOTICE}", rig_recording.truth.get("replaced", ""), samples)
+    text = "\n".join((*filter(None, lines), f"written: {out} ({', '.join(files)})"))
     return CommandOutput(text, {"folder": str(out), "files": list(files), **rig_recording.truth})
 
 

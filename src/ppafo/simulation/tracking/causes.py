@@ -273,7 +273,8 @@ def _not_settled(case: Case) -> TrackingCause:
     if _is_settling(case):
         longer = [remedy(case.scenario, {"run.duration": times * case.scenario.run.duration}) for times in (2.0, 4.0)]
         quicker = larger_gains(case.scenario, case.law, (2.0, 4.0))
-        return TrackingCause("it has not settled at the end", (*longer, *quicker), "give it a longer `run.duration`")
+        text = f"it has not settled by {case.settled.start:.3g} s"
+        return TrackingCause(text, (*longer, *quicker), "give it a longer `run.duration`")
     integral = next((name for name in settings if "integral" in name and settings[name] == 0.0), "")
     if integral:
         remedies = tuple(default_integral_remedy(case.scenario, case.law))

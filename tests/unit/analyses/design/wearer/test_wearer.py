@@ -80,6 +80,7 @@ def test_what_is_suggested_is_the_walk_that_is_shown_and_its_toes_clear_the_grou
     assert device.toes >= found.requirements.clearance == pytest.approx(found.healthy_toes, abs=1e-4)
     said = text_of(finding_of(found))
     assert device.command in said.splitlines()
+    assert "extrapolated here" not in said
     assert f"lowest toes  {1e3 * device.toes:.1f} mm over the ground" in said
     assert "the lowest height of the toes in the healthy gait itself is 5.2 mm" in said
     # The printed command walks the same walk, with the same torque.
@@ -205,7 +206,15 @@ def test_a_stature_that_no_adult_has_is_asked_for_and_not_clamped(mass: float) -
 
 @pytest.mark.long
 @pytest.mark.usefixtures("little")
-@pytest.mark.parametrize(("mass", "stature"), [(25.0, 1.25), (30.0, 1.33), (35.0, 1.4), (45.0, 1.5)])
+@pytest.mark.parametrize(
+    ("mass", "stature"),
+    [
+        pytest.param(25.0, 1.25, marks=pytest.mark.thorough),
+        pytest.param(30.0, 1.33, marks=pytest.mark.thorough),
+        (35.0, 1.4),
+        pytest.param(45.0, 1.5, marks=pytest.mark.thorough),
+    ],
+)
 def test_a_device_for_a_child_is_found_once_the_stature_that_is_asked_for_is_given(mass: float, stature: float) -> None:
     wanted = {"mass": mass, "torque": 1.0, "pressure": 4.5e5, "minutes": 0.5}
     with pytest.raises(StudyError, match="give stature too"):
