@@ -91,7 +91,7 @@ def _replaced_text(
     entries = [(item.typed, parameter_set.numbers.get(item.typed)) for item in replaced]
     kept = [f"{path}={entry.value:.12g} {entry.unit}".rstrip() for path, entry in entries if entry is not None]
     keeping = f"; {override_text(kept)} keeps its own" if kept else ""
-    return f"values of the scenario replace those of {name}: {', '.join(map(str, replaced))}{keeping}"
+    return f"values of the scenario replace values of {name}: {', '.join(map(str, replaced))}{keeping}"
 
 
 _warn_once = functools.lru_cache(maxsize=64)(logger.warning)
