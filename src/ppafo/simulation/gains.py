@@ -14,7 +14,7 @@ from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.default_gains import DEAD_TIME, GAIN_TERMS, RATE, loop_terms
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
-from ppafo.wording import override_text
+from ppafo.wording import override_text, subject_text
 
 logger = logging.getLogger("ppafo")
 
@@ -104,8 +104,8 @@ def remark_on_following_gains(scenario: Scenario, varied: Collection[str]) -> st
     )
     names = ", ".join(gain.name for gain in following)
     return (
-        f"{scenario.name}: {names} {'is' if len(following) == 1 else 'are'} computed anew from the varied values, as "
-        f"if the controller knew them in every run; for the gains of the nominal device: {options}"
+        f"{subject_text(scenario.name)}: {names} {'is' if len(following) == 1 else 'are'} computed anew from the "
+        f"varied values, as if the controller knew them in every run; for the gains of the nominal device: {options}"
     )
 
 

@@ -386,3 +386,10 @@ def test_a_pressure_loop_has_an_equilibrium_at_its_reference() -> None:
         assert point[controlled] == pytest.approx(3e5 + model.scenario.device.supply.atmospheric_pressure, rel=1e-9)
         assert model.margins is not None
         assert model.margins.is_stable
+
+
+def test_matrices_are_found_under_their_names_in_the_equations() -> None:
+    model = ppafo.linearise("torque-task-proportional", overrides=["reference.level=3 N m"]).found
+    assert (model.A is model.a, model.B is model.b, model.C is model.c, model.D is model.d) == (True,) * 4
+    with pytest.raises(AttributeError, match="no attribute 'E'"):
+        model.E  # noqa: B018
