@@ -256,7 +256,7 @@ def _document(
 
 
 def judge(result: Result, only_switches: bool) -> str:
-    """Judge a run by its last third, apart from the rule of the package: good, failing, or between."""
+    """Judge a run by its last third, an angle's swing by half of the hold: good, failing, or between."""
     recording, of = result.recording, result.scenario.controlled
     reference = recording["reference" if of == "torque" else f"reference_{of}"]
     value = recording[of]
@@ -276,7 +276,10 @@ def judge(result: Result, only_switches: bool) -> str:
     if of == "angle":
         way = max(change, float(np.ptp(reference)))
         farthest = change * float(np.max(np.abs(error))) / max(_FARTHEST, _FARTHEST_SHARE * way)
-        swing = change * float(np.ptp(error)) / max(_SWING, _SWING_SHARE * way)
+        # Noise kicks a joint now and then, so that its range grows with the time that is looked at: as long as a
+        # verdict says, the second half of the hold.
+        hold = int(np.flatnonzero(np.abs(np.append(np.inf, reference - reference[-1])) > 1.0e-9 * change)[-1])
+        swing = float(np.ptp((value - reference)[(hold + value.size) // 2 :])) / max(_SWING, _SWING_SHARE * way)
         is_moving = np.ptp(reference[last]) > 0.02 * change
         measure = max(measure, farthest, 0.0 if is_moving else swing)
     command = recording["command"][last]

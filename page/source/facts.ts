@@ -17,8 +17,10 @@ export function sustainedTorque(content: Content, { program, values }: Pick<Simu
   const { sustained } = programNamed(content, program);
   if (sustained === null) return null;
   const at = (key: string) => values.get(key) ?? NaN;
-  const above = (key: string) => Math.max(0, at(key) - at(sustained.zero)) * at(sustained.factor);
-  return [-above(sustained.lowered), above(sustained.raised)];
+  const above = (key: string) => (at(key) - at(sustained.zero)) * at(sustained.factor);
+  // Chamber 1 at its supply, and chamber 2 at its own: with a vacuum the second one raises the torque.
+  const [first, second] = [above(sustained.raised), -above(sustained.lowered)];
+  return [Math.min(first, second), Math.max(first, second)];
 }
 
 /** Relative difference of two molar masses up to which they are of the same gas. */

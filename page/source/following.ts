@@ -78,7 +78,7 @@ const RULES: Readonly<Record<string, (...given: number[]) => number>> = {
   "clock.step_with_output": (duration = 0, period = 0, output = 0) => Math.min(stepUnlessGiven(duration, period), output),
   "clock.output_unless_given": (duration = 0, period = 0, step = 0) => duration / Math.max(1, nearestWhole(duration / dividingStep(period, step))),
   "motion.record_interval": (seconds = 0) => (seconds <= 61 ? 1e-3 : seconds <= 601 ? 5e-3 : 2e-2),
-  "building.lag_of_bandwidth": (bandwidth = 0) => lagOfBandwidth(bandwidth),
+  "law_signals.lag_of_sensor": (bandwidth = 0) => lagOfBandwidth(bandwidth),
   "solenoid.lag": (_opening = 0, closing = 0, interval = 0) => closing + interval,
   "solenoid.no_dead_time": () => 0,
   "proportional.lag": (_band = 0, delay = 0, frequency = 0, damping = 0, slew = 0) => delay + spoolLag(frequency, damping, slew),

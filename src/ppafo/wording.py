@@ -47,6 +47,9 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
         return f", which is '{before}{dot}{_C}', {sheet}, with '{before}{dot}{_B}' 0.3"
     # 0.6 finds a transposed or forgotten letter, and is difflib's own default.
     near = difflib.get_close_matches(word, known, n=max(len(known), 1), cutoff=0.6)
+    # A section that both have makes names alike that have nothing else in common.
+    ends = [name.rpartition(".") for name in near]
+    near = ["".join(end) for end in ends if not dot or end[0] != before or _likeness(last, end[2]) >= 0.5]
     if near:
         # Of names that are as near, the one that begins like it: 'time_02' and not 'time_31' for 'time_01'.
         alike = [name for name in known if name in near and _likeness(name, word) == _likeness(near[0], word)]
@@ -123,12 +126,35 @@ def argument_text(name: str, value: str = "", option: str = "") -> str:
     return f"{option} {shlex.quote(value)}" if value else option
 
 
+_configuration: ContextVar[str] = ContextVar("_configuration", default="")
+
+
+@contextlib.contextmanager
+def said_of_configuration(name: str) -> Iterator[None]:
+    """Word messages within a ``with`` block for one of several configurations: name it, and address overrides to it."""
+    token = _configuration.set(name)
+    try:
+        yield
+    finally:
+        _configuration.reset(token)
+
+
+def subject_text(scenario: str) -> str:
+    """Return the subject of a message on a scenario: the configuration that is spoken of, else the scenario's name."""
+    return _configuration.get() or scenario
+
+
 def override_text(overrides: Iterable[str]) -> str:
     """Return overrides as written by the caller: words of the command line, or an argument in Python.
 
     >>> override_text(["run.duration=2 s"])
     "overrides=['run.duration=2 s']"
+    >>> with said_of_configuration("fast"):
+    ...     override_text(["valve.area=2 mm^2"])
+    "overrides=['fast:valve.area=2 mm^2']"
     """
+    if name := _configuration.get():
+        overrides = [f"{name}:{override}" for override in overrides]
     if _reader.get() != "command line":
         return f"overrides={list(overrides)!r}"
     return shlex.join(word for override in overrides for word in ("--set", override))

@@ -32,28 +32,42 @@ def results(words: list[str], capsys: pytest.CaptureFixture[str]) -> dict[str, f
     return dict(json.loads(capsys.readouterr().out))
 
 
-@pytest.mark.thorough
-def test_the_commands_of_the_page_run_one_after_the_other_and_give_its_numbers(
+FIRST_WALK = next(number for number, words in enumerate(COMMANDS) if words[0] == "walk")
+AFTER_WALKS = 1 + COMMANDS.index(SEVERAL)
+
+
+@pytest.mark.long
+def test_bottles_of_numbers_and_of_a_task_last_as_long_as_the_page_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert len(COMMANDS) == 10
-    steps = []
-    for words in COMMANDS:
-        if words[0] != "bottle" or "--list" in words or words[:2] == SEVERAL[:2]:
-            assert main(words) == 0
-            said = capsys.readouterr().out
-            assert words[:2] != SEVERAL[:2] or said.splitlines() == shown_below(words)
+    counts = []
+    for words in COMMANDS[:FIRST_WALK] + COMMANDS[AFTER_WALKS:]:
+        if words[0] == "bottle" and "--list" not in words:
+            counts.append(round(results(words, capsys)["result"]["strides"]))  # type: ignore[index]
         else:
-            document = results(words, capsys)
-            steps.append(round(document["result"]["strides"]))  # type: ignore[index]
-    for count in steps:
-        assert re.search(rf"\b{count} (strides|tasks)", TEXT), count
+            assert main(words) == 0
+            capsys.readouterr()
+    assert len(counts) == 5
+    assert [count for count in counts if not re.search(rf"\b{count} (strides|tasks)", TEXT)] == []
     assert (tmp_path / "out" / "bottle" / "endurance.png").is_file()
-    life = results(SEVERAL[:2], capsys)
+
+
+@pytest.mark.long
+def test_walks_on_a_bottle_last_as_long_as_the_page_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for words in COMMANDS[FIRST_WALK:AFTER_WALKS]:
+        capsys.readouterr()
+        assert main(words) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert printed == shown_below(SEVERAL)
     exec(re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)[0], {})
-    strides, minutes = life["result"]["strides"], life["result"]["walking_time"] / 60.0  # type: ignore[index]
-    assert capsys.readouterr().out == f"{strides:.0f} strides, {minutes:.2f} min\n"
+    _, _, minutes, strides, _ = printed[3].split()
+    count, _, time, _ = capsys.readouterr().out.split()
+    assert (count, float(time)) == (strides, pytest.approx(float(minutes), abs=0.01))
 
 
 def shown_below(words: list[str]) -> list[str]:

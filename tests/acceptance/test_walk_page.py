@@ -2,19 +2,21 @@
 
 import contextlib
 import io
+import math
 import re
 import shlex
-from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 
 import pytest
 
+import ppafo
 from ppafo.cli.main import main
 from ppafo.walking import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import gait_sensors_of, has_ideal_sensors
 
-pytestmark = pytest.mark.thorough
+pytestmark = pytest.mark.long
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "walk.md").read_text(encoding="utf-8")
 
@@ -23,21 +25,38 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
 
 
-@pytest.fixture(scope="module")
-def printed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
-    """Text of each command of the page, one after the other in a folder, which is the current one."""
+def command_with(words: str) -> str:
+    """The one command of the page that has some words."""
+    (command,) = [
+        line.strip() for line in PAGE.splitlines() if line.strip().startswith("ppafo ") and f" {words} " in f" {line} "
+    ]
+    return command
+
+
+@lru_cache
+def printed(command: str) -> list[str]:
+    """Lines that a command of the page prints, run without its folder."""
+    with contextlib.redirect_stdout(io.StringIO()) as text:
+        assert main(shlex.split(command.partition(" --out ")[0])[1:]) == 0, command
+    return text.getvalue().splitlines()
+
+
+def cells_of(command: str) -> dict[str, list[str]]:
+    """Cells of the table of a walk by the names of its rows."""
+    rows = (re.split(r" {2,}", line) for line in printed(command))
+    return {name: cells for name, *cells in rows if cells}
+
+
+@pytest.mark.thorough
+def test_the_commands_of_the_page_write_the_files_that_it_lists(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
     commands = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("ppafo ")]
-    texts = {}
-    with contextlib.chdir(tmp_path_factory.mktemp("page")):
-        for command in commands:
-            with contextlib.redirect_stdout(io.StringIO()) as text:
-                assert main(shlex.split(command)[1:]) == 0, command
-            texts[command] = text.getvalue()
-        yield texts
-
-
-def test_the_commands_of_the_page_write_the_files_that_it_lists(printed: dict[str, str]) -> None:
-    assert len(printed) > 20
+    assert len(commands) > 20
+    for command in commands:
+        assert main(shlex.split(command)[1:]) == 0, command
+        capsys.readouterr()
     table = PAGE.partition("| In the folder |")[2].partition("\n\n")[0]
     listed = {
         name for cell in re.findall(r"^\| (`.*?`) \|", table, re.MULTILINE) for name in re.findall(r"`(.*?)`", cell)
@@ -56,11 +75,41 @@ def test_the_python_of_the_page_prints_what_it_shows(capsys: pytest.CaptureFixtu
     assert capsys.readouterr().out == shown
 
 
-def test_the_table_of_the_page_is_what_the_command_prints(printed: dict[str, str]) -> None:
-    shown = [line.split() for line in PAGE.partition("\nprints\n")[2].splitlines()[1:12]]
-    lines = printed["ppafo walk solenoid --minutes 0.2 --out out/walk"].splitlines()
-    assert [line.split() for line in lines[2:13]] == shown
-    assert len(shown) == 11
+def test_the_table_of_the_page_is_what_the_command_prints() -> None:
+    shown = [line.split() for line in PAGE.partition("\nprints\n")[2].partition("\n\nA stride")[0].splitlines()[1:]]
+    lines = [line.split() for line in printed(command_with("--out out/walk"))]
+    assert len(shown) == 14
+    assert [line for line in shown if line not in lines] == []
+
+
+def test_the_cylinder_and_a_nondisabled_wearer_walk_with_the_numbers_of_the_page() -> None:
+    gas, work = "Gas per stride (g)", "Positive work on the wearer in push-off (J)"
+    cylinder, kept = cells_of(command_with("--out out/cylinder")), cells_of(command_with("--out out/nondisabled"))
+    assert f"takes {cylinder[gas][0]} g a stride for {cylinder[work][0]} J in push-off" in PAGE
+    moments = kept["Moment of the wearer's dorsiflexors, mean (N m)"]
+    assert f"{moments[0]} N m with the device and {moments[1]} N m without it" in PAGE
+    vane = {name: metric.value for name, metric in ppafo.walk("proportional", minutes=0.2).metrics.items()}
+    assert f"the vane {1e3 * vane['gas']:.3f} g for {vane['positive_push_off_work']:.2f} J" in PAGE
+
+
+def test_the_clock_of_the_page_takes_its_work_off() -> None:
+    as_shipped, on_time = (
+        ppafo.walk("solenoid", minutes=0.2, overrides=changes).metrics["positive_push_off_work"].value
+        for changes in ([], ["timing.kind=fractional"])
+    )
+    assert f"earlier, with {100.0 * (1.0 - on_time / as_shipped):.0f} % less work" in PAGE
+
+
+def test_swings_are_those_of_the_table_of_the_page() -> None:
+    rows = re.findall(r"^\| (\d), .*? \| ([\d.]+) deg \| (-?\d+) mm \| ([\d.]+) g \|$", PAGE, re.MULTILINE)
+    commands = [line for line in PAGE.splitlines() if line.startswith("ppafo simulate swing-foot")]
+    assert len(rows) == len(commands) == 5
+    for (number, *shown), command in zip(rows, commands, strict=True):
+        overrides = [word for word in shlex.split(command)[3:] if "=" in word]
+        metrics = ppafo.simulate("swing-foot", overrides).metrics
+        error, toes, gas = (metrics[name].value for name in ("foot_angle_error", "toe_clearance_error", "gas_supplied"))
+        found = f"{math.degrees(error):.1f}", f"{1e3 * toes:.0f}", f"{1e3 * gas:.3f}"
+        assert tuple(map(float, shown)) == pytest.approx(tuple(map(float, found)), abs=1e-9), number
 
 
 def test_the_walk_file_of_the_page_loads(tmp_path: Path) -> None:
@@ -93,21 +142,18 @@ def test_the_task_sequence_and_the_bottle_of_the_page_load(tmp_path: Path) -> No
     assert walk_of(load_walk(walk_file, [f"task_sequence={tmp_path / 'door.toml'}"])).task_sequence is not None
 
 
-def test_the_segments_of_the_page_are_rows_of_what_the_command_prints(printed: dict[str, str]) -> None:
+def test_the_segments_of_the_page_are_rows_of_what_the_command_prints() -> None:
     rows = re.findall(r"^    \*? +(rest|start, 0.4 m/s|ramp, 1 m/s|whole task sequence) +(.*)$", PAGE, re.MULTILINE)
     assert len(rows) == 4
-    text = printed["ppafo walk solenoid --task-sequence first-steps --out out/first-steps"]
+    text = "\n".join(printed(command_with("--out out/first-steps")))
     for name, numbers in rows:
         (found,) = re.findall(rf"^\*? +{re.escape(name)} +(.*)$", text, re.MULTILINE)
         cells = re.split(r" {2,}", found)
         assert re.split(r" {2,}", numbers) == [*cells[:7], cells[-1]]
 
 
-def test_the_walk_on_its_bottle_ends_as_the_page_shows(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    command, _, after = PAGE.partition("    ppafo walk solenoid-regulators ")[2].partition("\n")
-    shown = [line.strip() for line in after.lstrip("\n").partition("\n\n")[0].splitlines()]
-    words = ["walk", "solenoid-regulators", *shlex.split(command)[:-1], str(tmp_path / "on-bottle")]
-    assert main(words) == 0
-    printed = capsys.readouterr().out.splitlines()
+def test_the_walk_on_its_bottle_ends_as_the_page_shows() -> None:
+    command = command_with("--out out/on-bottle")
+    shown = PAGE.partition(command)[2].lstrip("\n").partition("\n\n")[0].splitlines()
     assert len(shown) == 10
-    assert [line for line in shown if line not in printed] == []
+    assert [line for line in shown if line.strip() not in printed(command)] == []

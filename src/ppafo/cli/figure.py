@@ -22,6 +22,7 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
     >>> print(export_figure(folder).text)
     written: step/figure.png, step/figure.svg
     """
+    import ppafo
     from ppafo.report.recording_figure import FIGURE_FORMATS
     from ppafo.report.style import drawn_at, render_figure
     from ppafo.storage.files import write_file
@@ -42,14 +43,18 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
         drawn = draw_folder(folder, names)
     if not drawn:
         message, document = what_is_there(folder, names)
-        if out is not None:
-            vectors = [str(folder / name) for name in names if name.endswith(".svg")]
+        command, stems = document["command"], [name.removesuffix(".png") for name in document["figures"]]
+        again = ""
+        if stems and hasattr(ppafo, command):
+            call = f"ppafo.{command}(...).plot({stems[0]!r}, width='84 mm').savefig('{stems[0]}.pdf')"
+            again = f"; for another form or width, in Python with the arguments of the command: {call}"
+        if out is not None or width is not None:
+            given = f"--width {1e3 * width:g} mm" if out is None and width is not None else f"--out {out}"
             raise DataError(
-                f"--out {out}: only figures of runs, walks, studies and rig recordings can be drawn again, not of "
-                f"'ppafo {document['command']}'"
-                + (f"; convert a vector figure to PDF with other software: {', '.join(vectors)}" if vectors else "")
+                f"{given}: only figures of runs, walks, studies and rig recordings can be drawn again, not of "
+                f"'ppafo {command}'{again}"
             )
-        return CommandOutput(message, document)
+        return CommandOutput(f"{message}{again}", document)
     if out is not None:
         if len(drawn) > 1:
             raise DataError(

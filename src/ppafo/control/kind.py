@@ -1,5 +1,6 @@
 """Declarations of controllers and profiles, and device properties from which their settings may take defaults."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Protocol
@@ -81,6 +82,11 @@ class ControllerKind:
     controls: tuple[str, ...] = (TORQUE,)
 
 
+def unbounded(_parameters: Any) -> tuple[float, float]:
+    """Bounds of a profile that follows a recording, whose parameters change at each sample: none."""
+    return -math.inf, math.inf
+
+
 @dataclass(frozen=True, slots=True)
 class ProfileKind:
     """Function of time in the catalogue, for a reference or a prescribed angle.
@@ -100,7 +106,7 @@ class ProfileKind:
     quantities: tuple[Quantity, ...]
     parameters: type
     value: Callable[[Any, float], Any]
-    bounds: Callable[[Any], tuple[float, float]]
+    bounds: Callable[[Any], tuple[float, float]] = unbounded
     differences: tuple[str, ...] = ()
     is_monotone: bool = False
     is_smooth: bool = False

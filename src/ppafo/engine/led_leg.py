@@ -4,7 +4,6 @@ Foot, foot plate and vane turn as one body, whose inertia is part of the plant; 
 knee and weight on this body. The free foot of a walk has the same physics among others (``scheme/walking.py``).
 """
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,19 +15,12 @@ from ppafo.engine.program import Program
 from ppafo.model.gait import ShankSeries, shank_in_gait
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
 
-
-def gait_bounds(_gait: ShankSeries) -> tuple[float, float]:
-    """Return no bounds, because the shank follows the recorded gait."""
-    return -math.inf, math.inf
-
-
 GAIT_SHANK = ProfileKind(
     name="gait",
     summary="The shank of a gait, whose ground is left out.",
     quantities=(),
     parameters=ShankSeries,
     value=shank_in_gait,
-    bounds=gait_bounds,
 )
 """Shank with a moving knee, whose value is a ``ShankNow``; with any other profile of the shank, the knee is at rest."""
 

@@ -3,7 +3,6 @@
 Between two changes of the inputs a run proceeds without interruption, so that constant inputs cost only a few calls.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -35,18 +34,12 @@ def segment_value(segment: AngleSegment, time: float) -> tuple[float, float, flo
     return segment.level + segment.rate * (time - segment.start), segment.rate, 0.0
 
 
-def segment_bounds(_segment: AngleSegment) -> tuple[float, float]:
-    """Bounds [rad] of a segment: none, because the next segment may lead to any angle between the stops."""
-    return -math.inf, math.inf
-
-
 RECORDED_ANGLE = ProfileKind(
     name="recorded",
     summary="A recorded angle, straight from sample to sample; its parameters change at every sample.",
     quantities=(),
     parameters=AngleSegment,
     value=segment_value,
-    bounds=segment_bounds,
 )
 """Profile outside the catalogue: a scenario file cannot name it, because its values come from a recording.
 

@@ -14,18 +14,12 @@ from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
 
 _NEEDED = ("torque", "reference")
 
-ONE_INSTANT = {
-    (f"final_{name}error"): (f"rms_{name}error_hold", f"{name}oscillations_hold")
-    for name in ("" if controlled == TORQUE else f"{controlled}_" for controlled in CONTROLLED)
-}
-"""Metrics of a single instant, arbitrary in an oscillating loop, and the metrics that reveal the oscillation."""
+ONE_INSTANT = frozenset(
+    f"final_{name}error" for name in ("" if controlled == TORQUE else f"{controlled}_" for controlled in CONTROLLED)
+)
+"""Metrics of a single instant, arbitrary where the value swings."""
 SUSTAINED = 4
 """Number of reversals on the hold from which a loop oscillates; a settling loop has one or two."""
-
-
-def settled_error(final: Floats, on_hold: Floats, reversals: Floats) -> Floats:
-    """Return the final error or, if the loop oscillates on the hold, the RMS error there if that is larger."""
-    return np.where((reversals >= SUSTAINED) & (on_hold > final), on_hold, final)
 
 
 def error_of(recording: Recording) -> Floats:

@@ -103,6 +103,7 @@ def record(
         "settings": plain(result.settings),
         "channels": {name: result.recording.unit(name) for name in result.recording.names},
         "samples": len(result.recording),
+        **({"replaced": result.replaced} if result.replaced else {}),
     }
     return RigRecording(result.recording, result.device, truth)
 

@@ -42,12 +42,16 @@ class ExperimentRequest:
 
 @dataclass(frozen=True, slots=True)
 class ExperimentResult:
-    """Result of an experiment: recording, true device, sensor offsets by channel, and further true values by name."""
+    """Result of an experiment: recording, true device, sensor offsets by channel, and further true values by name.
+
+    ``replaced`` is a sentence on values of the scenario that replace those of the requested parameter set, else "".
+    """
 
     recording: Recording
     device: Device
     offsets: Mapping[str, float]
     settings: Mapping[str, Any]
+    replaced: str = ""
 
 
 def steady_bench(request: ExperimentRequest) -> tuple[Device, RigPhysics]:

@@ -1,6 +1,5 @@
 """Transient experiments of the rig, integrated with LSODA: step response, torque task, free decay, leak over time."""
 
-import copy
 import math
 from dataclasses import replace
 from typing import Any
@@ -12,7 +11,7 @@ from ppafo.model.controlled import TORQUE
 from ppafo.model.effects.second_virial import real_density
 from ppafo.model.gas import gas_energy
 from ppafo.model.plant import chamber_volumes
-from ppafo.parameters import load_device
+from ppafo.parameters import load_device, load_parameter_set
 from ppafo.parameters.declaration import SECTIONS
 from ppafo.rig.dynamics import RigState
 from ppafo.rig.sensors import sensor
@@ -147,14 +146,16 @@ def _recorded(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str
         "impacts": solution.impacts,
         "breakaways": solution.breakaways,
     }
-    return ExperimentResult(recording, bench_run.device, offsets, settings)
+    return ExperimentResult(recording, bench_run.device, offsets, settings, scenario.origin.replaced)
 
 
 def _of_package(name: str, request: ExperimentRequest) -> Scenario:
     """Return a scenario of the package with the requested device."""
-    document = copy.deepcopy(dict(load_scenario(name).origin.content))
-    document["device"] = {"overrides": document["device"].get("overrides", []), **_device_table(request)}
-    return scenario_from_dict(document, request.overrides)
+    content = load_scenario(name).origin.content
+    # As overrides, so that the scenario tells which of its own values replace those of another set.
+    chosen = {"valve": load_parameter_set(request.parameter_set).default_valve, **_device_table(request)}
+    of_device = (f"device.{key}={name}" for key, name in chosen.items() if name != content["device"][key])
+    return scenario_from_dict(content, [*of_device, *request.overrides])
 
 
 def _of_bench(

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,10 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.units import from_si
 from ppafo.wording import count_of, nearest_name
+
+if TYPE_CHECKING:
+    import pandas  # type: ignore[import-untyped]
+    from matplotlib.figure import Figure
 
 TIME = "time"
 TIME_UNIT = "s"
@@ -322,6 +326,38 @@ class Recording:
             for name, channel in self.channels.items()
         }
         return Recording(self.label, wanted, moved, self.kind)
+
+    def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
+        """Return the channels as columns indexed by time [s], in SI or in ``units``, such as ``{"angle": "deg"}``.
+
+        Gauge pressures count from the standard atmosphere. Raises DataError for an unknown channel, and UnitError for a
+        unit that does not fit the channel.
+        """
+        from pandas import DataFrame, Index
+
+        shown = {**{name: channel.unit for name, channel in self.channels.items()}, **(units or {})}
+        columns = {
+            name: self.in_unit(name, unit) if name in (units or {}) else self[name] for name, unit in shown.items()
+        }
+        frame = DataFrame(columns, Index(self.time, name=TIME))
+        frame.attrs = {"title": self.label, "kind": self.kind, "units": shown}
+        return frame
+
+    def plot(self, units: Mapping[str, str] | None = None) -> "Figure":
+        """Return a figure with a panel for each channel over time [s], in units as in ``to_dataframe``."""
+        from matplotlib.figure import Figure
+
+        if not self.channels:
+            raise DataError(f"{self.label}: has no channel to draw")
+        table = self.to_dataframe(units)
+        figure = Figure((5.4, 1.2 + 1.2 * len(self.names)), layout="constrained")
+        panels = figure.subplots(len(self.names), sharex=True, squeeze=False)[:, 0]
+        for name, panel in zip(self.names, panels, strict=True):
+            panel.plot(self.time, table[name], drawstyle="steps-post" if self.is_held(name) else "default")
+            panel.set_title(f"{name} [{table.attrs['units'][name]}]", loc="left")
+        panels[0].figure.suptitle(self.label if self.kind == "measured" else f"{self.label} ({self.kind})")
+        panels[-1].set_xlabel("time [s]")
+        return figure
 
     def _channel(self, name: str) -> Channel:
         if name not in self.channels:

@@ -43,7 +43,7 @@ from ppafo.simulation.document import (
     value_at,
 )
 from ppafo.simulation.following import numbers_of_lines, read_followers
-from ppafo.simulation.hardware import device_error, read_device, read_hardware
+from ppafo.simulation.hardware import Hardware, device_error, read_device, read_hardware
 from ppafo.simulation.law_signals import LEG_PATHS, MOVED, PERIOD_PATH, seen_in_scenario
 from ppafo.simulation.motion_kind import MOTIONS, RunTimes
 from ppafo.simulation.nominal import nominal_terms
@@ -109,7 +109,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
             reference=reference,
             sensors=sensors,
             assumptions=(*assumptions, *assumed_lines(reading)),
-            origin=origin_of(request, document, hardware.valve),
+            origin=origin_of(request, document, hardware),
             gas_model=read_gas_model(reading),
             supply_line=supply_line,
             links={**initial_links, **reference_links, **control_links},
@@ -134,10 +134,13 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         return scenario
 
 
-def origin_of(request: ScenarioRequest, document: Mapping[str, Any], valve: str, named: Iterable[str] = ()) -> Origin:
+def origin_of(
+    request: ScenarioRequest, document: Mapping[str, Any], hardware: Hardware, named: Iterable[str] = ()
+) -> Origin:
     """Return the origin of a scenario; ``named`` are the overrides that correspond to ``request.instead``."""
     overrides = (*(override.words for override in request.overrides), *named)
-    return Origin(request.path, document["device"]["set"], valve, overrides, request.content)
+    set_name = document["device"]["set"]
+    return Origin(request.path, set_name, hardware.valve, overrides, request.content, hardware.replaced)
 
 
 def _initial(reading: DocumentReader, device: Device) -> tuple[Initial, Graph]:

@@ -14,7 +14,7 @@ from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.default_gains import DEAD_TIME, GAIN_TERMS, RATE, loop_terms
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
-from ppafo.wording import override_text
+from ppafo.wording import override_text, subject_text
 
 logger = logging.getLogger("ppafo")
 
@@ -47,7 +47,7 @@ class Gains:
     @property
     def sentence(self) -> str:
         """Gains in use and their origin."""
-        loop = f"{self.torque_rate:.3g} {self.unit}/s at full opening, {1.0e3 * self.dead_time:.3g} ms late"
+        loop = f"{self.torque_rate:.3g} {self.unit}/s at full opening, dead time {1.0e3 * self.dead_time:.3g} ms"
         parts = []
         for computed, origin in ((False, "(given)"), (True, f"(computed from the device: {loop})")):
             gains = [gain for gain in self.gains if gain.computed == computed]
@@ -104,8 +104,8 @@ def remark_on_following_gains(scenario: Scenario, varied: Collection[str]) -> st
     )
     names = ", ".join(gain.name for gain in following)
     return (
-        f"{scenario.name}: {names} {'is' if len(following) == 1 else 'are'} computed anew from the varied values, as "
-        f"if the controller knew them in every run; for the gains of the nominal device: {options}"
+        f"{subject_text(scenario.name)}: {names} {'is' if len(following) == 1 else 'are'} computed anew from the "
+        f"varied values, as if the controller knew them in every run; for the gains of the nominal device: {options}"
     )
 
 

@@ -23,7 +23,7 @@ from ppafo.parameters.parameter_set import (
 from ppafo.simulation.document import DocumentReader, ScenarioRequest, value_at
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Origin
-from ppafo.wording import nearest_name, one_line
+from ppafo.wording import nearest_name, one_line, override_text
 
 logger = logging.getLogger("ppafo")
 
@@ -33,11 +33,15 @@ _SECTIONS_WITH_UNITS = ("initial", "motion", "controller", "reference")
 
 @dataclass(frozen=True, slots=True)
 class Hardware:
-    """Parameter set with all overrides applied, name of its selected valve, and links between its numbers."""
+    """Parameter set with all overrides applied, name of its selected valve, and links between its numbers.
+
+    ``replaced`` is a sentence on values of the scenario that replace those of a set other than its own, else "".
+    """
 
     parameter_set: ParameterSet
     valve: str
     links: Graph
+    replaced: str
 
 
 def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: tuple[Override, ...]) -> Hardware:
@@ -52,20 +56,21 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
         if valve is not None and valve not in kinds and not nearest_name(valve, kinds):
             # The scenario names the valve of another device.
             raise ParameterError(
-                f"{parameter_set.file}: there is no valve '{valve}'; it has {', '.join(kinds)}: "
-                f"--set device.valve={parameter_set.default_valve}"
+                f"{parameter_set.file}: there is no valve '{valve}'; it has {', '.join(kinds)}: give "
+                f"{override_text((f'device.valve={parameter_set.default_valve}',))}"
             )
         name = chosen_valve(parameter_set, valve)
         is_own = section["set"] == in_file.get("set")
         of_file = _overrides_for(of_file, parameter_set, is_own)
+        replaced = "" if is_own else _replaced_text(parameter_set, section["set"], of_file, overrides)
         parameter_set = with_overrides(parameter_set, of_file, valve)
-        if of_file and not is_own:
-            _report_file_overrides(reading.file, section["set"], ", ".join(map(str, of_file)))
+        if replaced:
+            _warn_once(f"ppafo: {reading.file}: {replaced}")
     except ParameterError as error:
         raise device_error(reading, error) from error
     before = atmospheric_pressure(parameter_set) if overrides else None
     changed = with_overrides(parameter_set, overrides, valve)
-    return Hardware(changed, name, links_of_set(changed, {override.typed for override in overrides}, before))
+    return Hardware(changed, name, links_of_set(changed, {override.typed for override in overrides}, before), replaced)
 
 
 def _overrides_for(of_file: tuple[Override, ...], parameter_set: ParameterSet, is_own: bool) -> tuple[Override, ...]:
@@ -75,10 +80,21 @@ def _overrides_for(of_file: tuple[Override, ...], parameter_set: ParameterSet, i
     return tuple(item for item in of_file if item.typed not in OF_SECOND_CHAMBER)
 
 
-@functools.lru_cache(maxsize=64)
-def _report_file_overrides(file: str, set_name: str, overrides: str) -> None:
-    """Log, once for each set, that values which a scenario gives its own device replace those of another one."""
-    logger.warning("ppafo: %s: [device] overrides replace values of %s too: %s", file, set_name, overrides)
+def _replaced_text(
+    parameter_set: ParameterSet, name: str, of_file: tuple[Override, ...], overrides: tuple[Override, ...]
+) -> str:
+    """Sentence on values of a scenario's file in force in place of those of the set ``name``; "" without any."""
+    given = {override.typed for override in overrides}
+    replaced = [item for item in of_file if item.typed not in given]
+    if not replaced:
+        return ""
+    entries = [(item.typed, parameter_set.numbers.get(item.typed)) for item in replaced]
+    kept = [f"{path}={entry.value:.12g} {entry.unit}".rstrip() for path, entry in entries if entry is not None]
+    keeping = f"; {override_text(kept)} keeps its own" if kept else ""
+    return f"values of the scenario replace values of {name}: {', '.join(map(str, replaced))}{keeping}"
+
+
+_warn_once = functools.lru_cache(maxsize=64)(logger.warning)
 
 
 def parameter_set_of(origin: Origin) -> ParameterSet:

@@ -124,11 +124,12 @@ class Result:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Reasons why the run is of limited use, a sentence each: a missed reference, a too coarse pair of valves."""
+        """Remarks on the use of the run: a missed reference, a too coarse pair of valves, replaced values."""
         from ppafo.simulation.tracking.pair_step import coarse_pair, unlimited_switching
 
         verdict = self.tracking
-        said = ("" if verdict is None else verdict.sentence, unlimited_switching(self), coarse_pair(self.scenario))
+        sentence = "" if verdict is None else verdict.sentence
+        said = (sentence, unlimited_switching(self), coarse_pair(self.scenario), self.scenario.origin.replaced)
         return tuple(sentence for sentence in said if sentence)
 
     @in_units(_units_of)

@@ -34,6 +34,7 @@ _OTHERS = (
 _HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*(\w*)\s*", re.ASCII)
 _LEVEL = "Pa_a"
 _ONLY_SIMULATED = "supplied_mass"
+_NO_TIMES = f'for a table without times the map has {TIME} = {{ rate = "100 Hz" }}, the rate of its rows'
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +87,9 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
         columns.append(HeaderColumn(name, unit, between))
     names = [column.name for column in columns]
     if names[0] != TIME:
-        raise DataError(f"the first column must be '{TIME} [{TIME_UNIT}]', it is '{names[0]}'{_column_map_remedy()}")
+        raise DataError(
+            f"the first column must be '{TIME} [{TIME_UNIT}]', it is '{names[0]}'{_column_map_remedy()}; {_NO_TIMES}"
+        )
     twice = first_twice(names)
     if twice is not None:
         raise DataError(f"there are two columns '{twice}'")
@@ -202,10 +205,16 @@ def _separator_of(header: str) -> str:
     return next((mark for mark in "\t;" if mark in header and all(map(_HEADER.fullmatch, header.split(mark)))), ",")
 
 
-def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
+def read_csv(
+    path: str | Path,
+    label: str | None = None,
+    atmosphere: float = STANDARD_ATMOSPHERE,
+    row_time: float | None = None,
+) -> Recording:
     """Return the recording in a CSV file, in SI units, labelled with the file name by default.
 
-    Gauge pressure is relative to ``atmosphere`` [Pa absolute]. Raises DataError for an invalid file.
+    Gauge pressure is relative to ``atmosphere`` [Pa absolute]. ``row_time`` [s] is the time between the rows of a table
+    without a time column; None requires the column. Raises DataError for an invalid file.
     """
     content = read_bytes(path)
     try:
@@ -231,7 +240,8 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
             raise DataError("has no header")
         # A first column without a name is the row number that pandas writes.
         is_counted = bool(header) and not header[0].strip()
-        columns = parse_header(header[is_counted:])
+        has_rows_only = row_time is not None and not any(cell.partition("[")[0].strip() == TIME for cell in header)
+        columns = parse_header([*([f"{TIME} [{TIME_UNIT}]"] if has_rows_only else []), *header[is_counted:]])
         if mark != ",":
             # Commas that separate no columns are decimal marks.
             rows = (
@@ -243,6 +253,8 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
         kind = "simulated" if is_of_frame(header) else kind_of_comments(lines[:first])
         line_numbers = range(first + 2, first + 2 + len(values))
         series = list(values[:, is_counted:].T)
+        if row_time is not None and has_rows_only:
+            series = [row_time * np.arange(float(len(values))), *series]
         return recording_of_columns(columns, series, line_numbers, label or one_line(Path(path).stem), kind, atmosphere)
     except csv.Error as error:
         raise DataError(f"{path}: is not a CSV file: {error}") from error

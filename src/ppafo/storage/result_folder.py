@@ -25,6 +25,7 @@ from ppafo.storage.owned_folder import (
 )
 
 if TYPE_CHECKING:
+    import pandas  # type: ignore[import-untyped]
     from matplotlib.figure import Figure
 
 RUN_FILE = "run.json"
@@ -48,6 +49,10 @@ class StoredResult:
 
     def __repr__(self) -> str:
         return f"StoredResult in {self.folder}: {', '.join(self.document)}\n{self.recording!r}"
+
+    def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
+        """Return the channels as columns indexed by time [s]: ``Recording.to_dataframe``."""
+        return self.recording.to_dataframe(units)
 
     def plot(self, width: float | str | None = None) -> "Figure":
         """Return the same figure as ``Result.plot``; ``.savefig(...)`` writes it to a file."""

@@ -13,7 +13,7 @@ from ppafo.arguments import Count, Overrides, Seed, checked
 from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, ParameterError, ScenarioError, StudyError, UnitError, refused_as
-from ppafo.loading import load_scenario, placed, reloaded
+from ppafo.loading import load_scenario, placed
 from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
@@ -23,7 +23,16 @@ from ppafo.simulation.numbers import chosen_path
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import ShiftedDistribution
 from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, with_noise
-from ppafo.studies.study import NO_SAMPLE, Axis, Configuration, RandomValue, SamplingPlan, Study, valid_outputs
+from ppafo.studies.study import (
+    NO_SAMPLE,
+    Axis,
+    Configuration,
+    RandomValue,
+    SamplingPlan,
+    Study,
+    configurations_with,
+    valid_outputs,
+)
 from ppafo.studies.varying import (
     VariedPath,
     axis_or_distribution,
@@ -62,7 +71,7 @@ def load_study(
 
     Arguments:
         study: name of a study, a .toml file, or data laid out as such a file
-        overrides: changes of every configuration, as texts or a dictionary
+        overrides: values to change, as texts or a dictionary; of one configuration: 'NAME:PATH=VALUE'
         draws: number of draws, instead of the number in the file
         seed: random seed, instead of the seed in the file
         plugins: modules of your own, files or names, whose objects files may name
@@ -123,9 +132,10 @@ def _load(
     given = {key: value for key, value in (("runs", draws), ("seed", seed)) if value is not None}
     with refused_as(StudyError, source.file, StudyError):
         if changes:
-            for table, configuration in zip(document["configurations"], parsed.configurations, strict=True):
-                changed = _configuration(configuration, source.folder, changes).scenario
-                table["overrides"] = list(changed.origin.overrides)
+            given_here = [_configuration(section, source.folder) for section in parsed.configurations]
+            changed = configurations_with(given_here, changes)
+            for table, configuration in zip(document["configurations"], changed, strict=True):
+                table["overrides"] = list(configuration.scenario.origin.overrides)
         if given and parsed.sample is None:
             if any(not isinstance(entry, declared.NOT_RANDOM) for entry in parsed.vary):
                 raise StudyError(NO_SAMPLE)
@@ -239,11 +249,10 @@ def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Co
             )
 
 
-def _configuration(entry: declared.ConfigurationSection, folder: Path, overrides: Sequence[str] = ()) -> Configuration:
-    """Return a configuration; ``overrides`` apply on top of the configuration's own."""
+def _configuration(entry: declared.ConfigurationSection, folder: Path) -> Configuration:
+    """Return a configuration as its section gives it."""
     with refused_as(StudyError, f"configuration '{entry.name}'", ScenarioError, ParameterError, DataError):
-        scenario = load_scenario(placed(entry.scenario, folder), entry.overrides)
-        return Configuration(entry.name, reloaded(scenario, overrides) if overrides else scenario)
+        return Configuration(entry.name, load_scenario(placed(entry.scenario, folder), entry.overrides))
 
 
 def _common_path(

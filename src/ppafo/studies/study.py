@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ppafo.engine.channels import TRACED
-from ppafo.errors import StudyError, UnitError, at_fault, refused_as
+from ppafo.errors import PpafoError, StudyError, UnitError, at_fault, refused_as
 from ppafo.loading import reloaded, scenario_or_load
 from ppafo.metrics import METRICS
 from ppafo.model.controlled import CONTROLLED
@@ -18,7 +18,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Distribution
 from ppafo.units import parse_quantity
-from ppafo.wording import first_twice, nearest_name
+from ppafo.wording import first_twice, nearest_name, override_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,10 +236,39 @@ def choose_configurations(
         chosen = tuple(map(Configuration, names, scenarios))
     if len(chosen) < 2:
         raise StudyError(f"a comparison needs at least two configurations, there is {len(chosen)}")
-    changes = tuple(overrides)
-    return tuple(
-        replace(configuration, scenario=with_overrides(configuration.scenario, changes)) for configuration in chosen
-    )
+    return configurations_with(chosen, overrides)
+
+
+def configurations_with(configurations: Sequence[Configuration], overrides: Iterable[str]) -> tuple[Configuration, ...]:
+    """Return configurations with overrides of all, or addressed to one as ``NAME:PATH=VALUE``.
+
+    Raises StudyError for an address that no configuration has, and for an override that a configuration refuses.
+    """
+    names = [configuration.name for configuration in configurations]
+    own: dict[str, list[str]] = {name: [] for name in names}
+    for text in overrides:
+        typed, equals, value = text.partition("=")
+        name, colon, path = (part.strip() for part in typed.rpartition(":"))
+        if colon and name not in own:
+            hint = nearest_name(name, names)
+            raise StudyError(
+                f"override '{text}': there is no configuration '{name}'{hint}; available: {', '.join(names)}"
+            )
+        for addressed in [name] if colon else names:
+            own[addressed].append(f"{path}{equals}{value}" if colon else text)
+    changed, refused = [], []
+    for configuration in configurations:
+        try:
+            scenario = with_overrides(configuration.scenario, own[configuration.name])
+            changed.append(replace(configuration, scenario=scenario))
+        except PpafoError as error:
+            refused.append(f"configuration '{configuration.name}': {error}")
+    if refused:
+        name = changed[0].name if changed else ""
+        raise StudyError(
+            refused[0] + (f"; for '{name}' alone: {override_text([f'{name}:PATH=VALUE'])}" if name else "")
+        )
+    return tuple(changed)
 
 
 def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.metrics import metric_kind
 from ppafo.metrics.settled import SETTLED_METRICS
-from ppafo.metrics.tracking import ONE_INSTANT, settled_error
+from ppafo.metrics.tracking import ONE_INSTANT, SUSTAINED
 from ppafo.progress import Progress, Report
 from ppafo.running import most_reversals
 from ppafo.simulation.clock import TIMES
@@ -20,8 +20,8 @@ from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.metered import needed_metrics, tracking_excess
-from ppafo.simulation.tracking.rule import REVERSALS, smallest_change
+from ppafo.simulation.tracking.metered import command_turning, needed_metrics, tracking_excess
+from ppafo.simulation.tracking.rule import smallest_change
 from ppafo.studies.distributions import Floats
 from ppafo.studies.limits import check_metrics
 from ppafo.study.blocks import runs_at_once
@@ -162,16 +162,8 @@ def failures_of(rows: Rows) -> int:
 
 
 def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ...]:
-    """Return metrics, with the further metrics that their evaluation needs and that the scenario has.
-
-    A metric at one instant needs the oscillations of the controlled quantity, and the tracking verdict its own metrics.
-    """
-    companions = [name for metric in metrics for name in ONE_INSTANT.get(metric, ())]
-    offered = (
-        name
-        for name in (*companions, *needed_metrics(scenario))
-        if (kind := metric_kind(name)) and not lacking(scenario, kind)
-    )
+    """Return metrics, with those of the tracking verdict that the scenario has."""
+    offered = (name for name in needed_metrics(scenario) if (kind := metric_kind(name)) and not lacking(scenario, kind))
     return tuple(dict.fromkeys((*metrics, *offered)))
 
 
@@ -210,15 +202,13 @@ def tracking_violation(
 
 
 def oscillating(rows: Mapping[str, Floats], scenario: Scenario) -> NDArray[np.bool_]:
-    """Tell for each run whether its torque loop oscillates, from ``command_reversals``; False without this metric."""
-    if REVERSALS not in rows:
-        return np.zeros(next(iter(rows.values())).size, dtype=np.bool_)
-    return np.asarray(rows[REVERSALS] > most_reversals(scenario))
+    """Tell for each run whether its loop oscillates, from the reversals of its command; False if these are unknown."""
+    return np.asarray(command_turning(scenario, rows, most_reversals(scenario)) > 1.0)
 
 
 def settled(rows: Rows, metric: str) -> Floats:
-    """Return a metric for evaluation; for an oscillating loop, the final error becomes the RMS error if larger."""
-    companions = ONE_INSTANT.get(metric, ())
-    if not companions or not set(companions) <= set(rows):
+    """Return a metric for evaluation: a final error of a settled part that swings becomes its RMS error, if larger."""
+    if metric not in ONE_INSTANT or "settled_turns" not in rows:
         return rows[metric]
-    return settled_error(rows[metric], *(rows[name] for name in companions))
+    swings = (rows["settled_turns"] >= SUSTAINED) & (rows["settled_error"] > rows[metric])
+    return np.where(swings, rows["settled_error"], rows[metric])

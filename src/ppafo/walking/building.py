@@ -1,6 +1,5 @@
 """Building of a walk scenario from a validated document: motion, controller, sensors, supply and duration."""
 
-import math
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
@@ -26,7 +25,7 @@ from ppafo.simulation.default_gains import loop_terms
 from ppafo.simulation.document import DocumentReader, ScenarioRequest, kind_at, value_at
 from ppafo.simulation.following import numbers_of_lines, read_followers
 from ppafo.simulation.hardware import read_device, read_hardware
-from ppafo.simulation.law_signals import IN_WALK, PERIOD_PATH
+from ppafo.simulation.law_signals import IN_WALK, PERIOD_PATH, lag_of_sensor
 from ppafo.simulation.motion_kind import MOTIONS, WALK
 from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.overrides import OverriddenDocument
@@ -114,7 +113,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
             seed=int(reading.number("sensors.seed", SEED)),
         ),
         assumptions=_assumed(reading, bottle),
-        origin=origin_of(request, document, hardware.valve, instead),
+        origin=origin_of(request, document, hardware, instead),
         gas_model=read_gas_model(reading),
         supply_line=line,
         links={**links, **links_of_stature(reading.document)},
@@ -208,8 +207,8 @@ def _control(
     terms = {
         VALVE_LAG: LinkFunction(paths, valve.lag or delay, (valve.settings,)),
         VALVE_DELAY: LinkFunction(paths, delay, (valve.settings,)),
-        PRESSURE_LAG: LinkFunction(("sensors.pressure_bandwidth",), lag_of_bandwidth),
-        FORCE_LAG: LinkFunction(("sensors.force_bandwidth",), lag_of_bandwidth),
+        PRESSURE_LAG: LinkFunction(("sensors.pressure_bandwidth",), lag_of_sensor),
+        FORCE_LAG: LinkFunction(("sensors.force_bandwidth",), lag_of_sensor),
         **nominal_terms(device, lines),
         **loop_terms(device, law, IN_WALK),
     }
@@ -253,8 +252,3 @@ def _duration(reading: DocumentReader, scenario: Scenario) -> float:
         # The time of the wearer with the unchanged gait, whichever person walks.
         return float(planned_task_sequence(motion.task_sequence, motion.gait).duration)
     return DEFAULT_DURATION if motion.bottle is None else BOTTLE_DURATION
-
-
-def lag_of_bandwidth(bandwidth: float) -> float:
-    """Return the time constant [s] of a sensor with a bandwidth [Hz]; a bandwidth of 0 means no lag and returns 0."""
-    return 1.0 / (2.0 * math.pi * bandwidth) if bandwidth > 0.0 else 0.0

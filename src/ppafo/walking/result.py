@@ -242,9 +242,9 @@ class WalkResult:
         """Return status, verdict and metrics in display units, as printed by ``ppafo simulate``."""
         from ppafo.report.display_units import metrics_lines
 
-        verdict = []
+        verdict = [self.scenario.origin.replaced]
         if self.status.is_completed:
-            verdict = [self.torque_sentence(self.tracking), "" if self.is_helped else self.help_text]
+            verdict += [self.torque_sentence(self.tracking), "" if self.is_helped else self.help_text]
             toes = self.metrics.get("lowest_toes")
             if toes is not None and toes.value < 0.0:
                 verdict.append("the toes would drag in mid-swing: the ankle is not lifted enough")

@@ -65,7 +65,7 @@ def test_what_a_copy_of_a_set_accepts_lapses_where_it_changes_a_value_of_the_fin
     few = capsys.readouterr().out
     assert "[flow-of-solenoid]" in few
     assert "[flow-of-proportional]" not in few
-    assert "of them concern no changed value; show them with --all" in few
+    assert "of them concern no changed value; --all shows them" in few
     assert main(["sets", "audit", "own.toml", "--all"]) == 1
     assert "[flow-of-proportional]" in capsys.readouterr().out
 

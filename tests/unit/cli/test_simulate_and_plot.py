@@ -223,14 +223,17 @@ def test_a_folder_that_has_its_figures_or_none_says_so_and_what_to_open(
     assert main(["export", "figure", str(tmp_path / "a")]) == 0
     assert main(["export", "figure", str(tmp_path / "b"), "--json"]) == 0
     first, _, second = capsys.readouterr().out.partition("\n")
-    assert first.endswith(
-        f"result of 'ppafo compare' has its figures (change.png); open {tmp_path / 'a' / 'report.html'}"
-    )
+    again = "ppafo.compare(...).plot('change', width='84 mm').savefig('change.pdf')"
+    opened = f"result of 'ppafo compare' has its figures (change.png); open {tmp_path / 'a' / 'report.html'}; "
+    assert opened in first
+    assert first.endswith(again)
     assert json.loads(second)["open"] == str(tmp_path / "b" / "sets.txt")
     assert main(["export", "figure", str(tmp_path / "a"), "--out", str(tmp_path / "new.pdf")]) == 2
     message = capsys.readouterr().err
     assert "only figures of runs, walks, studies and rig recordings can be drawn again, not of 'ppafo" in message
-    assert message.strip().endswith(f"vector figure to PDF with other software: {tmp_path / 'a' / 'change.svg'}")
+    assert message.strip().endswith(again)
+    assert main(["export", "figure", str(tmp_path / "a"), "--width", "84 mm"]) == 2
+    assert again in capsys.readouterr().err
     assert names(tmp_path / "a") == before
     assert names(tmp_path) == ["a", "b"]
 
@@ -297,5 +300,5 @@ def test_an_interrupt_while_writing_ends_with_130_and_leaves_nothing(tmp_path: P
         _, error = process.communicate(timeout=30)
     assert process.returncode == 130
     *_, last = error.splitlines()  # before it, that the model is compiled anew where the cache has no more room for it
-    assert last == "ppafo: interrupted; nothing is half written"
+    assert last == "ppafo: interrupted; no file is incomplete"
     assert names(tmp_path) == []

@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from ppafo.loading import load_scenario
-from ppafo.page.content import page_content
+from ppafo.page.content import _SUSTAINED, page_content
 from ppafo.page.wasm.description import display_of
+from ppafo.parameters.reach import torque_reach
 from ppafo.report.display_units import display_value, metric_quantity
 from ppafo.units import without_exponent
 from ppafo.units.shown import QUANTITIES, shown_in
@@ -78,6 +79,22 @@ def told(module: str, work: str) -> Any:
     script = _BUNDLED.replace("MODULE", module).replace("WORK", work)
     line = ["node", "--input-type=module", "--eval", script]
     return json.loads(subprocess.run(line, cwd=SOURCES, check=True, capture_output=True, timeout=120).stdout)
+
+
+@pytest.mark.parametrize("supply", [("50 psi_g", "40 psi_g"), ("-6 psi_g", "-4 psi_g")])
+def test_the_page_says_the_torques_that_a_vane_reaches_on_pressure_and_on_a_vacuum(supply: tuple[str, str]) -> None:
+    changes = [f"supply.pressure={supply[0]}", f"supply.dorsiflexion_pressure={supply[1]}"]
+    device = load_scenario("torque-task-proportional", changes).device
+    values = {
+        "actuator.torque_constant": device.actuator.torque_constant,
+        "supply.pressure": device.supply.pressure,
+        "supply.dorsiflexion_pressure": device.supply.dorsiflexion_pressure,
+        "supply.atmospheric_pressure": device.supply.atmospheric_pressure,
+    }
+    program = json.dumps({"name": "one", "sustained": dict(_SUSTAINED)})
+    work = f"""({{ sustainedTorque }}) => sustainedTorque(
+        {{ programs: [{program}] }}, {{ program: "one", values: new Map(Object.entries({json.dumps(values)})) }})"""
+    assert told("facts", work) == pytest.approx(torque_reach(device, 1.3), rel=1e-12)
 
 
 def test_the_bands_of_all_channels_come_from_one_go_of_200_runs() -> None:

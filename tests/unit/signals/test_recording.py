@@ -8,6 +8,7 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording
+from ppafo.storage.reading import read_recording
 
 
 def recording(label: str = "bench", start: float = 0.0) -> Recording:
@@ -184,3 +185,19 @@ def test_a_channel_that_is_neither_held_nor_straight_is_refused_with_the_nearest
         DataError, match="between = 'held': a channel is hold or linear between its samples, did you mean 'hold'"
     ):
         Channel([1.0, 2.0], "-", "held")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("units", [None, {"pressure_1": "psi_g"}])
+def test_a_recording_is_a_table_that_is_read_again(units: dict[str, str] | None) -> None:
+    channels = {"pressure_1": Channel(np.array([2.0e5, 3.0e5]), "Pa"), "command": Channel(np.array([0.0, 1.0]), "-")}
+    recording = Recording("log", np.array([0.0, 0.1]), channels, "synthetic")
+    table = recording.to_dataframe(units)
+    again = read_recording(table)
+    assert (again.label, again.kind, again.names) == ("log", "synthetic", recording.names)
+    assert again["pressure_1"] == pytest.approx(recording["pressure_1"], rel=1e-12)
+
+
+def test_a_recording_draws_every_channel_in_the_unit_that_is_named() -> None:
+    channels = {"mass_flow": Channel(np.array([1.0e-3, 2.0e-3]), "kg/s"), "angle": Channel(np.array([0.0, 1.0]), "rad")}
+    figure = Recording("log", np.array([0.0, 0.1]), channels).plot({"angle": "deg"})
+    assert [panel.get_title("left") for panel in figure.axes] == ["mass_flow [kg/s]", "angle [deg]"]

@@ -100,14 +100,14 @@ def test_progress_grows_where_there_are_more_runs_than_were_thought() -> None:
     assert [(item.total, item.done, item.failed) for item in seen] == [(100, 100, 1), (200, 200, 2), (400, 400, 3)]
 
 
-def test_only_a_loop_that_oscillates_on_the_hold_has_its_last_error_replaced() -> None:
+def test_only_a_loop_that_swings_in_the_settled_part_has_its_last_error_replaced() -> None:
     rows = {
         "final_error": np.array([0.1, 0.1, 0.5]),
-        "rms_error_hold": np.array([0.4, 0.4, 0.4]),
-        "oscillations_hold": np.array([20.0, 2.0, 20.0]),
+        "settled_error": np.array([0.4, 0.4, 0.4]),
+        "settled_turns": np.array([20.0, 2.0, 20.0]),
     }
     assert settled(rows, "final_error").tolist() == [0.4, 0.1, 0.5]
-    assert settled(rows, "rms_error_hold") is rows["rms_error_hold"]
+    assert settled(rows, "settled_error") is rows["settled_error"]
 
 
 def test_runs_of_an_hour_are_reported_long_before_many_thousands_are_made() -> None:

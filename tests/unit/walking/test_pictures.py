@@ -17,7 +17,7 @@ from ppafo.walking import WalkComparison, WalkResult, compare_walks, load_walk, 
 from ppafo.walking.figures import task_sequence, whole_walk
 from ppafo.walking.figures.animation import animation
 from ppafo.walking.figures.gait_strip import strip_figure
-from ppafo.walking.figures.legs import drags, frames_figure, last_phases, legs_of
+from ppafo.walking.figures.legs import frames_figure, last_phases, legs_of
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.population import population_figure
 from ppafo.walking.figures.whole_walk import whole_walk_figure
@@ -50,9 +50,16 @@ def test_a_drop_foot_is_seen_without_the_device_and_lifted_with_it(name: str) ->
     assert lowest[0] < -0.06, "the toes drag"
     assert lowest[1] > lowest[0] + 0.05, "and are lifted"
     assert legs_of(pair.with_device, turns).healthy.toe[late, 1].min() > -0.002
-    assert any(drags(bare, index) for index in late.tolist())
-    dragging = [sum(drags(legs, index) for index in late.tolist()) for legs in (bare, worn)]
-    assert dragging[1] < dragging[0]
+    assert sum(worn.drags) < sum(bare.drags)
+
+
+def test_toes_of_the_figures_drag_where_the_verdict_says_so() -> None:
+    # The pair drags by millimetres, the proportional valve by nothing; the healthy stance is no drag.
+    for name in ("solenoid", "proportional"):
+        for result in (compared(name).with_device, compared(name).without_device):
+            legs = legs_of(result, last_phases(result, 1, 200))
+            assert any(legs.drags) == (result.metrics["lowest_toes"].value < 0.0), name
+            assert not any(np.array(legs.drags)[legs.turns % 1.0 < 0.6])
 
 
 def test_the_strip_of_frames_marks_toes_that_drag() -> None:

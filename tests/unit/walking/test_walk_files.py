@@ -272,7 +272,7 @@ def test_the_page_knows_every_rule_by_which_a_default_of_a_walk_follows_others()
         for term in link.terms
     ]
     rules = {f"{term.function.__module__.rpartition('.')[2]}.{term.function.__name__}" for term in terms}
-    assert "building.lag_of_bandwidth" in rules
+    assert "law_signals.lag_of_sensor" in rules
     assert {rule for rule in rules if f'"{rule}":' not in page} == set()
 
 

@@ -25,7 +25,7 @@ from ppafo.studies.distributions import Floats
 from ppafo.studies.intervals import fraction_text, is_carried
 from ppafo.study.runs import Rows
 from ppafo.units import without_exponent
-from ppafo.wording import count_of
+from ppafo.wording import count_of, said_of_configuration
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -256,15 +256,13 @@ def remarks_of(comparison: ComparisonResult) -> list[str]:
             )
         for case in task.cases:
             where = f"{case.configuration}, {task.task}"
-            if coarse := coarse_pair(case.scenario):
-                remarks.append(coarse)
-            following = remark_on_following_gains(case.scenario, comparison.varied)
-            if following and following not in remarks:
-                remarks.append(following)
+            with said_of_configuration(case.configuration):
+                remarks.append(coarse_pair(case.scenario))
+                remarks.append(remark_on_following_gains(case.scenario, comparison.varied))
+                if case.tracking is not None and not case.follows:
+                    remarks.append(f"{where}: {case.tracking.sentence}; it is not among the best")
             if not case.status.is_completed:
                 failed.append(f"{where}: {case.status.message}")
-            if case.tracking is not None and not case.follows:
-                remarks.append(f"{where}: {case.tracking.sentence}; it is not among the best")
             if case.failed_draws:
                 failed.append(
                     f"{where}: {case.failed_draws:,} of {comparison.draws:,} draws failed and are left out of every "
@@ -278,7 +276,8 @@ def remarks_of(comparison: ComparisonResult) -> list[str]:
             for pair in pairs
             if not is_carried(pair.effective_size, pair.pairs)
         ]
-    return [*remarks, *failed, *uncertain, *([_NOISE] if comparison.has_noise else [])]
+    # Several tasks may have the same remark.
+    return [*dict.fromkeys(filter(None, remarks)), *failed, *uncertain, *([_NOISE] if comparison.has_noise else [])]
 
 
 def front_of(cases: Sequence[ConfigurationResult]) -> list[str]:

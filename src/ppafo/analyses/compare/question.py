@@ -51,7 +51,8 @@ def compare(
         study: study file that gives the distributions and, without others, the configurations
         tasks: a task for all configurations, for example 'slow:reference.ramp_time=2 s'; default: as the scenarios are
             written
-        overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
+        overrides: values to change, for example 'valve.area=12.6 mm^2'; of one configuration: 'NAME:PATH=VALUE'; may be
+            repeated
         baseline: configuration that all others are compared with; default: the first
         draws: draws of the uncertain values of the study, or of the noise, at least 32; default 4096, whatever the
             runs of the study

@@ -20,10 +20,10 @@ from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, Uncertainty, uncertainty_of
 from ppafo.studies.limits import CONFIDENCE, check_fraction
 from ppafo.studies.sampling import NOISE, with_new_noise
-from ppafo.studies.study import Configuration, Study, with_overrides
+from ppafo.studies.study import Configuration, Study, configurations_with
 from ppafo.studies.varying import value_at, varied_path
 from ppafo.study.runs import Rows, RunCounter, failures_of, scenario_runs, unvaried
-from ppafo.wording import argument_text, first_twice, nearest_name
+from ppafo.wording import argument_text, first_twice, nearest_name, said_of_configuration
 
 AS_WRITTEN = "as written"
 """Name of the task of configurations that run as written."""
@@ -104,11 +104,13 @@ def compared(
     if repeated is not None:
         raise StudyError(f"two tasks are named '{repeated}'; give each its own name")
     scenarios = {
-        (task, configuration.name): with_overrides(configuration.scenario, overrides)
+        (task, configuration.name): configuration.scenario
         for task, overrides in named_tasks
-        for configuration in configurations
+        for configuration in configurations_with(configurations, overrides)
     }
-    warn_of_coarse_pairs(scenarios.values())
+    for (_, name), scenario in scenarios.items():
+        with said_of_configuration(name):
+            warn_of_coarse_pairs([scenario])
     # Metrics that all scenarios can have: without a reference there is no error.
     metrics = [
         name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios.values())
@@ -133,12 +135,14 @@ def compared(
     cases: dict[str, list[ConfigurationResult]] = {task: [] for task, _ in named_tasks}
     for ((task, name), scenario), result in zip(scenarios.items(), results, strict=True):
         runs = drawn.get((task, name), _DrawnRuns())
+        with said_of_configuration(name):
+            tracking = tried(scenario, result.tracking)
         cases[task].append(
             ConfigurationResult(
                 configuration=name,
                 status=result.status,
                 metrics={metric: value for metric, value in result.metrics.items() if metric in COMPARED},
-                tracking=tried(scenario, result.tracking),
+                tracking=tracking,
                 failed_draws=0 if runs.rows is None else failures_of(runs.rows),
                 reason=runs.failure,
                 scenario=scenario,

@@ -129,7 +129,7 @@ def finding_of(endurance: Endurance) -> Finding[Endurance]:
                 name="endurance",
                 caption=_CAPTION,
                 size=(5.4, 1.8),
-                title=f"{endurance.bottle.name}: {_MASS.text(endurance.draw.mass_per_stride)} per "
+                title=f"{endurance.bottle.label}: {_MASS.text(endurance.draw.mass_per_stride)} per "
                 f"{_counted(endurance)} of {TIME.text(endurance.draw.stride_time, '.3g')}",
                 note=f"End: {endurance.discharge.ending.message}.",
                 remarks=(_LEFT_OUT,),
@@ -172,7 +172,7 @@ def finding_of_several(several: Endurances) -> Finding[Endurances]:
         said=(next(iter(several.uses.values())).bottle.title,),
         parts=(
             Section(columns=columns_of(titles, rows)),
-            Section("What is not in the model", said=(_LEFT_OUT,), is_detail=True),
+            Section("Not in the model", said=(_LEFT_OUT,), is_detail=True),
         ),
         found=several,
     )

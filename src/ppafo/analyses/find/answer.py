@@ -5,9 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.analyses.find.solve import FindResult
-from ppafo.metrics.tracking import ONE_INSTANT
-from ppafo.report.display_units import metric_words
+from ppafo.analyses.find.solve import FOLLOWS, FindResult
 from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import Kind, of_metric, of_path
 from ppafo.report.panels import Mark, Panel
@@ -21,8 +19,8 @@ class FindSample:
 
     ``value``: tried value [SI]
     ``metric``: metric at this value [SI]; nan if the run failed
-    ``judged``: number compared with the limit [SI]: the metric, or the RMS error on the hold if that is larger and the
-        loop oscillates there; nan if the loop oscillates throughout
+    ``judged``: number compared with the limit [SI]: the metric, or the RMS error in the second half of the hold if that
+        is larger and the value swings there; nan if the loop oscillates throughout
     ``is_of_grid``: True if the value belongs to the initial grid
     """
 
@@ -40,8 +38,8 @@ class Threshold:
     ``not_met_at``: next tried value on the outer side, which does not meet the condition; None at the end of the range
     ``changes``: number of changes between met and not met along the tried values
     ``met``: first and last value of each interval in which the condition is met
-    ``unsettled``: number of runs whose loop oscillates at the instant of the metric, so that their RMS error on the
-        hold must meet the condition too
+    ``unsettled``: number of runs that swing at the instant of the metric, so that their RMS error in the second half of
+        the hold must meet the condition too
     """
 
     scenario: str
@@ -71,6 +69,7 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
     # In the unit of the range that was given.
     kind = of_path(path.path, path.quantity.unit, given=path.given)
     met, (index, neighbour) = outcome.met_intervals, outcome.found
+    limit = "" if condition.text == FOLLOWS else "dashed: the limit; "
     columns = [Column(title, [kind.text(ends[end]) for ends in met]) for end, title in enumerate(("from", "to"))]
     remarks = list(_remarks(outcome, kind))
     # In more digits than are shown, so that the value that is pasted meets the condition.
@@ -78,7 +77,7 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
     return Finding(
         name="find",
         kicker="Search",
-        title=f"The {wanted} {path.path} such that {condition.text}",
+        title=f"The {wanted} {path.path} such that {'the run ' if condition.text == FOLLOWS else ''}{condition.text}",
         said=(_verdict(outcome, kind), *remarks),
         parts=(
             Section("Met in the range that was tried", columns),
@@ -87,7 +86,7 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
                 "Metric over the value",
                 panels=(_panel(outcome, kind),),
                 name="find",
-                caption="The metric over the value; dashed: the limit; shaded: where the condition is met.",
+                caption=f"The metric over the value; {limit}shaded: where the condition is met.",
             ),
         ),
         found=Threshold(
@@ -124,17 +123,20 @@ def _verdict(outcome: FindResult, kind: Kind) -> str:
     path, condition, tried = outcome.path.path, outcome.condition, outcome.tried
     of_condition, (index, neighbour) = of_metric(condition.metric), outcome.found
     wanted, further = ("highest", "higher") if outcome.highest else ("lowest", "lower")
+    is_verdict = condition.text == FOLLOWS
+    meets = "lets the run follow its reference" if is_verdict else f"meets {condition.text}"
+    nearest = f"{condition.metric} of " if is_verdict else ""
     if index is None:
         # The nearest one says whether a wider range could.
         row = int((np.nanargmin if condition.is_most else np.nanargmax)(tried["judged"]))
         return (
-            f"no {path} from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])} meets {condition.text}; "
-            f"the nearest is {of_condition.text(tried['judged'][row])} at {kind.text(tried['value'][row])}"
+            f"no {path} from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])} {meets}; "
+            f"the nearest is {nearest}{of_condition.text(tried['judged'][row])} at {kind.text(tried['value'][row])}"
         )
     value = float(tried["value"][index])
     # Beyond it the condition may be met by a loop that does not follow its reference.
-    follows = " and follows its reference" if _not_followed(outcome) else ""
-    lead = f"{path} = {kind.text(value)} is the {wanted} value that meets {condition.text}{follows}"
+    follows = " and follows its reference" if _not_followed(outcome) and not is_verdict else ""
+    lead = f"{path} = {kind.text(value)} is the {wanted} value that {meets}{follows}"
     there = f"{condition.metric} is {of_condition.text(float(tried['metric'][index]))} there"
     if neighbour is None:
         return f"{lead}, and the end of the range: {there}; a wider range may have a {further} one"
@@ -172,12 +174,12 @@ def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
         yield noise
     if unsettled := int(tried["unsettled"].sum()):
         yield (
-            f"in {unsettled} runs the loop oscillates on the hold, and {condition.metric} is one sample of it: in "
-            f"these runs the condition must also hold for {ONE_INSTANT[condition.metric][0]}"
+            f"in {unsettled} runs the loop still swings in the second half of the hold, and {condition.metric} is one "
+            "sample of that: in these runs the condition must also hold for the RMS error there"
         )
     if oscillating := int(tried["oscillating"].sum()):
         yield f"in {oscillating} of {runs.count} runs the loop oscillates: they count as not met"
-    if missed := _not_followed(outcome):
+    if (missed := _not_followed(outcome)) and condition.text != FOLLOWS:
         yield f"at {missed} values the condition is met, but the reference is not followed: they count as not met"
     if runs.failures:
         yield f"{runs.failures} of {runs.count} runs failed and count as not met; the first: {runs.reason}"
@@ -190,13 +192,14 @@ def _panel(outcome: FindResult, kind: Kind) -> Panel:
     dots, dashes = {"linestyle": "", "marker": "o", "markersize": 3}, {"linestyle": "--", "linewidth": 1.0}
     grid_samples = tried[tried["is_of_grid"]]
     marks = [Mark("line", values, metrics), Mark("line", grid_samples["value"], grid_samples["metric"], style=dots)]
-    # The RMS error on the hold where that is larger, and what the condition is asked of.
+    # The RMS error where that is larger, and what the condition is asked of.
     larger = np.where(judged > metrics, judged, np.nan)
     if np.isfinite(larger).any():
         crosses = {"linestyle": "", "marker": "x", "markersize": 4}
-        label = f"{metric_words(ONE_INSTANT[condition.metric][0])}, of a loop that oscillates"
+        label = "RMS error in the second half of the hold, where it swings"
         marks.append(Mark("line", values, larger, label=label, colour=GREY, style=crosses))
-    marks.append(Mark("level", (), condition.limit, label="limit", colour=BLACK, style=dashes))
+    if condition.text != FOLLOWS:
+        marks.append(Mark("level", (), condition.limit, label="limit", colour=BLACK, style=dashes))
     marks += [
         Mark("span", ends, label="" if row else "condition met", colour=GREEN)
         for row, ends in enumerate(outcome.met_intervals)

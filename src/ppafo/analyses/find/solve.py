@@ -1,5 +1,6 @@
 """Search for the lowest or highest value that meets a condition on a metric: grid, then bisection."""
 
+import math
 import re
 from dataclasses import dataclass, replace
 
@@ -7,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import ScenarioError, StudyError, UnitError, at_fault, refused_as
+from ppafo.metrics import METRICS
 from ppafo.progress import Report
+from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import seeds_of_noise
@@ -29,6 +32,8 @@ ACCURACY = 1.0e-6
 _SEED = 1
 """Seed of the noise streams."""
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
+FOLLOWS = "follows"
+"""Condition that the run follows its reference, as ``simulate`` judges it."""
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
@@ -51,15 +56,23 @@ def range_of(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
 
 
 def condition_of(text: str, base: Scenario, path: str) -> MetricLimit:
-    """Return the condition of a text ``METRIC <= LIMIT`` or ``METRIC >= LIMIT``; StudyError for any other text.
+    """Return the condition of a text ``METRIC <= LIMIT``, ``METRIC >= LIMIT`` or ``follows``; StudyError for others.
 
     Gauge pressures refer to the ambient pressure of the scenario, unless ``path``, the varied number, is this pressure.
     """
     quoted = f"'{one_line(text)}'"
+    if text.strip() == FOLLOWS:
+        # Every value that is found follows its reference; of two that do not, the error says which is nearer.
+        tracked = (f"rms_{base.controlled}_error", "rms_error", "torque_error", "peak_torque")
+        errors = [name for name in tracked if name in METRICS and not lacking(base, METRICS[name])]
+        if base.controller.is_open_loop or not errors:
+            raise StudyError(f"{quoted}: scenario '{base.name}' has no reference to follow; give a limit of a metric")
+        return MetricLimit(errors[0], math.inf, True, FOLLOWS)
     parts = _CONDITION.fullmatch(text)
     if parts is None:
         raise StudyError(
-            f"{quoted} is not of the form METRIC <= LIMIT or METRIC >= LIMIT, for example 'final_error <= 0.3 N m'"
+            f"{quoted} is not of the form METRIC <= LIMIT or METRIC >= LIMIT, for example 'final_error <= 0.3 N m', "
+            f"nor '{FOLLOWS}', for a run that follows its reference"
         )
     metric, sign, limit = parts.groups()
     check_metrics([metric], base)
@@ -76,11 +89,11 @@ TRIED = np.dtype(
 )
 """Row of a tried value [SI] with its metric [SI], nan if the run failed, and the ``spread`` over the noise streams.
 
-``judged``: number compared with the limit: the metric, or the RMS error on the hold if that is larger and the loop
-    oscillates there; nan if the loop oscillates throughout
+``judged``: number compared with the limit: the metric, or the RMS error in the second half of the hold if that is
+    larger and the value swings there; nan if the loop oscillates throughout
 ``follows``: True if the reference is followed in all streams
 ``is_of_grid``: True for values of the initial grid, False for values of a bracket
-``unsettled``, ``oscillating``: number of runs that oscillate on the hold, and throughout
+``unsettled``, ``oscillating``: number of runs that swing in the second half of the hold, and oscillate throughout
 """
 
 
@@ -127,7 +140,7 @@ class FindResult:
         if seeds.size:
             columns[NOISE] = np.repeat(seeds, values.size)
         rows = self.runs.run(columns)
-        # One instant of a loop that oscillates may meet the condition by chance.
+        # One instant of a value that swings may meet the condition by chance.
         judged = settled(rows, metric)
         # A loop whose command turns all the time meets no condition that anybody would build on.
         turns = oscillating(rows, base)
@@ -158,8 +171,8 @@ def outermost(
 ) -> FindResult:
     """Search for the lowest or highest value that meets a condition.
 
-    ``vary`` is ``PATH=LOW..HIGH`` and ``such_that`` is ``METRIC <= LIMIT`` or ``METRIC >= LIMIT``. ``highest`` selects
-    the highest value instead of the lowest; ``grid`` is the number of values tried first.
+    ``vary`` is ``PATH=LOW..HIGH`` and ``such_that`` is ``METRIC <= LIMIT``, ``METRIC >= LIMIT`` or ``follows``.
+    ``highest`` selects the highest value instead of the lowest; ``grid`` is the number of values tried first.
 
     Raises StudyError for invalid input, and if no run has the metric.
     """

@@ -20,8 +20,10 @@ from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, number_in_si
 from ppafo.progress import Report, report_nothing
+from ppafo.storage.comma_separated import read_csv
 from ppafo.storage.foreign import read_trials
-from ppafo.storage.reading import read_recording
+from ppafo.storage.reading import TEXT_SUFFIXES, read_recording
+from ppafo.storage.result_folder import RUN_FILE
 from ppafo.units.shown import counted_from, shown_in
 
 _FILES_IN_TITLE = 4
@@ -49,7 +51,9 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
             sources = [
                 source
                 for recording in procedure.recordings
-                for source in _sources(problem, folder / recording, file, procedure.columns, before)
+                for source in _sources(
+                    problem, folder / recording, file, procedure.columns, before, _ROW_TIMES.get(procedure.kind)
+                )
             ]
             tasks.append(_Task(procedure, tuple(sources), f"{file}: procedure {number}, {procedure.kind}"))
         # In the order in which they are applied.
@@ -84,16 +88,29 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         return replace(identification, new_set=described)
 
 
+_ROW_TIMES = dict.fromkeys(("static-torque", "open-valve-flow", "valve-map"), 1.0)
+"""Time between rows without a time column [s], by procedure: those whose laws do not depend on time."""
+
+
 def _sources(
-    problem: ProblemFile, path: Path, file: str, columns: str | None, parameter_set: ParameterSet
+    problem: ProblemFile,
+    path: Path,
+    file: str,
+    columns: str | None,
+    parameter_set: ParameterSet,
+    row_time: float | None = None,
 ) -> tuple[RecordingSource, ...]:
     """Return the recordings in a file that a problem names, read through a column map if one is given.
 
-    ``parameter_set`` provides the atmosphere for gauge pressures and the gas for volume flows.
+    ``parameter_set`` provides the atmosphere for gauge pressures and the gas for volume flows. ``row_time`` [s] is the
+    time between the rows of a table of text without a time column; None requires the column.
     """
     atmosphere = atmospheric_pressure(parameter_set)
     if path.is_dir():
         raise IdentificationError(f"{path}: is a folder and cannot be hashed; give the recording in the folder")
+    is_text = path.suffix.lower() in TEXT_SUFFIXES and not (path.parent / RUN_FILE).exists()
+    if columns is None and row_time is not None and is_text:
+        return (source_of(path, read_csv(path, atmosphere=atmosphere, row_time=row_time)),)
     if columns is None:
         return (source_of(path, read_recording(path, atmosphere=atmosphere)),)
     molar_mass = number_in_si(parameter_set, "gas.molar_mass")

@@ -81,7 +81,8 @@ class LinearModel:
     """Linear plant model of a scenario, x' = A x + B u, y = C x + D u, for deviations from the operating point in SI.
 
     ``time``: time of the operating point [s]; None for a steady state
-    ``a`` (states, states), ``b`` (states, inputs), ``c`` (outputs, states), ``d`` (outputs, inputs): matrices
+    ``a`` (states, states), ``b`` (states, inputs), ``c`` (outputs, states), ``d`` (outputs, inputs): matrices, also
+        named as in the equations: ``A``, ``B``, ``C``, ``D``
     ``rates`` (states,): x' at the operating point, 0 in a steady state
     ``sides``: side of each limit of the plant, in words
     ``edges``: kinks on which the operating point lies
@@ -103,6 +104,13 @@ class LinearModel:
     edges: tuple[SlopeKink, ...]
     delays: OmittedDelays
     margins: LoopMargins | None = None
+
+    def __getattr__(self, name: str) -> Floats:
+        """Matrix under its name in the equations: ``A``, ``B``, ``C`` or ``D``."""
+        if name not in ("A", "B", "C", "D"):
+            raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'", name=name, obj=self)
+        matrix: Floats = getattr(self, name.lower())
+        return matrix
 
     @property
     def is_steady(self) -> bool:

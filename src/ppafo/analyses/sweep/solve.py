@@ -54,6 +54,7 @@ from ppafo.study.store import (
     trace_column,
 )
 from ppafo.version import __version__
+from ppafo.wording import said_of_configuration
 
 _EXAMPLES = 5
 QUANTILE_DEFINITION = (
@@ -219,7 +220,7 @@ def sweep(
 
     Arguments:
         study: name of a study, a .toml file, data laid out as one, or a Study
-        overrides: values to change in every configuration, texts or a dictionary as of ``simulate``
+        overrides: values to change, texts or a dictionary as of ``simulate``; of one configuration: 'NAME:PATH=VALUE'
         draws: number of draws in place of the file's
         seed: random seed in place of the file's
         threads: threads of this process; default: all cores
@@ -246,12 +247,13 @@ def sweep(
     check_can_be_swept(chosen)
     kept = temporary_folder("ppafo-study") if out is None else None
     folder = study_folder(kept.name if kept is not None else str(out))
-    warn_of_coarse_pairs(configuration.scenario for configuration in chosen.configurations)
     for configuration in chosen.configurations:
         varied = {*chosen.paths, *chosen.same}
-        warn_of_following_gains(
-            configuration.scenario, [path for path in varied if chosen.varies(path, configuration.name)]
-        )
+        with said_of_configuration(configuration.name):
+            warn_of_coarse_pairs([configuration.scenario])
+            warn_of_following_gains(
+                configuration.scenario, [path for path in varied if chosen.varies(path, configuration.name)]
+            )
     store = StudyStore.claim(chosen, folder, agreed, threads)
     _compute_missing_chunks(store, threads, progress)
     results = StudyResults(folder, read_manifest(folder), {}, kept)

@@ -12,9 +12,7 @@ from ppafo.analyses.tune.problem import Problem
 from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, GainResult, SearchStart, Tuned, agreement
 from ppafo.loading import reloaded, usage_text
 from ppafo.metrics.metric import controlled_in
-from ppafo.metrics.tracking import ONE_INSTANT
 from ppafo.model.controlled import CONTROLLED, TORQUE
-from ppafo.report.display_units import metric_words
 from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import TIME, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
@@ -299,8 +297,8 @@ def remarks_of(
     ]
     printed = after.fresh or after.values
     remarks += [
-        f"the loop oscillates on the hold, and {name} is one instant of that: what counts is "
-        f"{_number(name, judged)}, {metric_words(ONE_INSTANT[name][0])}"
+        f"the loop still swings in the second half of the hold, and {name} is one instant of that: what counts is "
+        f"{_number(name, judged)}, its RMS error there"
         for name, judged in after.judged.items()
         if judged > printed[name]
     ]

@@ -69,8 +69,8 @@ class GainResult:
 
     ``values``: metrics of the search [SI]: of the nominal device, or at their unfavourable end over the draws
     ``fresh``: the same over draws that the search did not use; empty without draws
-    ``judged``: metrics compared with the constraints over fresh draws; for a loop that oscillates on the hold, the
-        error at a single instant does not count
+    ``judged``: metrics compared with the constraints over fresh draws; for a loop that swings in the second half
+        of the hold, the error at a single instant does not count
     ``objective``, ``violation``, ``share_without_value``: objective, violation, and fraction of runs without a value,
         in the search
     ``fresh_violation``, ``fresh_share_without_value``: the same over fresh draws, or in the search without draws

@@ -117,8 +117,8 @@ class CandidateMetrics:
     """Metrics of candidates, each array (candidates, draws), with one draw if there is no uncertainty.
 
     ``metrics``: metrics by name [SI]
-    ``judged``: metrics by which candidates are ranked; for a loop that oscillates on the hold, the error at a single
-        instant does not count
+    ``judged``: metrics by which candidates are ranked; for a loop that swings in the second half of the hold, the
+        error at a single instant does not count
     ``failed``: True for failed and oscillating runs
     ``off``: fraction by which a run exceeds the tracking limits
     """

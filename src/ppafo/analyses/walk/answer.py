@@ -175,8 +175,11 @@ _EXPLAINED = (
     "stride is one step of that leg. A stride with less help (lifted only, paused or stopped) is not in 'with' but in "
     "'less help', where there is one."
 )
-_LEGS = "Shank and foot on the path that the gait prescribes. A cross marks toes below the ground: they would drag."
-_MOVING = "Two strides at half speed. A dark red foot drags."
+_LEGS = (
+    "Shank and foot on the path that the gait prescribes. A cross marks toes below the ground in mid-swing: they "
+    "would drag."
+)
+_MOVING = "Two strides at half speed. A dark red foot has its toes below the ground in mid-swing."
 _PHASES = (
     "The functional tasks of the paper's figure 1A: 1 control of the foot at heel strike, 2 propulsion, 3 support of "
     "the foot in the swing, 4 free motion. A block that does not fill the height occurs only in some of the strides."
@@ -206,7 +209,8 @@ def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
     # How the torque follows what is requested, and the gains in force with their origin.
     in_force = gains_of(configuration, law_of(configuration))
     torque = worn.torque_sentence(verdict)
-    first_lines = [benefit_sentence(comparison), torque, "" if in_force is None else in_force.sentence]
+    gains = "" if in_force is None else in_force.sentence
+    first_lines = [benefit_sentence(comparison), torque, configuration.origin.replaced, gains]
     gait, overrides = motion.gait, configuration.origin.overrides
     title = f" ({gait.title})" if gait.title else ""
     set_up = (
@@ -232,12 +236,10 @@ def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
             *task_sequence_parts(comparison),
             Section(columns=comparison_table(comparison), remarks=_remarks(comparison)),
             *bottle_parts(worn),
-            Section("To use the remedy" if mended else "", code=usage_text(mended) if mended else ""),
+            Section("Command with the remedy" if mended else "", code=usage_text(mended) if mended else ""),
             Section("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
             *_pictures(comparison),
-            Section(
-                "What is assumed" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True
-            ),
+            Section("Assumptions" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True),
         ),
         found=_WalkPair(comparison, verdict),
         passed=comparison.is_completed and worn.is_helped,
@@ -263,7 +265,7 @@ def _remarks(comparison: WalkComparison) -> list[str]:
     if supply is not None:
         time = lasted(supply)
         ended = "" if time is None else f"lasts {duration_text(time)}: "
-        bottle = f"bottle {supply.supply.bottle.name}: {ended}{supply.ending.message}"
+        bottle = f"bottle {supply.supply.bottle.label}: {ended}{supply.ending.message}"
     elif "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
         walk_on_it = f"walk on it, {argument_text('bottle', PAPER_BOTTLE)}"
         bottle = f"how long a bottle lasts: {walk_on_it}; here its supply pressure stays as it is set"

@@ -47,7 +47,8 @@ def rig_simulate(
     files = write_rig_recording(out, rig_recording)
     recording = rig_recording.recording
     samples = f"{len(recording)} samples of {', '.join(recording.names)}"
-    text = f"{experiment}: {NOTICE}\n{samples}\nwritten: {out} ({', '.join(files)})"
+    lines = (f"{experiment}: {NOTICE}", rig_recording.truth.get("replaced", ""), samples)
+    text = "\n".join((*filter(None, lines), f"written: {out} ({', '.join(files)})"))
     return CommandOutput(text, {"folder": str(out), "files": list(files), **rig_recording.truth})
 
 
@@ -98,7 +99,7 @@ def rig_record(
         link.close()
     code, aside = output.EXIT_CHECK_FAILED if is_broken else output.EXIT_GOOD, ""
     if collected.is_stopped:
-        code, aside = output.EXIT_INTERRUPTED, f"stopped; {out} is whole"
+        code, aside = output.EXIT_INTERRUPTED, f"stopped; {out} is complete"
     document = {"file": str(out), **collected.document()}
     return output.CommandOutput(f"{collected.text()}\nwritten: {out}", document, exit_code=code, aside=aside)
 

@@ -41,9 +41,11 @@ def check_sources(
         for name in channels:
             if name not in recording:
                 known, hint = CHANNELS[name], nearest_name(name, recording.names)
+                derived = ', or derive it: direction.of = "pressure_difference", with a threshold and a window'
                 raise IdentificationError(
                     f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; "
                     f"the file has {', '.join(recording.names) or 'only time'}; a column map can name it"
+                    f"{derived if name == 'direction' else ''}"
                 )
         for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):
             worst = int(np.argmax(np.abs(values)))

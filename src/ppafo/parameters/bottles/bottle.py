@@ -7,7 +7,7 @@ power of the volume.
 
 import functools
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,7 @@ from ppafo.model.source import (
 from ppafo.parameters.bottles.declaration import FILLS, PATHS, REQUIRED, SECTIONS, WARMING, bottle_file
 from ppafo.parameters.bottles.fluid import Fluid, check_temperature, filled_mass, filling_text, load_fluid
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
-from ppafo.parameters.parameter_set import Entry, allowed_number
+from ppafo.parameters.parameter_set import SOURCE, Entry, allowed_number
 from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import Figure
 from ppafo.units import format_quantity, split_quantity
@@ -77,7 +77,8 @@ def scaled_entries(part: Part, paper: Mapping[str, Entry]) -> dict[str, Entry]:
 class Bottle:
     """Full bottle with its regulator, in SI: volume [m^3], mass of gas [kg], room temperature [K].
 
-    ``entries`` maps each dotted path to its value as given, with the source.
+    ``title`` lists the values that overrides changed. ``entries`` maps each dotted path to its value as given, with the
+    source.
     """
 
     name: str
@@ -93,6 +94,12 @@ class Bottle:
     ice_capacity: float
     hose: Passage
     entries: Mapping[str, Entry]
+
+    @property
+    def label(self) -> str:
+        """Name for sentences and titles of figures, with a remark if overrides changed values."""
+        is_changed = any(entry.source == SOURCE for entry in self.entries.values())
+        return f"{self.name} (values changed)" if is_changed else self.name
 
     @property
     def supply(self) -> ColdSupply:
@@ -158,7 +165,8 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     if part is not None:
         parsed = parsed.model_copy(update={"name": part.name, "title": f"{part.maker}: {part.model}, with a regulator"})
         entries, file = scaled_entries(part, entries), part.name
-    for path, override in override_set(read_overrides(overrides), forms=FILLS).items():
+    changes = override_set(read_overrides(overrides), forms=FILLS)
+    for path, override in changes.items():
         if path not in PATHS:
             raise ParameterError(f"override '{override}': a bottle has no value '{path}'{nearest_name(path, PATHS)}")
         with refused_as(ParameterError, f"override '{override}'", UnitError):
@@ -166,8 +174,9 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
         # A new form of the filling replaces the old one: two forms would contradict each other.
         for other in other_forms(path, FILLS):
             entries.pop(other, None)
-        entries[path] = Entry(value=value, unit=unit, origin="assumed", source="override")
-    return _build(parsed, entries, file)
+        entries[path] = Entry(value=value, unit=unit, origin="assumed", source=SOURCE)
+    bottle, changed = _build(parsed, entries, file), ", ".join(map(str, changes.values()))
+    return replace(bottle, title=f"{bottle.title} (values changed: {changed})") if changes else bottle
 
 
 def _entries_of(parsed: Any) -> dict[str, Entry]:

@@ -41,6 +41,19 @@ def needed_metrics(scenario: Scenario) -> tuple[str, ...]:
     return (*(SETTLED_METRICS if scenario.follows_reference else _OF_WALK), REVERSALS)
 
 
+def command_turning(scenario: Scenario, metrics: Mapping[str, Floats], most_reversals: float) -> Floats:
+    """Command reversals of each run divided by their limit (runs,): above 1 the loop oscillates; 0 if unknown.
+
+    Under sensor noise the reversals of the last half of the settled part count, if known. Arguments as in
+    ``tracking_excess``.
+    """
+    none = np.zeros(next(iter(metrics.values())).size)
+    if not is_noisy(scenario) or "settled_reversals" not in metrics:
+        return np.nan_to_num(metrics.get(REVERSALS, none)) / most_reversals
+    often = most_reversals / max(float(first(scenario.run.duration)), 1.0)
+    return np.nan_to_num(metrics["settled_reversals"]) / often
+
+
 def tracking_excess(scenario: Scenario, metrics: Mapping[str, Floats], most_reversals: float, least: float) -> Floats:
     """Largest number of each run divided by its limit (runs,): up to 1 the run follows; nan if unknown.
 
@@ -49,10 +62,7 @@ def tracking_excess(scenario: Scenario, metrics: Mapping[str, Floats], most_reve
     """
     runs = next(iter(metrics.values())).size
     none = np.full(runs, np.nan)
-    turning = np.nan_to_num(metrics.get(REVERSALS, none)) / most_reversals
-    if is_noisy(scenario):
-        often = most_reversals / max(float(first(scenario.run.duration)), 1.0)
-        turning = np.nan_to_num(metrics.get("settled_reversals", none)) / often
+    turning = command_turning(scenario, metrics, most_reversals)
     numbers = {name: metrics.get(name, none) for name in needed_metrics(scenario)}
     with np.errstate(divide="ignore", invalid="ignore"):
         if not scenario.follows_reference:

@@ -20,6 +20,7 @@ from ppafo.simulation.tracking.rule import (
     torque_limit,
 )
 from ppafo.units.shown import in_units
+from ppafo.wording import subject_text
 
 if TYPE_CHECKING:
     from ppafo.simulation.at_hand import RecordedResult
@@ -94,7 +95,7 @@ def coarse_pair(scenario: Scenario) -> str:
     step_text, wanted_text = change_text(controlled.name, step), change_text(controlled.name, wanted)
     smaller = smaller_pair(scenario, ratio)[0].text
     return (
-        f"{scenario.name}: the pair of valves changes the {controlled.words} by {step_text} in its dead time of "
-        f"{1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the {wanted_text} wanted: {smaller}, faster valves or larger "
-        "chambers make that step smaller"
+        f"{subject_text(scenario.name)}: the pair of valves changes the {controlled.words} by {step_text} in its dead "
+        f"time of {1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the {wanted_text} wanted: {smaller}, faster valves or "
+        "larger chambers make that step smaller"
     )

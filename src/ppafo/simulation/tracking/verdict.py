@@ -168,55 +168,47 @@ def following_text(result: "RecordedResult") -> str:
     judged = _judged(result)
     # A walk without a requested torque has nothing to follow.
     if judged is None:
-        return _undecided_text(scenario, len(result.recording), None) if scenario.follows_reference else ""
-    case = judged[0]
-    settled, is_task = case.settled, scenario.follows_reference
+        few = f"{len(result.recording)} samples are too few"
+        return _undecided_text(scenario, few) if scenario.follows_reference else ""
+    case, settled = judged[0], judged[0].settled
     if case.failure is not None:
         return ""
     if settled.ends_on_ramp:
-        return _undecided_text(scenario, len(result.recording), settled.error)
+        error = change_text(controlled.name, settled.error)
+        return _undecided_text(scenario, f"the run ends on the ramp of its reference, with an RMS error of {error}")
 
     def judged_text(name: str, number: float, limit: float | None, why: str = "") -> str:
         allowed = "" if limit is None else f" ({change_text(controlled.name, limit)} allowed{why})"
         return f"{name} {change_text(controlled.name, number)}{allowed}"
 
-    if not is_task:
-        rms = judged_text("RMS error", settled.error, LARGEST_SHARE_OF_WAVE * settled.wanted)
-        return f"the {controlled.words} follows its reference: {rms}"
+    begin, rms = f"the {controlled.words} follows its reference: ", ("RMS error", settled.error)
+    if not scenario.follows_reference:
+        return begin + judged_text(*rms, LARGEST_SHARE_OF_WAVE * settled.wanted)
     # The limit of valves without gradual openings is several times wider, and the swing tells what it hides.
     why = ", as its valves are only open or shut" if case.only_switches else ""
-    rms = judged_text("RMS error", settled.error, float(largest_error(settled, case.only_switches)), why)
-    is_limited = settled.way > 0.0 and not case.only_switches
-    name, number = ("swing", settled.span) if settled.rests else ("largest error", settled.worst)
-    deviation = judged_text(name, number, float(largest_deviation(settled)) if is_limited else None)
+    limit = float(largest_deviation(settled)) if settled.way > 0.0 and not case.only_switches else None
+    deviation = ("swing", settled.span) if settled.rests else ("largest error", settled.worst)
+    texts = judged_text(*rms, float(largest_error(settled, case.only_switches)), why), judged_text(*deviation, limit)
     # A reference just beyond reach is missed by no more than is allowed.
     beyond = torque_beyond_reach(case)
-    short = "" if beyond is None else f"; {beyond.text}"
-    return f"the {controlled.words} follows its reference: {rms}, {deviation}{time_text(settled.start)}{short}"
+    return f"{begin}{', '.join(texts)}{time_text(settled.start)}{'' if beyond is None else f'; {beyond.text}'}"
 
 
-def _undecided_text(scenario: Scenario, samples: int, error: float | None) -> str:
-    """Reason why a task has no verdict, and times with which it has one.
-
-    ``error`` is the RMS error of a run that ends on its ramp, None for a run with too few samples.
-    """
-    run, controlled = scenario.run, CONTROLLED[scenario.controlled]
-    reason = f"{samples} samples are too few"
-    if error is not None:
-        reason = (
-            f"the run ends on the ramp of its reference, with an RMS error of {change_text(controlled.name, error)}"
-        )
+def _undecided_text(scenario: Scenario, reason: str) -> str:
+    """Reason why a task has no verdict, and times with which it has one."""
+    run, count = scenario.run, _SAMPLES_ADVISED
     for times in (2.0**power for power in range(_MOST_DOUBLINGS)):
         duration = times * run.duration
-        reference = profile_values(scenario.reference, np.linspace(0.0, duration, _SAMPLES_ADVISED))[0]
+        reference = profile_values(scenario.reference, np.linspace(0.0, duration, count))[0]
         ways = np.diff(reference) * (reference[-1] - reference[0])
-        if duration < _SAMPLES_ADVISED * run.step or (np.all(ways >= 0.0) and ways[_SAMPLES_ADVISED // 2 :].any()):
+        if duration < count * run.step or (np.all(ways >= 0.0) and ways[count // 2 :].any()):
             continue
         changes = [f"run.duration={duration:.12g} s"] if times > 1.0 else []
-        if run.output_interval > duration / _SAMPLES_ADVISED:
-            changes.append(f"run.output_interval={duration / _SAMPLES_ADVISED:.12g} s")
-        return f"no verdict on the {controlled.words}: {reason}; {override_text(changes)} gives one"
-    return f"no verdict on the {controlled.words}: {reason}; a shorter ramp gives one"
+        changes += [f"run.output_interval={duration / count:.12g} s"] if run.output_interval > duration / count else []
+        return (
+            f"no verdict on the {CONTROLLED[scenario.controlled].words}: {reason}; {override_text(changes)} gives one"
+        )
+    return f"no verdict on the {CONTROLLED[scenario.controlled].words}: {reason}; a shorter ramp gives one"
 
 
 def time_text(since: float) -> str:

@@ -15,7 +15,6 @@ from ppafo.walking.figures.legs import (
     DRAGS,
     GHOST,
     LegPostures,
-    drags,
     draw_ground,
     last_phases,
     leg_artists,
@@ -69,7 +68,7 @@ class _Scene:
         ghost, worn = self.artists
         ghost.place(self.legs.healthy, index, offset)
         worn.place(self.legs.worn, index, offset)
-        worn.foot.set_color(DRAGS if drags(self.legs, index) else self.colour)
+        worn.foot.set_color(DRAGS if self.legs.drags[index] else self.colour)
         parts = (ghost.shank, worn.shank, worn.foot, ghost.foot, worn.joint)
         return [self.ticks, *parts]
 

@@ -81,7 +81,7 @@ def bottle_figure(result: WalkResult) -> "Figure":
             panel(Kind("Left in the bottle", "kg", "gas mass"), left, largest=supply.supply.mass),
         ],
         size=(5.4, 1.6),
-        title=f"{result.scenario.name} on {supply.supply.bottle.name}",
+        title=f"{result.scenario.name} on {supply.supply.bottle.label}",
         note=f"End: {supply.ending.message}.",
         kind=recording.kind,
     )

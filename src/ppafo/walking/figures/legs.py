@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 GHOST = "#5a5a5a"
 """Colour of the healthy foot: dark enough to be visible in front of a coloured foot."""
 DRAGS = "#a4001d"
-DRAG_LIMIT = -0.01
-"""Toe height [m] below which the toes are drawn as dragging; hip and knee could compensate for less."""
 
 CHAMBERS = (("pressure_1", "plantarflexion", CHAMBER_1), ("pressure_2", "dorsiflexion", CHAMBER_2))
 """Channel, name and line style of each chamber."""
@@ -49,24 +47,32 @@ _VIEW = (-0.36, 0.86)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LegPostures:
-    """Postures in a walk and in the healthy gait at the same instants, and their running phases [strides]."""
+    """Postures in a walk and in the healthy gait at the same instants, and their running phases [strides].
+
+    ``drags``: True at instants of mid-swing with toes below the ground, as in the metric ``lowest_toes``
+    """
 
     turns: Floats
     worn: Posture
     healthy: Posture
+    drags: list[bool]
 
 
 def legs_of(result: WalkResult, turns: Floats) -> LegPostures:
     """Return the postures of a walk at running phases [strides], counted from the start of the recording."""
     configuration, recording = result.scenario, result.recording
     gait = walk_of(configuration).gait
-    path = ankle_path(gait, gait_timing(gait), walk_of(configuration).wearer)
+    timing = gait_timing(gait)
+    path = ankle_path(gait, timing, walk_of(configuration).wearer)
     # All strides have the stride time of the gait.
     times = turns * gait.stride_time
     shank, angle, healthy = (
         np.interp(times, recording.time, recording[name]) for name in ("shank_angle", "angle", "healthy_angle")
     )
-    return LegPostures(turns, path.posture(turns, shank, angle), path.posture(turns, shank, healthy))
+    worn, phases = path.posture(turns, shank, angle), turns % 1.0
+    must_clear = (phases >= timing.clearance_from) & (phases < timing.clearance_to)
+    drags = (must_clear & (worn.toe[:, 1] < 0.0)).tolist()
+    return LegPostures(turns, worn, path.posture(turns, shank, healthy), drags)
 
 
 def last_phases(result: WalkResult, strides: int, per_stride: int) -> Floats:
@@ -127,11 +133,6 @@ def draw_ground(axes: "Axes", left: float, right: float) -> None:
     axes.fill_between([left, right], [-0.25, -0.25], [0.0, 0.0], color="#f1f1f1", linewidth=0.0, zorder=0)
 
 
-def drags(legs: LegPostures, index: int) -> bool:
-    """Return True if the toes are more than 1 cm below the ground."""
-    return bool(legs.worn.toe[index, 1] < DRAG_LIMIT)
-
-
 def frames_figure(comparison: WalkComparison) -> "Figure":
     """Return a figure of instants of one stride, without the device (top) and with the device (bottom)."""
     from matplotlib.figure import Figure
@@ -147,7 +148,7 @@ def frames_figure(comparison: WalkComparison) -> "Figure":
         rows = figure.subplots(2, 1, sharex=True)
         _draw_frames(rows[0], comparison.without_device, "without the device", WITHOUT, count)
         _draw_frames(rows[1], comparison.with_device, "with the device", WITH, count)
-        remark = "outline: healthy foot; cross: toes more than 1 cm below ground"
+        remark = "outline: healthy foot; cross: toes below ground in mid-swing"
         worn = comparison.with_device
         write_head(figure, f"{worn.scenario.name}: one stride", remark, worn.recording.kind)
         return figure
@@ -166,7 +167,7 @@ def _draw_frames(axes: "Axes", result: WalkResult, label: str, colour: str, coun
         offset = legs.healthy.ankle[index, 0] - middle
         leg_artists(axes, GHOST, 1.0, is_ghost=True).place(legs.healthy, index, offset)
         leg_artists(axes, colour, 2.2).place(legs.worn, index, offset)
-        if drags(legs, index):
+        if legs.drags[index]:
             toe = legs.worn.toe[index] - (offset, 0.0)
             axes.plot(toe[0], toe[1], "x", color=DRAGS, markersize=7, markeredgewidth=1.8, zorder=5)
         percent = f"{100.0 * (turns[index] % 1.0):.0f} %"

@@ -26,7 +26,7 @@ STRIDE = Kind("Stride", "1", "fraction")
 ANGLE = Kind("Ankle angle; 0 neutral, dorsiflexion positive", "rad", "angle")
 PRESSURE = Kind("Gauge pressure; dashed: dorsiflexion chamber", "Pa_d", "pressure change")
 ONE_PRESSURE = Kind("Gauge pressure", "Pa_d", "pressure change")
-TOES = Kind("Toe height above ground; below -1 the toes drag", "m", "body length")
+TOES = Kind("Toe height above ground; below 0 in mid-swing the toes drag", "m", "body length")
 _CHANNELS = {
     ANGLE: ("angle",),
     Kind("Torque on the wearer, $T_{ex}$", "N m", "torque"): ("external_torque",),

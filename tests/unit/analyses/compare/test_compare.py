@@ -1,5 +1,6 @@
 """Comparisons: pairs on known distributions, and configurations on tasks."""
 
+import ast
 import math
 from dataclasses import replace
 
@@ -166,8 +167,51 @@ def test_a_remedy_that_is_said_was_tried() -> None:
     beyond = ppafo.load_scenario("torque-task-proportional", ["reference.level=9 N m"])
     remarks = compare({"beyond": beyond, "paper": ppafo.load_scenario("torque-task-proportional")}).found.remarks
     said = next(text for text in remarks if text.startswith("beyond"))
-    assert "with overrides=['supply.pressure=" in said
+    assert "with overrides=['beyond:supply.pressure=94.5 psi_g'] it follows" in said
     assert "it follows, as a further run shows; it is not among the best" in said
+
+
+UNKNOWN_GAINS = {
+    "schema_version": 1,
+    "name": "two",
+    "description": "A law whose gains follow the device, beside a law without gains.",
+    "configurations": [
+        {"name": "PD, own", "scenario": "torque-task-proportional", "overrides": ["controller.kind=sliding_mode"]},
+        {"name": "solenoid", "scenario": "torque-task-solenoid"},
+    ],
+    "sample": {"method": "sobol", "runs": 64, "seed": 1},
+    "vary": [{"path": "actuator.dead_volume_1", "kind": "uniform", "minimum": "30 cm^3", "maximum": "40 cm^3"}],
+    "outputs": {"metrics": ["rms_error"]},
+}
+
+
+def test_a_remedy_for_one_configuration_is_addressed_to_it_and_taken_by_the_command_that_says_it() -> None:
+    def said(overrides: list[str]) -> list[str]:
+        # Where a task is repeated, a remark is not.
+        tasks = {"whole": [], "short": ["run.duration=2.5 s"]}
+        return compare(study=UNKNOWN_GAINS, draws=32, tasks=tasks, overrides=overrides).found.remarks
+
+    (gains,) = (text for text in said([]) if "computed anew" in text)
+    (pair,) = (text for text in said([]) if "the pair of valves changes" in text)
+    assert gains.startswith("PD, own: ")
+    assert pair.startswith("solenoid: ")
+    overrides = [ast.literal_eval(text[text.index("overrides=[") + 10 : text.index("]") + 1]) for text in (gains, pair)]
+    together = [*overrides[0], *overrides[1]]
+    assert all(text.startswith("PD, own:controller.") for text in overrides[0])
+    assert overrides[1] == ["solenoid:valve.area=6.9 mm^2"]
+    assert not [text for text in said(together) if "overrides=" in text]
+    assert ppafo.sweep(UNKNOWN_GAINS, overrides=together).found.summary["completed"] == 128
+
+
+def test_an_override_that_one_configuration_lacks_names_it_and_the_way_to_another() -> None:
+    given = ["torque-task-proportional", "torque-task-solenoid"]
+    with pytest.raises(StudyError) as caught:
+        compare(given, overrides=["controller.proportional_gain=1 1/(N m)"])
+    assert str(caught.value).startswith("configuration 'torque-task-solenoid': override 'controller.proportional_gain")
+    assert "did you mean" not in str(caught.value)
+    assert "for 'torque-task-proportional' alone: overrides=['torque-task-proportional:PATH=" in str(caught.value)
+    with pytest.raises(StudyError, match="there is no configuration 'solenoid', did you mean 'torque-task-solenoid'"):
+        compare(given, overrides=["solenoid:valve.area=5 mm^2"])
 
 
 def test_mistakes_are_one_line() -> None:

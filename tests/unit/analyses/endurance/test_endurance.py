@@ -185,3 +185,13 @@ def test_a_run_on_another_gas_than_the_bottle_holds_is_refused(tmp_path: Path) -
     with pytest.raises(ppafo.DataError, match=r"uses gas of 28\.9. g/mol, but bottle 'paper-co2-9oz' contains CO2"):
         ppafo.bottle(tmp_path / "task")
     assert ppafo.bottle(tmp_path / "task", bottle="air-48ci-3000psi").found.discharge.walking_time > 0.0
+
+
+def test_a_bottle_with_changed_values_says_so_and_one_without_does_not() -> None:
+    changes = ["bottle.volume=500 cm^3", "bottle.gas_mass=300 g"]
+    shipped, changed = (
+        endurance(bottle="co2-3_5oz", gas_per_stride="0.4 g", overrides=given) for given in ([], changes)
+    )
+    assert "changed" not in f"{shipped.said} {shipped.parts[1].title}"
+    assert changed.said[0].endswith("(values changed: bottle.gas_mass=300 g, bottle.volume=500 cm^3)")
+    assert changed.parts[1].title.startswith("co2-3_5oz (values changed): 0.4 g per stride")

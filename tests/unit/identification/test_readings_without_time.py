@@ -1,0 +1,42 @@
+"""Readings of a bench without a column of times, where the law has no time in it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.analyses.identify.question import identify
+from ppafo.errors import DataError, IdentificationError
+
+HEAD = 'schema_version = 1\nname = "bench"\ndevice.set = "ppafo2011"\n'
+BRANCH = np.tile(np.repeat([1.0, -1.0], 6), 3)
+PRESSURE = np.tile(np.concatenate((np.linspace(0.0, 50.0, 6), np.linspace(50.0, 0.0, 6))), 3)
+NOISE = 0.003 * np.random.default_rng(7).standard_normal(PRESSURE.size)
+TORQUE = 0.1 * PRESSURE - 0.45 * BRANCH + NOISE
+
+
+def problem(folder: Path, columns: str, kind: str = "static-torque") -> Path:
+    rows = "".join(f"75,{p},{t},{b}\n" for p, t, b in zip(PRESSURE, TORQUE, BRANCH, strict=True))
+    (folder / "readings.csv").write_text(f"{columns}\n{rows}", encoding="utf-8")
+    file = folder / "problem.toml"
+    file.write_text(f'{HEAD}[[procedure]]\nkind = "{kind}"\nrecordings = ["readings.csv"]\n', encoding="utf-8")
+    return file
+
+
+def test_static_torque_needs_no_column_of_times(tmp_path: Path) -> None:
+    columns = "angle [deg],pressure_difference [psi_d],torque [N m],direction [-]"
+    found = identify(problem(tmp_path, columns)).found.results[0]
+    assert found["friction.static_torque"].value == pytest.approx(0.45, rel=0.03)
+    assert found["actuator.torque_constant"].value == pytest.approx(0.1 / 6894.757, rel=0.02)
+
+
+def test_a_decay_needs_times_and_the_message_says_how_a_table_without_them_is_read(tmp_path: Path) -> None:
+    columns = "angle [deg],pressure_difference [psi_d],torque [N m],direction [-]"
+    with pytest.raises(DataError, match=r'it is \'angle\'.*without times the map has time = \{ rate = "100 Hz" \}'):
+        identify(problem(tmp_path, columns, "free-decay"))
+
+
+def test_a_missing_direction_is_told_the_table_that_derives_it(tmp_path: Path) -> None:
+    columns = "angle [deg],pressure_difference [psi_d],torque [N m],state [-]"
+    with pytest.raises(IdentificationError, match=r"or derive it: direction.of = \"pressure_difference\""):
+        identify(problem(tmp_path, columns))
