@@ -143,7 +143,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     """Return a linear model as a finding with sentences, tables and panels."""
     when = "in its steady state" if model.time is None else f"at {model.time:g} s"
     validity = Section(
-        "How far it holds",
+        "Range of validity",
         panels=partial(steps_panels, model),
         name="steps",
         caption=_STEPS_CAPTION,
@@ -192,7 +192,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         said=sentences,
         parts=[
             _point(model),
-            Section("Which side was taken", facts(model.sides.items()), remarks=remarks),
+            Section("Side of the kink", facts(model.sides.items()), remarks=remarks),
             _poles(model),
             _loop(model),
             *matrices,
