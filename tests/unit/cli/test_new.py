@@ -136,3 +136,9 @@ def test_a_copy_that_does_not_load_is_not_left(capsys: pytest.CaptureFixture[str
     assert main(["new", "scenario", "task", "--from", "task.toml", "--out", "other/task.toml"]) == 2
     assert "bench.toml" in capsys.readouterr().err
     assert not list(Path().glob("other/*"))
+
+
+def test_the_command_in_a_new_study_writes_into_a_folder_whatever_the_name_of_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "st.toml"
+    assert main(["new", "study", "st", "--from", "pressure-and-area", "--out", str(file)]) == 0
+    assert f"#   ppafo sweep {file} --out out/st\n" in file.read_text(encoding="utf-8")
