@@ -32,7 +32,9 @@ test-all: check
 
 # The short tests of what fits and compares, with the linear algebra of other processors, older than that of this computer.
 PROCESSORS ?= Haswell Nehalem
-FITTING := tests/unit/identification tests/unit/validation tests/unit/studies tests/contract/test_bad_recordings.py
+FITTING := $(addprefix tests/unit/,identification/bench identification/trajectory $(addprefix identification/test_,fit.py\
+	identify.py trajectory_section.py) $(addprefix validation/test_,causes.py compare_recording.py inputs.py)\
+	$(addprefix studies/test_,draws.py sampling.py))
 test-processors: $(READY)
 	set -e; for kernel in $(PROCESSORS); do OPENBLAS_CORETYPE=$$kernel $(TESTS) -m "not long" $(FITTING); done
 

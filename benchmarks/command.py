@@ -29,5 +29,5 @@ def run_command(
         print(f"{prog}: {one_line(error)}", file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
-        print(f"{prog}: interrupted; nothing is half written", file=sys.stderr)
+        print(f"{prog}: interrupted; no file is incomplete", file=sys.stderr)
         return EXIT_INTERRUPTED

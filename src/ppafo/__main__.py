@@ -23,7 +23,7 @@ def start() -> int:
         # Python wraps an interrupt that falls into the making of a class, pydantic makes another error of it.
         if not (isinstance(error, KeyboardInterrupt) or interrupts.is_interrupted()):
             raise
-        sys.stderr.write("ppafo: interrupted; nothing is half written\n")
+        sys.stderr.write("ppafo: interrupted; no file is incomplete\n")
         return 130
 
 

@@ -7,7 +7,7 @@ import _signal  # type: ignore[import-not-found]
 import os
 import sys
 
-_LINE = b"ppafo: interrupted; nothing is half written\n"
+_LINE = b"ppafo: interrupted; no file is incomplete\n"
 _EXIT_CODE = 130
 _COMMANDS = ("ppafo", "ppafo.exe", "ppafo-script.py")
 

@@ -17,8 +17,9 @@ from ppafo.cli.main import main
 from ppafo.engine.lanes import LaneBlock
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
-from ppafo.exports.c_library import c_library, library_of
+from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.exported import COUNTS
+from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.library import c_identifier
 from ppafo.exports.fmu.interface import closed_loop
 from ppafo.exports.fmu.platforms import host_platform
@@ -164,7 +165,7 @@ def test_an_exported_library_makes_the_numbers_of_a_run_that_python_makes(name: 
     places = {item.path: place for place, item in enumerate(library.settings)}
     assert {AREA, "effects.mesh.discharge_coefficient"} <= set(places)
     assert not any(path.startswith("effects.silencer.") for path in places)
-    for file, content in c_library(walked).items():
+    for file, content in library_files(library).items():
         (tmp_path / file).write_bytes(content)
     source = tmp_path / f"{c_identifier(walked.name)}.c"
     built = ctypes.CDLL(str(shared_library(source, "-O0", "-ffp-contract=off", "-Dstatic=", "-Wl,-Bsymbolic", "-w")))

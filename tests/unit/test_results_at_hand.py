@@ -36,6 +36,11 @@ def _tuned() -> Any:
     return ppafo.tune(replace(problem, effort=effort))
 
 
+def _designed() -> Any:
+    problem = ppafo.load_design("push-off")
+    return ppafo.design(replace(problem, valves=problem.valves[:1], gain_factors=(1.0,), simulated=1))
+
+
 MADE: dict[str, Callable[[], Any]] = {
     "simulate": lambda: ppafo.simulate(TASK),
     "simulate_many": lambda: ppafo.simulate_many([TASK, "torque-task-solenoid"]),
@@ -45,7 +50,7 @@ MADE: dict[str, Callable[[], Any]] = {
     "endurance_of_walk": lambda: ppafo.endurance_of_walk(ppafo.walk("solenoid", minutes=0.1)),
     "evaluate": lambda: ppafo.evaluate(ppafo.simulate(TASK).recording),
     "audit": lambda: ppafo.audit("ppafo2011"),
-    "design": lambda: ppafo.design("push-off"),
+    "design": _designed,
     "tune": _tuned,
     "apply_overrides": lambda: ppafo.apply_overrides(ppafo.load_parameter_set("ppafo2011"), {"valve.area": 3.0e-6}),
     "load_catalogue": ppafo.load_catalogue,

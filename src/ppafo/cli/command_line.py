@@ -165,7 +165,7 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
         metavar="MODULE",
         action="append",
         default=[],
-        help="a module of yours that files may name, such as laws.py",
+        help="your own Python module that files refer to, such as laws.py",
     )
     if OUT not in names:
         help_text = "also write the result as files into this folder"

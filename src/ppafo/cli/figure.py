@@ -1,5 +1,7 @@
 """``ppafo export figure DIR``: redraws the figures of a result folder without a new run."""
 
+import sys
+
 from ppafo.arguments import FigureWidth, File, Folder
 from ppafo.cli import output
 from ppafo.cli.output import CommandOutput
@@ -22,7 +24,6 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
     >>> print(export_figure(folder).text)
     written: step/figure.png, step/figure.svg
     """
-    import ppafo
     from ppafo.report.recording_figure import FIGURE_FORMATS
     from ppafo.report.style import drawn_at, render_figure
     from ppafo.storage.files import write_file
@@ -45,7 +46,8 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
         message, document = what_is_there(folder, names)
         command, stems = document["command"], [name.removesuffix(".png") for name in document["figures"]]
         again = ""
-        if stems and hasattr(ppafo, command):
+        # Not every command is a function of the package, which no module imports.
+        if stems and hasattr(sys.modules["ppafo"], command):
             call = f"ppafo.{command}(...).plot({stems[0]!r}, width='84 mm').savefig('{stems[0]}.pdf')"
             again = f"; for another form or width, in Python with the arguments of the command: {call}"
         if out is not None or width is not None:

@@ -111,7 +111,7 @@ def _said(ran: "HardwareRun", port: str, folder: Path) -> CommandOutput:
         "folder": str(folder),
     }
     if traffic.is_stopped:
-        aside = f"stopped at {traffic.vented_at:.6g} s and vented; {folder} is whole"
+        aside = f"stopped at {traffic.vented_at:.6g} s and vented; {folder} is complete"
         return CommandOutput(text, document, exit_code=EXIT_INTERRUPTED, aside=aside)
     if ran.is_good:
         return CommandOutput(text, document)

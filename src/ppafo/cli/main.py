@@ -184,5 +184,5 @@ def _run(words: list[str]) -> int:
             print(f"{'  ' if number else 'ppafo: '}{shown}", file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt as interrupt:
-        print(f"ppafo: {str(interrupt) or 'interrupted; nothing is half written'}", file=sys.stderr)
+        print(f"ppafo: {str(interrupt) or 'interrupted; no file is incomplete'}", file=sys.stderr)
         return EXIT_INTERRUPTED

@@ -186,5 +186,8 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
         rest = f"\nparent = {value_text(parent)}{_PARENT_LINE.sub('', rest, count=1)}"
     text = f'{head}name = "{name}"{rest}'
     # A file of the package shows in its first lines how it is run.
-    shown = [line.replace(named[2], str(path)) if line.startswith("#   ppafo ") else line for line in text.split("\n")]
-    return "\n".join(shown)
+    renamed = {named[2]: shlex.quote(str(path)), f"out/{named[2]}": f"out/{name}"}
+    return "\n".join(
+        " ".join(renamed.get(word, word) for word in line.split(" ")) if line.startswith("#   ppafo ") else line
+        for line in text.split("\n")
+    )

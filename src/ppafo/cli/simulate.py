@@ -128,7 +128,7 @@ def _text(report: _RunReport) -> str:
     if report.check is not None:
         accuracy = [repr(report.check)]
     # Gains that are in force are no news: they stand last.
-    last = [*accuracy, *report.gain_text, *(f"\nTo use the remedy\n{text}" for text in report.usage)]
+    last = [*accuracy, *report.gain_text, *(f"\nCommand with the remedy\n{text}" for text in report.usage)]
     return "\n".join([*head, *metrics_lines(report.result.metrics), *([""] if last else []), *last])
 
 
@@ -170,16 +170,16 @@ def finding_of(report: _RunReport) -> "Finding[None]":
         said=(" ".join(scenario.description.split()), f"{device}{changed if scenario.origin.overrides else ''}"),
         parts=(
             Section(remarks=(*(() if status.is_completed else (f"The run {status.message}",)), *report.verdict)),
-            Section("Metrics", columns_of(("Metric", "Value", "What it is"), rows), left=3),
+            Section("Metrics", columns_of(("Metric", "Value", "The run"), rows), left=3),
             Section(
                 "Over time",
                 name="figure",
                 caption="What the device does over time. Pressures count from the atmosphere.",
                 draw=result.plot,
             ),
-            Section() if check is None else Section("What can be repeated", code=repr(check)),
+            Section() if check is None else Section("Repeatability", code=repr(check)),
             Section(remarks=report.gain_text),
-            *(Section("To use the remedy", code=text) for text in report.usage),
+            *(Section("Command with the remedy", code=text) for text in report.usage),
         ),
         found=None,
         live=lambda: live_part([scenario]),

@@ -19,6 +19,7 @@ from ppafo.gait.mean_stride import MeanStride
 from ppafo.gait.plausible import STANCE_FRACTION, force_remarks
 from ppafo.gait.plausible_angles import MIDSTANCE
 from ppafo.signals.recording import Floats
+from ppafo.units import without_exponent
 
 LARGEST_DELAY = 0.03
 """Largest plausible delay [s] of a curve relative to its usual time (at most 0.016 in the recorded strides)."""
@@ -167,12 +168,14 @@ def size_remarks(walk: MeanStride) -> list[str]:
         arm = peak / (STANDARD_GRAVITY * float(force[np.argmax(moment)]))
     if arm is not None and not USUAL_LEVER[0] <= arm <= USUAL_LEVER[1]:
         remarks.append(
-            f"ankle_moment reaches {peak:.3g} N m/kg, which is the vertical force at {100.0 * arm:.0f} cm from the "
+            f"ankle_moment reaches {without_exponent(peak, '.3g')} N m/kg,"
+            f" which is the vertical force at {100.0 * arm:.0f} cm from the "
             f"ankle, usual are {100.0 * USUAL_LEVER[0]:.0f} to {100.0 * USUAL_LEVER[1]:.0f} cm: {why}"
         )
     elif arm is None and peak > 0.0 and not USUAL_MOMENT[0] <= peak <= USUAL_MOMENT[1]:
         remarks.append(
-            f"ankle_moment reaches {peak:.3g} N m/kg, usual are {USUAL_MOMENT[0]:g} to {USUAL_MOMENT[1]:g} N m/kg: "
+            f"ankle_moment reaches {without_exponent(peak, '.3g')} N m/kg,"
+            f" usual are {USUAL_MOMENT[0]:g} to {USUAL_MOMENT[1]:g} N m/kg: "
             f"{why}"
         )
     return remarks

@@ -23,7 +23,7 @@ _SUMMARIES = {
     "ankle_angle": "ankle angle, 90 deg neutral, growing in plantarflexion",
     "ankle_moment": "internal ankle moment per body mass, above 0 in plantarflexion",
     "vertical_force": "vertical ground reaction on this foot in body weights, above 0 upwards",
-    "centre_of_pressure": "where it acts, forward of the ankle along the foot; without meaning in swing",
+    "centre_of_pressure": "centre of pressure, forward of the ankle along the foot; undefined in swing",
     "knee_forward": "acceleration of the knee in walking direction",
     "knee_up": "acceleration of the knee upwards, without gravity",
 }
@@ -53,7 +53,10 @@ def gait_file() -> type[BaseModel]:
         "recorded_speed": optional(text, "speed at which the curves were recorded, where it is another one"),
     }
     stride = {
-        "time": (text, Field(description="from one heel strike to the next of the same foot, such as '1.04 s'")),
+        "time": (
+            text,
+            Field(description="stride time, from one heel strike to the next of the same foot, such as '1.04 s'"),
+        ),
         "time_deviation": optional(text, "its standard deviation between strides"),
         "stance_share": (text, Field(description="fraction of the stride until toe-off, such as '62 percent'")),
         "stance_share_deviation": optional(text, "its standard deviation between strides"),

@@ -15,6 +15,7 @@ from ppafo.gait.mean_stride import CLEARLY_BETTER, MeanStride, SignSource, other
 from ppafo.gait.plausible_angles import check_ankle, check_ankle_range, check_shank
 from ppafo.gait.plausible_knee import check_knee, check_knee_means
 from ppafo.signals.recording import Floats
+from ppafo.units import without_exponent
 
 STANCE_FRACTION = (0.45, 0.85)
 STRIDE_TIME = (0.5, 3.0)
@@ -121,7 +122,8 @@ def check_moment(walk: MeanStride) -> None:
     peak, (low, high) = float(np.max(moment)), MOMENT_PEAK
     if not low <= peak <= high:
         raise DataError(
-            f"{where} reaches {peak:.3g} N m/kg, plausible is {low:g} to {high:g} N m/kg; check the body mass and "
+            f"{where} reaches {without_exponent(peak, '.3g')} N m/kg,"
+            f" plausible is {low:g} to {high:g} N m/kg; check the body mass and "
             "the unit (N m, N m/kg, N mm/kg)"
         )
 

@@ -163,7 +163,10 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
     is_at_bound = ((point - runs.low < near) & (gradient > 0.0)) | ((runs.high - point < near) & (gradient < 0.0))
     names = [number.name for number in runs.numbers]
     # Against the value that was found: against the start a far start would make a known number unknown.
-    typical = np.where((runs.low > 0.0) & (runs.prior == 0.0), point, 1.0)
+    # Where the model lacks something, that may be what moves a number so far from its start.
+    conflict = conflict_of(runs, linear.rows, point, ~is_at_bound, freedom) or too_smooth(sensors)
+    moved = point if conflict is None else np.minimum(point, 1.0)
+    typical = np.where((runs.low > 0.0) & (runs.prior == 0.0), moved, 1.0)
     # What is assumed of each number widens the interval of every one by its share of the variance [-].
     fractions = np.square(covariance * runs.prior) / np.diag(covariance)[:, None]
     shares = {
@@ -180,7 +183,7 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
         correlation={channel: len(noise.reflection) + (noise.gain > 0.0) for channel, noise in sensors.items()},
         residuals=end.residuals,
         outliers=tuple(outliers.tolist()),
-        conflict=conflict_of(runs, linear.rows, point, ~is_at_bound, freedom) or too_smooth(sensors),
+        conflict=conflict,
         unidentified=tuple(unidentified(covariance / np.outer(typical, typical), names)),
         shares=shares,
         evaluations=runs.evaluations,

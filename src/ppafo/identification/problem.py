@@ -37,9 +37,7 @@ class ProblemFile(StrictTable):
     name: str = Field(pattern=NAME, max_length=100, description="name of the new parameter set")
     title: str = Field("", description="title of the new parameter set")
     device: DeviceProblem = Field(description="the set to start from")
-    citation: Citation | None = Field(
-        None, description="authors of the measurements; default: those of the set to start from"
-    )
+    citation: Citation | None = Field(None, description="authors of the measurements; default: as in the starting set")
     columns: dict[str, ColumnMap] = Field({}, description="column maps by name, for files with columns of other names")
     bench: BenchSection | None = Field(None, description="tolerances of the bench")
     procedure: tuple[Annotated[ProcedureProblem, Field(discriminator="kind")], ...] = Field(

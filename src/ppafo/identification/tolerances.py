@@ -87,7 +87,7 @@ class BenchSection(StrictTable):
         Field(strict=False, description="sensor errors that differ between recordings: 'zero', 'gain'; default: none"),
     ] = ()
     gas_temperature: Annotated[
-        Text | None, Field(description="tolerance of the gas temperature; default: that of the set, else 15 K")
+        Text | None, Field(description="tolerance of the gas temperature; default: from the set, else 15 K")
     ] = None
     gas_law: Annotated[Text | None, Field(description="deviation of the gas from the ideal gas law; default 1 %")] = (
         None

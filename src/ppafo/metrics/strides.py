@@ -249,7 +249,7 @@ METRICS = (
     _kind(
         "vented_strides",
         "-",
-        "whole strides with less help (lifted only, paused or stopped) in at least a part of them",
+        "whole strides with less help (lift only, pause or stop) for at least a part",
         ReadAt(("meters.strides.ended.whole", "meters.strides.ended.helped"), less),
     ),
     _kind(

@@ -23,6 +23,7 @@ from ppafo.signals.recording import Recording
 from ppafo.simulation.at_hand import RecordedResult
 from ppafo.units import without_exponent
 from ppafo.units.shown import in_units, units_in_force
+from ppafo.wording import argument_text
 
 SHORTER = 4
 """Factor by which the finer run shortens the steps; its allowed error is smaller by the square of this factor."""
@@ -102,7 +103,7 @@ class ErrorEstimate:
         beyond = ""
         if self.over_promise > 1.0:
             remedy = f": `run.tolerance = {self.tolerance:.1g}` reduces it" if self.tolerance else ""
-            beyond = f" That is {self.over_promise:.2g} times what a run promises{remedy}."
+            beyond = f" That is {self.over_promise:.2g} times the accuracy that a run promises{remedy}."
         return f"Estimated error of the steps: at most {over_time} over time{of_metrics}.{beyond}"
 
 
@@ -173,11 +174,12 @@ class Check:
         inexact = [row.name for row in sensitive if not row.changed_by & _PERTURBATIONS]
         sentences = []
         if perturbed:
+            sweep = argument_text("ppafo.sweep(..., statistic=...)", option="ppafo sweep --statistic")
             kinds = {name.split()[0] for row in sensitive for name in row.changed_by & _PERTURBATIONS}
             sentences.append(
                 f"{', '.join(perturbed)}: a {' or '.join(sorted(kinds, reverse=True))} moved by {MOVE:.0e} of its "
                 "range, far below what can be measured, changes them. One run is no evidence of their values; give "
-                "the spread over many (ppafo sweep --statistic)."
+                f"the spread over many runs ({sweep})."
             )
         if inexact:
             sentences.append(
@@ -204,7 +206,7 @@ class Check:
             changes = [without_exponent(metric_change(row.changes[name], row.unit)[0], "+.1e") for name in names]
             verdict = "" if row.is_determined else "sensitive"
             rows.append([row.name, f"{value:.4g} {unit}".rstrip(), *changes, verdict])
-        head = f"Check of '{self.scenario}': what changes in runs that should be the same"
+        head = f"Check of '{self.scenario}': differences between runs that should be equal"
         return "\n".join([head, *align_columns(rows), "", self.sentence])
 
     def document(self) -> dict[str, Any]:

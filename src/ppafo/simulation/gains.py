@@ -47,7 +47,7 @@ class Gains:
     @property
     def sentence(self) -> str:
         """Gains in use and their origin."""
-        loop = f"{self.torque_rate:.3g} {self.unit}/s at full opening, {1.0e3 * self.dead_time:.3g} ms late"
+        loop = f"{self.torque_rate:.3g} {self.unit}/s at full opening, dead time {1.0e3 * self.dead_time:.3g} ms"
         parts = []
         for computed, origin in ((False, "(given)"), (True, f"(computed from the device: {loop})")):
             gains = [gain for gain in self.gains if gain.computed == computed]

@@ -56,8 +56,8 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
         if valve is not None and valve not in kinds and not nearest_name(valve, kinds):
             # The scenario names the valve of another device.
             raise ParameterError(
-                f"{parameter_set.file}: there is no valve '{valve}'; it has {', '.join(kinds)}: "
-                f"--set device.valve={parameter_set.default_valve}"
+                f"{parameter_set.file}: there is no valve '{valve}'; it has {', '.join(kinds)}: give "
+                f"{override_text((f'device.valve={parameter_set.default_valve}',))}"
             )
         name = chosen_valve(parameter_set, valve)
         is_own = section["set"] == in_file.get("set")
@@ -91,7 +91,7 @@ def _replaced_text(
     entries = [(item.typed, parameter_set.numbers.get(item.typed)) for item in replaced]
     kept = [f"{path}={entry.value:.12g} {entry.unit}".rstrip() for path, entry in entries if entry is not None]
     keeping = f"; {override_text(kept)} keeps its own" if kept else ""
-    return f"values of the scenario replace those of {name}: {', '.join(map(str, replaced))}{keeping}"
+    return f"values of the scenario replace values of {name}: {', '.join(map(str, replaced))}{keeping}"
 
 
 _warn_once = functools.lru_cache(maxsize=64)(logger.warning)

@@ -32,7 +32,7 @@ from ppafo.simulation.scenario import (
     Scenario,
 )
 from ppafo.simulation.schema import scenario_file, whole_scenario_file
-from ppafo.wording import one_line
+from ppafo.wording import one_line, override_text
 
 FILE = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", ScenarioError)
 
@@ -132,10 +132,10 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     """Check the keys of the file itself, apply the overrides, then check that all required keys are given."""
     # A set in the place of a scenario would else be refused key by key.
     if "default_valve" in request.content and not {"run", "controller"} & request.content.keys():
+        of_set = (f"device.set={request.file}", f"device.valve={one_line(request.content['default_valve'])}")
         raise ScenarioError(
             f"{request.file}: is a parameter set, not a scenario; "
-            f"run one with it: SCENARIO --set device.set={request.file} "
-            f"--set device.valve={one_line(request.content['default_valve'])}"
+            f"give the name of a scenario and {override_text(of_set)}"
         )
     declared = layout.declared
     declared.find_kinds(request.content, request.file)

@@ -203,7 +203,10 @@ class RunSettings:
         float, Number("s", "time between two recorded samples; the step unless given", 1.0e-3, 1.0e-8, 1.0e6)
     ]
     tolerance: Annotated[
-        float, Number("1", "error of a pressure to keep to, over the pressure range", KEPT_OF_PRESSURE, 1.0e-6, 0.1)
+        float,
+        Number(
+            "1", "allowed pressure error of the steps, relative to the pressure range", KEPT_OF_PRESSURE, 1.0e-6, 0.1
+        ),
     ] = KEPT_OF_PRESSURE
 
 
@@ -236,8 +239,8 @@ class RegulatedLine:
     """Regulator with its downstream line: droop [Pa s/kg], largest mass flow [kg/s], line volume [m^3]."""
 
     droop: Annotated[float, Number("Pa s/kg", "fall of the line pressure per mass flow", None, 1.0, 1.0e10)]
-    largest_flow: Annotated[float, Number("kg/s", "what the regulator passes at most", None, 1.0e-6, 1.0)]
-    volume: Annotated[float, Number("m^3", "room for gas between regulator and valve", None, 1.0e-6, 1.0e-2)]
+    largest_flow: Annotated[float, Number("kg/s", "maximum mass flow of the regulator", None, 1.0e-6, 1.0)]
+    volume: Annotated[float, Number("m^3", "volume between regulator and valve", None, 1.0e-6, 1.0e-2)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,8 +281,8 @@ class Sensors:
     pressure_noise: Annotated[
         float, Number("Pa_d", "standard deviation of the measured pressures", 0.0, 0.0, 1.0e8)
     ] = 0.0
-    angle_resolution: Annotated[float, Number("rad", "step of the measured angle", 0.0, 0.0, 10.0)] = 0.0
-    pressure_resolution: Annotated[float, Number("Pa_d", "step of the measured pressures", 0.0, 0.0, 1.0e8)] = 0.0
+    angle_resolution: Annotated[float, Number("rad", "resolution of the measured angle", 0.0, 0.0, 10.0)] = 0.0
+    pressure_resolution: Annotated[float, Number("Pa_d", "resolution of the measured pressures", 0.0, 0.0, 1.0e8)] = 0.0
     seed: Annotated[int, Number("", "seed of the noise, a whole number", 1.0, 0.0, float(LARGEST_SEED))] = 1
     angle_bandwidth: float = 0.0
     pressure_bandwidth: float = 0.0

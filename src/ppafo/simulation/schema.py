@@ -104,7 +104,7 @@ def shank_table() -> Any:
             ),
             table(
                 "GaitShank",
-                kind_field(declaration.GAIT_SHANK, "the shank and the knee of a gait, whose ground is left out")
+                kind_field(declaration.GAIT_SHANK, "shank and knee motion of a gait, without ground contact")
                 | gait
                 | quantity_fields(declaration.shank_settings(declaration.GAIT_SHANK)),
             ),
@@ -141,7 +141,7 @@ def file_model(name: str, own: dict[str, Any], sections: Container[str] = declar
     fields: dict[str, Any] = {
         "schema_version": (SchemaVersion, ...),
         "name": (str, Field(pattern=NAME, max_length=_LONGEST_NAME)),
-        "description": (str, Field("", description="what this file tries, and why")),
+        "description": (str, Field("", description="purpose of this file")),
         "device": (table("Device", device), Field(description="the hardware")),
         **own,
     }
@@ -166,7 +166,7 @@ def file_model(name: str, own: dict[str, Any], sections: Container[str] = declar
             for line in declaration.SUPPLY_LINES
         }
         fields[declaration.SUPPLY_LINE] = optional(table("SupplyLine", lines), what)
-    reasons = "assumed values, which no source gives, and why these"
+    reasons = "assumed values without a source, with the reason for each"
     fields["assumed"] = (dict[str, str], Field(default_factory=dict, description=reasons))
     return table(name, fields)
 
@@ -210,20 +210,20 @@ def _scenario_file(sections: tuple[str, ...], kinds: tuple[tuple[str, str], ...]
             table("Run", quantity_fields((*declaration.RUN, declaration.ACCURACY))),
             Field(description="times of the run, and its accuracy"),
         ),
-        "motion": (one_of(motions), Field(description="what the vane does")),
+        "motion": (one_of(motions), Field(description="motion of the vane")),
     }
     if "initial" in sections:
         initial = table("Initial", quantity_fields(declaration.INITIAL, tuple(declaration.PRESSURE_WORDS)))
         own["initial"] = optional(initial, "state of the gas at the start; atmosphere unless given")
-    own["controller"] = (controller_table(controllers, "Controller"), Field(description="what commands the valve"))
+    own["controller"] = (controller_table(controllers, "Controller"), Field(description="controller of the valve"))
     if "reference" in sections:
-        controlled = optional(Literal[tuple(CONTROLLED)], "what it is a value of; torque unless given")
+        controlled = optional(Literal[tuple(CONTROLLED)], "controlled quantity; torque unless given")
         named_kind = named.get("reference", "")
-        on_purpose = optional(str, "why it lies beyond the reach of the device, where it does so on purpose")
+        on_purpose = optional(str, "reason for a reference intentionally beyond the reach of the device")
         further = {"of": controlled, "beyond_reach": on_purpose}
         reference = profile_table(CONTROLLED[TORQUE].level, "Reference", named_kind, further)
-        what = "what the controller follows, a torque unless it says of what; one that follows none may leave it out"
-        own["reference"] = optional(reference, what)
+        described = "reference of the controller, a torque unless 'of' names another quantity; optional for some kinds"
+        own["reference"] = optional(reference, described)
     if "sensors" in sections:
         # The one whole number of the file: half a seed means nothing.
         seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]

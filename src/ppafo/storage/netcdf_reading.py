@@ -74,7 +74,7 @@ def read_netcdf(path: str | Path) -> Recording:
             kind = recording_kind(_attribute(file, "kind") or "measured")
             return Recording(_attribute(file, "title") or one_line(Path(path).stem), time.values, channels, kind)
     except _DAMAGED as error:
-        raise DataError(f"{path}: is not a whole NetCDF file of a recording: {one_line(error)}") from error
+        raise DataError(f"{path}: is no complete NetCDF file of a recording: {one_line(error)}") from error
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
 

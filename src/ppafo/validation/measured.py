@@ -154,9 +154,7 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     wide = np.flatnonzero(intervals > _REMARKED_GAP * np.median(intervals))
     if wide.size:
         noun, first = "gap" if wide.size == 1 else "gaps", float(recording.time[wide[0]])
-        remarks += (
-            f"{wide.size} {noun} in time, the first after {first:.6g} s; inputs were held constant across gaps",
-        )
+        remarks += (f"{wide.size} {noun} in time, the first after {first:.6g} s; inputs were constant across gaps",)
     return MeasuredRecording(file, sha256, recording, remarks)
 
 

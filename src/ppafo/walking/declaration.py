@@ -45,20 +45,20 @@ STEP = Quantity("step", "s", "largest step; 1 ms unless given", 1.0e-3, 1.0e-6, 
 PERSON = Quantity(
     "person",
     "",
-    "number of the person of the population who walks; 0: the wearer",
+    "number of the simulated person of the population; 0: the wearer of the file",
     0.0,
     0.0,
     float(LARGEST_SEED),
 )
 DURATION = Quantity(
-    "duration", "s", "length of the walk; its task sequence's, else a minute unless given", None, 1.0, 3600.0
+    "duration", "s", "duration of the walk; default: the length of the task sequence, else 1 min", None, 1.0, 3600.0
 )
 
 WALK_SENSORS = (
     *(quantity for quantity in SENSORS if quantity.name != "delay"),
     Quantity("force_bandwidth", "Hz", "bandwidth of the force sensors", 30.0, 0.1, 1.0e4),
     Quantity("force_noise", "N", "standard deviation of the measured forces", 0.0, 0.0, 1.0e4),
-    Quantity("force_resolution", "N", "step of the measured forces", 0.0, 0.0, 1.0e3),
+    Quantity("force_resolution", "N", "resolution of the measured forces", 0.0, 0.0, 1.0e3),
     Quantity("lost_share", "1", "fraction of the force samples that are lost", 0.0, 0.0, 1.0),
     Quantity("angle_lost_share", "1", "fraction of the angle samples that are lost", 0.0, 0.0, 1.0),
     Quantity("pressure_lost_share", "1", "fraction of the pressure samples that are lost", 0.0, 0.0, 1.0),
@@ -232,17 +232,17 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
     }
     motion = one_of([table(f"{model_name(name)}Motion", kind_field(name, SUMMARY) | led_by) for name in motions])
     sections: dict[str, Any] = {
-        "run": optional(table("WalkRun", run), "how long it is, and how it is computed"),
-        "motion": optional(motion, "that it is a walk; gait and task sequence may stand here"),
+        "run": optional(table("WalkRun", run), "duration and settings of the computation"),
+        "motion": optional(motion, "kind of motion; gait and task sequence may be given here"),
         **led_by,
         "controller": (
             controller_table(walking_controllers(), "Walking"),
-            Field(description="what commands the valve"),
+            Field(description="controller of the valve"),
         ),
         "timing": optional(one_of(timings), "how the controller estimates the gait phase; thresholds unless given"),
         "wearer": optional(
             table("Wearer", quantity_fields((*WEARER, PERSON))),
-            "who walks; the subject of the gait that is named, else the paper's, unless given",
+            "wearer; default: the subject of the named gait, else the paper's subject",
         ),
         "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),
         "faults": optional(_faults_table(), "sensors and parts of the plant that fail during the walk"),
@@ -250,9 +250,7 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
             table("ShutOffValve", quantity_fields(SHUT_OFF)),
             "normally closed 3/2 valve in the supply line, part of the safe state; none unless given",
         ),
-        BOTTLE: optional(
-            table("WalkBottle", bottle), "bottle that supplies the device; a supply without end unless given"
-        ),
+        BOTTLE: optional(table("WalkBottle", bottle), "bottle that supplies the device; unlimited supply unless given"),
     }
     return file_model("WalkFile", sections)
 

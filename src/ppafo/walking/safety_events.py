@@ -23,7 +23,7 @@ SILENT_ROW = "unpowered.silent"
 """Path of the row for the time since the last controller signal, for a shut-off valve with a watchdog."""
 
 SILENT = FaultFlag(
-    "silent_controller", STOPPED, "the controller takes no samples: the watchdog has shut the supply off", (), ()
+    "silent_controller", STOPPED, "the controller has stopped sampling: the watchdog has closed the supply", (), ()
 )
 """Fault flag of the watchdog, which controllers cannot raise."""
 
@@ -143,4 +143,4 @@ def event_lines(events: Sequence[SafetyEvent]) -> list[str]:
     if len(lines) <= SHOWN:
         return lines
     between = len(lines) - SHOWN
-    return [*lines[: SHOWN - 1], f"... and {between} more changes of help", lines[-1]]
+    return [*lines[: SHOWN - 1], f"... and {between} more changes of assistance", lines[-1]]

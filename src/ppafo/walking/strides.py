@@ -102,7 +102,7 @@ def walk_metrics(
     """
     chosen = helped & counted
     gas = float(np.ptp(recording["supplied_mass"][[0, -1]]))
-    less = "whole strides with less help (lifted only, paused or stopped) in at least a part of them"
+    less = "whole strides with less help (lift only, pause or stop) for at least a part"
     metrics = stride_metrics(configuration, strides, averages, chosen) | {
         "strides": Metric(float(helped.size), "-", "whole strides of the walk"),
         "helped_strides": Metric(float(helped.sum()), "-", "whole strides with help from strike to strike"),
@@ -181,7 +181,7 @@ def lowest_toes(configuration: Scenario, height: Floats) -> Metric:
     """Return the lowest toe height in mid-swing, where toes must clear the ground, from heights [m] at ``PHASES``."""
     timing = gait_timing(walk_of(configuration).gait)
     first, last = np.searchsorted(PHASES, [timing.clearance_from, timing.clearance_to])
-    summary = "lowest toe height above ground in mid-swing of the mean stride; below 0 they would drag"
+    summary = "lowest toe height above ground in mid-swing of the mean stride; below 0 the toes would drag"
     return Metric(float(height[first:last].min()), "m", summary)
 
 
@@ -324,7 +324,7 @@ def task_sequence_metrics(
         "task_sequence_flat_push": Metric(push, "N m", "largest torque in plantarflexion with a loaded heel"),
     }
     if toes:
-        summary = "lowest toes over the ground in the middle of a swing"
+        summary = "lowest toe height above ground in mid-swing"
         metrics["task_sequence_lowest_toes"] = Metric(min(toes), "m", summary)
     if "walking_speed" in recording:
         way = float(np.trapezoid(recording["walking_speed"], recording.time))

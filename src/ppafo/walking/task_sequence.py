@@ -24,13 +24,13 @@ SLOWEST, FASTEST = 0.4, 1.6
 """Range of walking speeds in a task sequence [m/s]."""
 
 SPEED = Quantity("speed", "m/s", "walking speed; the gait's unless given", None, SLOWEST, FASTEST)
-CADENCE = Quantity("cadence", "1/s", "steps of both legs in a time, in place of a speed", None, 0.5, 4.0)
+CADENCE = Quantity("cadence", "1/s", "cadence, steps of both legs per time, in place of a speed", None, 0.5, 4.0)
 DURATION = Quantity("duration", "s", "how long", None, 0.5, 3600.0)
-WALKED_FOR = Quantity("duration", "s", "how long; to the nearest whole number of strides", None, 0.5, 3600.0)
+WALKED_FOR = Quantity("duration", "s", "duration, rounded to whole strides", None, 0.5, 3600.0)
 STRIDES = Quantity("strides", "1", "number of strides, in place of a duration", None, 1.0, 1.0e4)
-ONE_STRIDE = Quantity("strides", "1", "number of strides that it takes", 1.0, 1.0, 20.0)
-CONTACT = Quantity("contact", "s", "how long the toes touch the ground in the swing", 0.04, 1.0e-3, 0.2)
-TIME = Quantity("time", "1", "time of the stride over the others'", 0.75, 0.6, 1.6)
+ONE_STRIDE = Quantity("strides", "1", "number of strides of the transition", 1.0, 1.0, 20.0)
+CONTACT = Quantity("contact", "s", "duration of toe contact in the swing", 0.04, 1.0e-3, 0.2)
+TIME = Quantity("time", "1", "stride time relative to a regular stride", 0.75, 0.6, 1.6)
 LENGTH = Quantity("length", "1", "length in the middle of the stride over the others'", 0.6, 0.2, 1.4)
 SLOPE = Quantity("slope", "rad", "slope of the ground, above 0 uphill; level unless given", None, -0.175, 0.175)
 RADIUS = Quantity("radius", "m", "radius of the turn; below 0 where the device is on the outer leg", 1.0, -10.0, 10.0)
@@ -41,7 +41,7 @@ KINDS: dict[str, tuple[str, tuple[Quantity, ...]]] = {
     "rest": ("sits, the foot flat on the ground and nearly unloaded", (DURATION,)),
     "start": ("starts to walk", (SPEED, CADENCE, ONE_STRIDE)),
     "walk": ("walks", (*_PACE, SLOPE)),
-    "ramp": ("changes the speed evenly", _PACE),
+    "ramp": ("changes speed at a constant rate", _PACE),
     "turn": ("walks along a curve: the inner leg takes shorter steps than the outer one", (*_PACE, RADIUS)),
     "stop": ("stops and stands", (ONE_STRIDE,)),
     "stairs": ("climbs: the toes meet the ground before the heel", _PACE),
@@ -123,7 +123,7 @@ def _contradictions(segments: Iterable[TaskSegment]) -> Iterator[tuple[int, str]
         if "speed" in values and "cadence" in values:
             yield index, "give either speed or cadence, not both"
         if "radius" in values and abs(values["radius"]) < TIGHTEST:
-            yield index, f"radius must be at least {TIGHTEST:g} m, either way"
+            yield index, f"radius must be at least {TIGHTEST:g} m in either direction"
         extents = [name for name in ("duration", "strides") if name in values]
         if segment.kind in ("walk", "ramp", "stairs", "turn") and len(extents) != 1:
             yield index, "give either duration or strides" + (", not both" if extents else "")
@@ -151,10 +151,10 @@ def _task_sequence_table(segment: Any, name: str) -> type[BaseModel]:
     fields: dict[str, Any] = {
         "schema_version": (SchemaVersion, ...),
         "name": (str, Field(pattern=NAME, max_length=100)),
-        "description": (str, Field("", description="who walks like this, and why it is tried")),
+        "description": (str, Field("", description="description: who walks like this, and the purpose")),
         "segment": (
             Annotated[list[segment], Field(min_length=1)],
-            Field(description="what the wearer does one after the other, who stands at the beginning"),
+            Field(description="segments in order; the wearer starts from standing"),
         ),
     }
     return table(name, fields)

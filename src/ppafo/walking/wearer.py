@@ -77,7 +77,7 @@ class Wearer:
     foot_mass: float
     foot_inertia: float
     heel_lever: Annotated[
-        float, Number("m", "ankle back to the heel; bounds the lever of the ground force", 0.05, 0.0, 0.2)
+        float, Number("m", "distance from ankle back to heel; limits the lever arm of the ground force", 0.05, 0.0, 0.2)
     ]
     toe_lever: float
     ankle_stiffness: Annotated[float, Number("N m/rad", "stiffness of tissue at the ankle", 4.0, 0.0, 500.0)]

@@ -153,4 +153,4 @@ def test_an_interruption_leaves_nothing(
     for words in commands(tuning).values():
         assert main([*words, "--out", str(tmp_path / "out")]) == 130
         assert not (tmp_path / "out").exists()
-    assert "interrupted; nothing is half written" in capsys.readouterr().err
+    assert "interrupted; no file is incomplete" in capsys.readouterr().err

@@ -102,7 +102,7 @@ def test_a_signal_that_became_another_error_is_one_line(middle: str, name: str, 
     code = START.replace("MIDDLE", middle.replace("NAME", name))
     words = [sys.executable, "-c", code, str(tmp_path / "run")]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=120)
-    assert (done.returncode, done.stderr) == (130, "ppafo: interrupted; nothing is half written\n")
+    assert (done.returncode, done.stderr) == (130, "ppafo: interrupted; no file is incomplete\n")
 
 
 @each_signal(lost_in_a_finaliser=LOST, caught_by_a_library=CAUGHT, dropped_by_compiled_code=COMPILED)
@@ -111,7 +111,7 @@ def test_a_signal_whose_exception_got_lost_ends_the_run_all_the_same(middle: str
     words = [sys.executable, "-c", code, str(tmp_path / "run")]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 130
-    assert done.stderr.splitlines()[-1] == "ppafo: interrupted; nothing is half written"
+    assert done.stderr.splitlines()[-1] == "ppafo: interrupted; no file is incomplete"
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
 
@@ -220,5 +220,5 @@ def test_an_interrupt_while_the_package_loads_is_one_line_of_the_command_alone(s
     assert done.returncode == code
     # A program that imports the package has its own way to end.
     is_command = code == 130
-    assert (done.stderr == "ppafo: interrupted; nothing is half written\n") == is_command
+    assert (done.stderr == "ppafo: interrupted; no file is incomplete\n") == is_command
     assert ("KeyboardInterrupt" in done.stderr) != is_command

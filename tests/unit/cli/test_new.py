@@ -65,7 +65,7 @@ def test_what_a_copy_of_a_set_accepts_lapses_where_it_changes_a_value_of_the_fin
     few = capsys.readouterr().out
     assert "[flow-of-solenoid]" in few
     assert "[flow-of-proportional]" not in few
-    assert "of them concern no changed value; show them with --all" in few
+    assert "of them concern no changed value; --all shows them" in few
     assert main(["sets", "audit", "own.toml", "--all"]) == 1
     assert "[flow-of-proportional]" in capsys.readouterr().out
 
@@ -136,3 +136,9 @@ def test_a_copy_that_does_not_load_is_not_left(capsys: pytest.CaptureFixture[str
     assert main(["new", "scenario", "task", "--from", "task.toml", "--out", "other/task.toml"]) == 2
     assert "bench.toml" in capsys.readouterr().err
     assert not list(Path().glob("other/*"))
+
+
+def test_the_command_in_a_new_study_writes_into_a_folder_whatever_the_name_of_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "st.toml"
+    assert main(["new", "study", "st", "--from", "pressure-and-area", "--out", str(file)]) == 0
+    assert f"#   ppafo sweep {file} --out out/st\n" in file.read_text(encoding="utf-8")

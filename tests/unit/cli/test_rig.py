@@ -48,7 +48,9 @@ def test_values_of_an_experiment_that_replace_those_of_the_requested_set_are_sai
     own = tmp_path / "mine.toml"
     own.write_text((Path(ppafo.__file__).parent / "parameters" / "sets" / "ppafo2011.toml").read_text())
     words = ["rig", "simulate", "step-response", "--device", str(own), "--out"]
-    replaced = f"values of the scenario replace those of {own}: supply.pressure=55 psi_g, supply.dorsiflexion_pressure="
+    replaced = (
+        f"values of the scenario replace values of {own}: supply.pressure=55 psi_g, supply.dorsiflexion_pressure="
+    )
     assert main([*words, str(tmp_path / "replaced")]) == 0
     assert replaced in capsys.readouterr().out
     (truth,) = json.loads((tmp_path / "replaced" / "rig.json").read_text())["recordings"].values()

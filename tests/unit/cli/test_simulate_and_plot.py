@@ -300,5 +300,5 @@ def test_an_interrupt_while_writing_ends_with_130_and_leaves_nothing(tmp_path: P
         _, error = process.communicate(timeout=30)
     assert process.returncode == 130
     *_, last = error.splitlines()  # before it, that the model is compiled anew where the cache has no more room for it
-    assert last == "ppafo: interrupted; nothing is half written"
+    assert last == "ppafo: interrupted; no file is incomplete"
     assert names(tmp_path) == []

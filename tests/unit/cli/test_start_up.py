@@ -99,7 +99,7 @@ def test_interrupt_while_modules_load_is_one_line(module: str, wrapped: bool) ->
         check=False,
     )
     assert done.returncode == 130
-    assert done.stderr == "ppafo: interrupted; nothing is half written\n"
+    assert done.stderr == "ppafo: interrupted; no file is incomplete\n"
     assert done.stdout == ""
 
 

@@ -370,14 +370,14 @@ def test_a_library_has_the_bits_of_python_and_gains_that_follow_what_is_changed(
 
 @pytest.mark.parametrize("taken", ["main", "unit", "fmi2", "check", "string", "board", "install"])
 def test_a_scenario_with_the_name_of_another_file_or_target_is_called_otherwise(taken: str) -> None:
-    contents = c_library(replace(load_scenario("step-response"), name=taken))
+    contents = library_files(library_of(replace(load_scenario("step-response"), name=taken)))
     assert {f"run_{taken}.c", f"run_{taken}.h", "main.c"} <= set(contents)
     assert f"check: run_{taken}\n" in contents["Makefile"].decode()
 
 
 def test_a_description_cannot_end_or_begin_a_comment() -> None:
     described = replace(load_scenario("step-response"), description="first /* and last */ of a comment")
-    head = c_library(described)["step_response.h"].decode().split("#ifndef")[0]
+    head = library_files(library_of(described))["step_response.h"].decode().split("#ifndef")[0]
     assert (head.count("/*"), head.count("*/")) == (1, 1)
 
 
@@ -387,7 +387,7 @@ def test_what_a_scenario_says_is_plain_words_in_every_page_and_comment() -> None
     described = replace(load_scenario("torque-task-proportional"), description=hostile)
     fixed = load_scenario("torque-task-proportional", ("controller.kind=pid_fixed_point",))
     texts = {
-        **c_library(described),
+        **library_files(library_of(described)),
         **{f"plant/{name}": text for name, text in plant_library(described).items()},
         **{f"firmware/{name}": text for name, text in firmware(replace(fixed, description=hostile)).items()},
     }
@@ -412,7 +412,7 @@ def test_cmake_builds_the_example_and_runs_it(tmp_path: Path) -> None:
 
 
 def test_the_licence_is_that_of_the_package() -> None:
-    contents = c_library(load_scenario("step-response"))
+    contents = library_files(library_of(load_scenario("step-response")))
     assert contents["LICENSE"] == (Path(__file__).parents[3] / "LICENSE").read_bytes()
     page = contents["README.md"].decode()
     assert "@" not in page
@@ -450,7 +450,7 @@ needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on th
 
 def built(scenario: Scenario, folder: Path) -> ctypes.CDLL:
     """The library of a scenario, with the function from settings to numbers to be called from outside."""
-    for name, content in c_library(scenario).items():
+    for name, content in library_files(library_of(scenario)).items():
         (folder / name).write_bytes(content)
     source = folder / f"{c_identifier(scenario.name)}.c"
     return ctypes.CDLL(str(shared_library(source, "-O0", "-ffp-contract=off", "-Dstatic=", "-Wl,-Bsymbolic", "-w")))

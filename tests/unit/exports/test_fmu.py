@@ -20,7 +20,8 @@ import pytest
 
 import ppafo.cli
 from ppafo.errors import ProgramError, ScenarioError
-from ppafo.exports.c_library import c_library
+from ppafo.exports.c_library import library_of
+from ppafo.exports.c_library.files import library_files
 from ppafo.exports.fmu import platforms
 from ppafo.exports.fmu.interface import closed_loop
 from ppafo.exports.fmu.platforms import host_platform
@@ -356,7 +357,7 @@ def test_no_name_of_a_scenario_meets_another_name_of_its_unit(tmp_path: Path) ->
         code = {
             Path(name).name: archive.read(name).decode() for name in archive.namelist() if name.endswith((".c", ".h"))
         }
-    code["main.c"] = c_library(scenario)["main.c"].decode()
+    code["main.c"] = library_files(library_of(scenario))["main.c"].decode()
     found = set(re.findall(r"[A-Za-z]\w*", "\n".join(code.values())))
     ends = {name[3:] for name in found if name.lower().startswith("zzz_")}
     fronts = {name.removesuffix(end).lower() for name in found for end in ends if name.endswith(end)} - {"zzz"}

@@ -217,7 +217,7 @@ def test_a_stumble_is_left_out_and_named(
     assert found.gait.strides == strides
     remarks = [line for line in found.remarks if "left out" in line]
     assert len(remarks) == 5 - strides
-    assert all(line.endswith("left out: ankle_angle is unlike all others") for line in remarks)
+    assert all(line.endswith("left out: ankle_angle differs from all others") for line in remarks)
 
 
 @pytest.mark.parametrize(("column", "value", "start", "samples"), [(ANKLE, 1.57, 755, 18), (MOMENT, 0.0, 730, 50)])
@@ -229,7 +229,7 @@ def test_a_short_drop_out_in_one_stride_is_no_part_of_the_mean(
     damaged[start : start + samples] = value + 1e-4 * np.arange(samples)
     found = import_gait([csv_of({**columns, column: damaged})], ImportSettings(62.0))
     assert found.gait.strides == 4
-    assert any("is unlike all others" in line for line in found.remarks)
+    assert any("differs from all others" in line for line in found.remarks)
 
 
 def test_a_reversed_ankle_over_a_stiff_shank_is_refused(

@@ -94,8 +94,8 @@ def test_several_plates_of_one_foot_are_summed_and_named(tmp_path: Path) -> None
     assert_true(found.gait)
     assert len(found.curves["vertical_force"].strides) == 2
     assert (
-        "vertical force: the contacts of this foot, by the lean of its shank, summed over '1_ground_force_vy' (1), "
-        "'2_ground_force_vy' (1)"
+        "vertical force: the contacts of this foot, going by the lean of its shank, summed over "
+        "'1_ground_force_vy' (1), '2_ground_force_vy' (1)"
     ) in found.remarks
 
 

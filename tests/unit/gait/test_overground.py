@@ -199,7 +199,7 @@ def test_a_stance_that_no_plate_carries_leaves_the_loads_out(trial: Trial) -> No
     found = import_gait([trial(plates={"right": (0,), "left": (0,)})], ImportSettings())
     assert found.gait.vertical_force is None
     assert found.gait.ankle_moment is None
-    assert "vertical_force is left out: in no whole stride was it measured throughout the stance" in found.remarks
+    assert "vertical_force is left out: no whole stride has it measured throughout the stance" in found.remarks
 
 
 def test_another_body_mass_than_the_files_is_taken_and_said(trial: Trial) -> None:

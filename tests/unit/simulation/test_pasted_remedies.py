@@ -88,7 +88,7 @@ def test_a_run_prints_its_remedy_in_both_forms_at_the_end_of_its_numbers(
     monkeypatch.chdir(tmp_path)
     main(["simulate", "torque-task-proportional", "--set", "reference.level=9 N m"])
     said = capsys.readouterr().out
-    (command,) = re.findall(r"^To use the remedy\n(ppafo simulate .*)$", said, re.MULTILINE)
+    (command,) = re.findall(r"^Command with the remedy\n(ppafo simulate .*)$", said, re.MULTILINE)
     assert '[device]\nset = "ppafo2011"\nvalve = "proportional"\noverrides = ["supply.pressure=' in said
     assert main(shlex.split(command)[1:]) == 0
     assert "the torque follows its reference" in capsys.readouterr().out

@@ -264,7 +264,9 @@ def test_a_mistake_in_the_device_names_scenario_and_set() -> None:
 def test_a_set_without_the_valve_of_the_scenario_names_the_option_that_takes_its_own() -> None:
     text = TEXT.replace('"ppafo2011"', '"cylinder-lever"').replace('valve = "proportional"', 'valve = "solenoid"')
     message = problem_with(text.encode(), ParameterError)
-    assert message.endswith("there is no valve 'solenoid'; it has proportional: --set device.valve=proportional")
+    assert message.endswith(
+        "there is no valve 'solenoid'; it has proportional: give overrides=['device.valve=proportional']"
+    )
 
 
 @pytest.mark.parametrize("name", ["a" * 300, "a/" * 3000 + "b"])
@@ -330,7 +332,7 @@ def test_plain_values_of_a_wrong_type_are_clean_errors(change: dict[Any, Any]) -
 def test_a_parameter_set_that_is_given_as_a_scenario_is_called_what_it_is() -> None:
     with pytest.raises(
         ScenarioError,
-        match=r"^bench\.toml: is a parameter set, not a scenario; .*device\.set=bench\.toml --set device\.valve=main$",
+        match=r"^bench\.toml: is a parameter set, .*overrides=\['device\.set=bench\.toml', 'device\.valve=main'\]$",
     ):
         parse_scenario(b'name = "bench"\ndefault_valve = "main"\n', "bench.toml")
 

@@ -230,7 +230,7 @@ def test_values_of_the_scenario_s_own_device_that_replace_those_of_another_set_a
     own.write_text((Path(ppafo.__file__).parent / "parameters" / "sets" / "ppafo2011.toml").read_text())
     load_scenario("step-response", [f"device.set={own}"])
     assert caplog.messages == [
-        f"ppafo: step-response: values of the scenario replace those of {own}: supply.pressure=55 psi_g, "
+        f"ppafo: step-response: values of the scenario replace values of {own}: supply.pressure=55 psi_g, "
         "supply.dorsiflexion_pressure=55 psi_g; overrides=['supply.pressure=50 psi_g', "
         "'supply.dorsiflexion_pressure=50 psi_g'] keeps its own"
     ]

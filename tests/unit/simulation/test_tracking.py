@@ -171,7 +171,7 @@ def test_a_valve_that_opens_away_from_the_reference_is_not_called_too_small() ->
 
     told = simulate(load_scenario(TASK, ["reference.level=2 N m"]).controlled_by(Opens())).tracking
     assert told is not None
-    assert "away from the reference for 100 % of it; turn the sign" in told.sentence
+    assert "away from the reference for 100 % of it; reverse the sign" in told.sentence
 
 
 @pytest.mark.parametrize(
@@ -207,7 +207,7 @@ def test_a_joint_that_is_flung_at_the_start_is_told_so_with_pressures_that_carry
     scenario = load_scenario("cylinder-servo", changes)
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
-    assert "at the start its chambers give 0 N m for a load of 4 N m: the joint is flung 19" in verdict.sentence
+    assert "at the start its chambers give 0 N m for a load of 4 N m: the joint moves 19" in verdict.sentence
     assert [text.partition("=")[0] for text in verdict.mended] == ["initial.pressure_1", "initial.pressure_2"]
     again = simulate("cylinder-servo", [*changes, *verdict.mended])
     assert again.tracking is None
@@ -517,7 +517,7 @@ LEVEL = "reference.level=3 N m"
         (
             TASK,
             [LEVEL, "controller.proportional_gain=95 1/(N m)"],
-            "its gains are not this device's",
+            "its gains do not suit this device",
             "proportional_gain",
         ),
         (

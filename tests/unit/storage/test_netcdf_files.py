@@ -49,7 +49,7 @@ def test_a_file_cut_off_anywhere_is_refused_by_name(tmp_path: Path) -> None:
     path = tmp_path / "cut.nc"
     for share in (0.001, 0.2, 0.5, 0.9, 0.999):
         path.write_bytes(whole[: int(len(whole) * share)])
-        with pytest.raises(DataError, match="not a whole NetCDF file of a recording"):
+        with pytest.raises(DataError, match="no complete NetCDF file of a recording"):
             read_netcdf(path)
 
 
@@ -57,7 +57,7 @@ def test_a_file_cut_off_anywhere_is_refused_by_name(tmp_path: Path) -> None:
 def test_a_file_of_another_kind_is_refused_by_name(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "other.nc"
     path.write_bytes(content)
-    with pytest.raises(DataError, match=r"other\.nc: is not a whole NetCDF file"):
+    with pytest.raises(DataError, match=r"other\.nc: is no complete NetCDF file"):
         read_netcdf(path)
 
 

@@ -305,15 +305,24 @@ def _change_panels(comparison: ComparisonResult) -> list[Panel]:
     return [_change(comparison, task, metric) for task in comparison.tasks for metric in (_ERROR, _GAS)]
 
 
+def _colours(task: TaskComparison) -> dict[str, str]:
+    """Return the colour of each configuration: of its valve, where that tells all apart, else one of a list."""
+    of_valves = [look_of_valve(case.scenario.device.valve.kind).colour for case in task.cases]
+    chosen = (
+        of_valves
+        if len(set(of_valves)) == len(of_valves)
+        else [COLOURS[row % len(COLOURS)] for row in range(len(of_valves))]
+    )
+    return dict(zip((case.configuration for case in task.cases), chosen, strict=True))
+
+
 def _pareto(comparison: ComparisonResult, task: TaskComparison) -> Panel:
     """Return a panel of error over gas, with a mark for each completed configuration and a dot for each draw."""
     cases = [case for case in task.cases if case.status.is_completed]
     front, marks, on_front = front_of(cases), [], []
-    # As everywhere: the colour of a valve, where that tells the configurations apart.
-    valve_colours = [look_of_valve(case.scenario.device.valve.kind).colour for case in cases]
-    are_different = len(set(valve_colours)) == len(cases)
+    colours = _colours(task)
     for number, case in enumerate(cases):
-        colour = valve_colours[number] if are_different else COLOURS[number % len(COLOURS)]
+        colour = colours[case.configuration]
         if case.rows is not None:
             dots = {"linestyle": "", "marker": ".", "alpha": 0.35, "markersize": 4, "markeredgewidth": 0}
             gas, error = (case.rows[name][:_MAXIMUM_DOTS] for name in (_GAS, _ERROR))
@@ -333,8 +342,8 @@ def _pareto(comparison: ComparisonResult, task: TaskComparison) -> Panel:
 def _change(comparison: ComparisonResult, task: TaskComparison, metric: str) -> Panel:
     """Return a panel with histograms of the change of a metric against the baseline; dashed: nominal device."""
     baseline, marks, ends = task.case(comparison.baseline), [], []
-    for number, name in enumerate(comparison.configurations):
-        case, colour = task.case(name), COLOURS[number % len(COLOURS)]
+    for name, colour in _colours(task).items():
+        case = task.case(name)
         if name == comparison.baseline or case.rows is None or baseline.rows is None:
             continue
         change = _relative(baseline.rows[metric], case.rows[metric])

@@ -172,7 +172,7 @@ def finding_of_several(several: Endurances) -> Finding[Endurances]:
         said=(next(iter(several.uses.values())).bottle.title,),
         parts=(
             Section(columns=columns_of(titles, rows)),
-            Section("What is not in the model", said=(_LEFT_OUT,), is_detail=True),
+            Section("Not in the model", said=(_LEFT_OUT,), is_detail=True),
         ),
         found=several,
     )

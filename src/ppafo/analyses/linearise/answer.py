@@ -1,13 +1,14 @@
 """Report of a linear model: operating point, side of each limit, poles, matrices and range of validity."""
 
 import io
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.analyses.linearise.loop import PID_LAWS
+from ppafo.analyses.linearise.loop import PID_LAWS, open_loop
 from ppafo.analyses.linearise.model import LinearModel
 from ppafo.engine.lanes import Floats
 from ppafo.engine.replay import StepInputs, replay
@@ -118,6 +119,8 @@ _LOWEST_SHARE = 0.1
 """Lowest frequency of the plot divided by the frequency of the slowest pole [-]."""
 _HIGHEST_FREQUENCY = 100.0
 """Highest frequency of the plot [Hz]."""
+_LOOP_POINTS = slice(None, None, -20)
+"""Points of the open loop that are plotted, its last one included."""
 _DRAWN_STEPS = (-5, -1)
 """Indices of the steps plotted over time: the middle of the three decades, and the largest step."""
 _REAL = 1.0e-6
@@ -125,8 +128,9 @@ _REAL = 1.0e-6
 _FREQUENCY = Kind("Frequency", "Hz")
 _DASHED = {"linestyle": "--"}
 _FREQUENCY_CAPTION = (
-    "The torque for a small sine of the command; dashed: with the dead time, the age of the measurements and half a "
-    "sample period, which are not in the model."
+    "Where there are margins, the open loop first, each margin from its dot to the dashed line. The torque for a small "
+    "sine of the command; dashed: with the dead time, the age of the measurements and half a sample period, which are "
+    "not in the model."
 )
 _STEPS_CAPTION = (
     "Steps of the command from the steady state, on the runs and of the linear model, in which the difference grows "
@@ -139,7 +143,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     """Return a linear model as a finding with sentences, tables and panels."""
     when = "in its steady state" if model.time is None else f"at {model.time:g} s"
     validity = Section(
-        "How far it holds",
+        "Range of validity",
         panels=partial(steps_panels, model),
         name="steps",
         caption=_STEPS_CAPTION,
@@ -188,7 +192,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         said=sentences,
         parts=[
             _point(model),
-            Section("Which side was taken", facts(model.sides.items()), remarks=remarks),
+            Section("Side of the kink", facts(model.sides.items()), remarks=remarks),
             _poles(model),
             _loop(model),
             *matrices,
@@ -253,18 +257,27 @@ def _loop(model: LinearModel) -> Section:
         ("phase margin", f"{angle.text(margins.phase_margin or 0.0)} at ", margins.gain_crossover),
         ("bandwidth (-3 dB)", "", margins.bandwidth),
     )
+    # A sampled loop is real at half the sample rate: its phase may meet -180 deg there alone.
+    end = (1.0 - _REAL) * 0.5 / controller.period
+    only = ", half the sample rate: the phase reaches -180 deg there only"
     none = "none below half the sample rate"
     rows = [("closed loop", "stable" if margins.is_stable else "unstable")]
-    rows += [(name, none if at is None else text + frequency.text(at)) for name, text, at in values]
+    rows += [
+        (name, none if at is None else f"{text}{frequency.text(at)}{only if at >= end else ''}")
+        for name, text, at in values
+    ]
     rows.append(("peak sensitivity", f"{margins.peak_sensitivity:.3g}"))
     return Section("Loop with the PID of the scenario, sampled and with its delays", facts(rows))
 
 
 def frequency_panels(model: LinearModel) -> list[Panel]:
-    """Return panels of the frequency response of torque to command: magnitude, phase, phase with omitted delays."""
+    """Return panels of the frequency response of torque to command, and of the open loop with its margins if any."""
     poles = np.abs(model.poles) / (2.0 * np.pi)
     lowest = min(float(np.min(poles[poles > 0.0], initial=1.0)), 1.0)
-    frequencies = np.geomspace(_LOWEST_SHARE * lowest, _HIGHEST_FREQUENCY, _POINTS)
+    # Half the sample rate, where the loop ends, is in the plot of a loop.
+    highest = max(_HIGHEST_FREQUENCY, 0.0 if model.margins is None else 0.5 / model.delays.period)
+    frequencies = np.geomspace(_LOWEST_SHARE * lowest, highest, _POINTS)
+    scales = {"xscale": "log", "xlim": (float(frequencies[0]), 1.1 * highest)}
     response = model.response(frequencies)
     delay = model.delays.command + model.delays.signals + 0.5 * model.delays.period
     phase = np.degrees(np.unwrap(np.angle(response)))
@@ -273,15 +286,16 @@ def frequency_panels(model: LinearModel) -> list[Panel]:
     def set_phase(axes: "Axes") -> None:
         from matplotlib.ticker import MultipleLocator
 
-        axes.set(xscale="log", ylim=(max(-360.0, float(np.min(phase)) - 90.0), float(np.max(phase)) + 20.0))
+        axes.set(**scales, ylim=(max(-360.0, float(np.min(phase)) - 90.0), float(np.max(phase)) + 20.0))
         axes.yaxis.set_major_locator(MultipleLocator(45.0))
 
     return [
+        *_open_loop_panels(model, scales),
         Panel(
             _FREQUENCY,
             Kind("Torque per command", "N m"),
             [Mark("line", frequencies, np.abs(response))],
-            then=lambda axes: axes.set(xscale="log", yscale="log"),
+            then=lambda axes: axes.set(**scales, yscale="log"),
             shares_x=True,
         ),
         Panel(
@@ -296,6 +310,45 @@ def frequency_panels(model: LinearModel) -> list[Panel]:
             shares_x=True,
         ),
     ]
+
+
+def _open_loop_panels(model: LinearModel, scales: Mapping[str, Any]) -> list[Panel]:
+    """Return panels of gain and phase of the open loop, with the margins at its crossovers; none without margins.
+
+    ``scales`` are settings of the axis of frequencies.
+    """
+    found, margins = open_loop(model), model.margins
+    if found is None or margins is None:
+        return []
+    is_drawn = found[0] >= scales["xlim"][0]
+    frequencies, loop = (values[is_drawn][_LOOP_POINTS][::-1] for values in found)
+    curves = np.abs(loop), np.degrees(np.unwrap(np.angle(loop)))
+    crossovers = (
+        (margins.gain_crossover, "phase margin", VERMILION, "o"),
+        (margins.phase_crossover, "gain margin", BLACK, "s"),
+    )
+    levels = (Kind("Open-loop gain"), 1.0), (Kind("Open-loop phase", "deg"), -180.0)
+    panels = []
+    for curve, (kind, critical) in zip(curves, levels, strict=True):
+        # Where a margin is read: from the dot to the dashed line.
+        nearest = critical + (0.0 if critical > 0.0 else 360.0 * round((curve[-1] - critical) / 360.0))
+        marks = [
+            Mark("line", frequencies, curve),
+            Mark("line", frequencies[[0, -1]], np.full(2, nearest), (), "", GREY, _DASHED),
+        ]
+        for at, name, colour, marker in crossovers:
+            if at is not None:
+                place = np.array([np.interp(at, frequencies, curve)])
+                dot = {"linestyle": "", "marker": marker, "markersize": 5}
+                marks.append(Mark("line", np.array([at]), place, (), f"{name} at {at:.3g} Hz", colour, dot))
+        every = {**scales, "yscale": "log" if critical > 0.0 else "linear"}
+        panels.append(Panel(_FREQUENCY, kind, marks, legend="inside", then=partial(_set_scales, every), shares_x=True))
+    return panels
+
+
+def _set_scales(scales: Mapping[str, Any], axes: "Axes") -> None:
+    """Set the scales of both axes."""
+    axes.set(**scales)
 
 
 def steps_panels(model: LinearModel) -> list[Panel]:

@@ -22,12 +22,13 @@ _ROUNDING = 1.0e-9
 _HALF_POWER = float(np.sqrt(0.5))
 
 
-def loop_margins(model: LinearModel) -> LoopMargins | None:
-    """Return the margins of the loop that the scenario's PID closes around a linear model, cut at the command.
+def open_loop(model: LinearModel) -> tuple[Floats, NDArray[np.complex128]] | None:
+    """Frequencies [Hz] up to half the sample rate, and the loop of a linear model with the scenario's PID there.
 
-    The loop is the sampled one, exact at the samples: the PID with its sum of rectangles and filtered difference, a
-    held command, the delays that the model omits and the bandwidth of the sensors; without noise and resolution. None
-    without such a loop: another controller, a command that is clipped or has no effect, a controlled quantity at rest.
+    The loop, cut at the command, is the sampled one, exact at the samples: the PID with its sum of rectangles and
+    filtered difference, a held command, the delays that the model omits and the bandwidth of the sensors; without noise
+    and resolution. None without such a loop: another controller, a command that is clipped or has no effect, a
+    controlled quantity at rest.
     """
     scenario, gains, period = model.scenario, model.scenario.controller.settings, model.scenario.controller.period
     command, outputs = abs(model.inputs[0].value), [signal.name for signal in model.outputs]
@@ -49,8 +50,15 @@ def loop_margins(model: LinearModel) -> LoopMargins | None:
     law += gains["derivative_gain"] * change / (period + gains["derivative_filter"] * change)
     steered = error_functions(scenario.controlled, scenario.device.supply.is_vacuum).steered(opened)
     loop = steered * law * plant
-    if not loop.all():
+    return (frequencies, loop) if loop.all() else None
+
+
+def loop_margins(model: LinearModel) -> LoopMargins | None:
+    """Return the margins of the loop that the scenario's PID closes around a linear model; None without one."""
+    found = open_loop(model)
+    if found is None:
         return None
+    frequencies, loop = found
     sensitivity = 1.0 / (1.0 + loop)
     # Nyquist: of a stable closed loop, 1 + L turns by a quarter for each integrator, by a half for each unstable pole.
     turned = np.unwrap(np.angle(1.0 + loop))

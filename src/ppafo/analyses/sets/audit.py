@@ -14,7 +14,7 @@ from ppafo.parameters.audit.changes import changes
 from ppafo.parameters.loading import set_or_load
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.finding import Finding, Section, columns_of
-from ppafo.wording import count_of
+from ppafo.wording import argument_text, count_of
 
 _WIDTH = 100
 _INDENT = "    "
@@ -94,7 +94,9 @@ def audited(names: Sequence[str], parent: str | None, is_whole: bool, overrides:
     sets = []
     for name in names:
         loaded = apply_overrides(load_parameter_set(name), overrides)
-        with refused_as(ParameterError, "--parent" if parent else f"{loaded.file}: parent", ParameterError):
+        with refused_as(
+            ParameterError, argument_text("parent") if parent else f"{loaded.file}: parent", ParameterError
+        ):
             parent_set = set_or_load(parent or loaded.parent or None)
         sets.append(AuditedSet(loaded, parent_set, tuple(findings_of(loaded, parent_set)), tuple(overrides)))
     return _finding_of(sets, is_whole)
@@ -155,7 +157,7 @@ def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Sect
     hidden = len(findings) - len(listed)
     if hidden:
         concern = "concerns" if hidden == 1 else "concern"
-        summary += f"; {hidden} of them {concern} no changed value; show them with --all"
+        summary += f"; {hidden} of them {concern} no changed value; {argument_text('all_', option='--all')} shows them"
     for finding in listed:
         lines = [f"{finding.severity}: {finding.title} [{finding.id}]"]
         for value in finding.values:

@@ -15,6 +15,7 @@ from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION, font_size
 from ppafo.signals.recording import CHANNELS
 from ppafo.studies.sampling import NOISE
+from ppafo.study.store import FOLLOWS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,6 +66,12 @@ def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence
     grid = [number["path"] for number in study.get("vary", ()) if number["kind"] in _GRIDDED]
     # Over two paths each configuration has a panel of each metric, a map or points; else all share one panel.
     is_mapped = 2 in (len(grid), len(varied))
+    if is_mapped:
+        metrics = _differing(results, metrics) or metrics[:1]
+        # Where some runs follow their reference and others do not, the map tells which.
+        if "not_following" in results.summary:
+            verdicts = np.concatenate(list(results.thin(FOLLOWS, MAXIMUM_DRAWN).values()))
+            metrics += [FOLLOWS] if {0.0, 1.0} <= set(verdicts.tolist()) else []
     title = f"{results.name}, {results.summary['completed']:,} runs"
     if not is_mapped and len(varied) > 1:
         labels = [label_of(path) for path in varied[:_NAMED]]
@@ -86,6 +93,19 @@ def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence
         title=title,
         is_detail=True,
     )
+
+
+def _differing(results: StudyResults, metrics: Sequence[str]) -> list[str]:
+    """Return the metrics that differ between the runs by more than their accuracy, and from every metric before."""
+    chosen: dict[str, str] = {}
+    for metric in metrics:
+        kind = metric_kind(results, metric)
+        rows = [described[metric] for described in results.metrics.values() if described[metric]["count"]]
+        ends = [[kind.text(row[end]) for end in ("minimum", "maximum") if end in row] for row in rows]
+        if any(len(set(texts)) != 1 for texts in ends) or len({texts[0] for texts in ends}) > 1:
+            # Equal in every statistic is equal in every run.
+            chosen.setdefault(str(rows), metric)
+    return list(chosen.values())
 
 
 def _panels(

@@ -153,4 +153,5 @@ class StudyResults:
 
 def metric_kind(results: StudyResults, metric: str) -> Kind:
     """Return label, unit and format of a metric from the stored unit, also for a metric that no longer exists."""
-    return of_stored_metric(metric, results.document["metrics"][metric]["unit"])
+    # Whether a run follows is a column of every study, and none of the metrics that it asked for.
+    return of_stored_metric(metric, results.document["metrics"].get(metric, {"unit": "-"})["unit"])

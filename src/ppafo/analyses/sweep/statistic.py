@@ -28,6 +28,7 @@ from ppafo.studies.sampling import with_new_noise
 from ppafo.studies.study import Study
 from ppafo.study.runs import RunCounter, Runs, scenario_runs
 from ppafo.units.shown import shown_in
+from ppafo.wording import argument_text
 
 DEFAULT_WIDTH = "1 %"
 """Default width of an interval, as a fraction of the value."""
@@ -140,7 +141,7 @@ def draw_until(
         first_drawn = first_drawn or columns
         runs.run(columns)
         rows = runs.table
-        runs.check(rows, rule.maximum_failed, "sweep --statistic", [metric])
+        runs.check(rows, rule.maximum_failed, argument_text("statistic", option="sweep --statistic"), [metric])
         values = rows[metric]
         look = InterimEstimate(
             draws=values.size,

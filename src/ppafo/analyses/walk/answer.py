@@ -236,12 +236,10 @@ def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
             *task_sequence_parts(comparison),
             Section(columns=comparison_table(comparison), remarks=_remarks(comparison)),
             *bottle_parts(worn),
-            Section("To use the remedy" if mended else "", code=usage_text(mended) if mended else ""),
+            Section("Command with the remedy" if mended else "", code=usage_text(mended) if mended else ""),
             Section("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
             *_pictures(comparison),
-            Section(
-                "What is assumed" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True
-            ),
+            Section("Assumptions" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True),
         ),
         found=_WalkPair(comparison, verdict),
         passed=comparison.is_completed and worn.is_helped,

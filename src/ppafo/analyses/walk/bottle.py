@@ -56,7 +56,7 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
         walked = f"{strides} strides, {worn.helped.size} of them whole between strikes"
     rows = [
         ("bottle", f"{supply.supply.bottle.title}, with {filled}"),
-        ("what ended it", supply.ending.message),
+        ("reason for the end", supply.ending.message),
         ("when", f"{duration_text(supply.ending.time)}, {walked}"),
         ("gas used", f"{_GAS.text(supply.balance.left_bottle)}, left {remaining}"),
         ("bottle at the end", f"{_WARMTH.text(end['bottle_temperature'])}, {_PRESSURE.text(end['bottle_pressure'])}"),

@@ -99,7 +99,7 @@ def rig_record(
         link.close()
     code, aside = output.EXIT_CHECK_FAILED if is_broken else output.EXIT_GOOD, ""
     if collected.is_stopped:
-        code, aside = output.EXIT_INTERRUPTED, f"stopped; {out} is whole"
+        code, aside = output.EXIT_INTERRUPTED, f"stopped; {out} is complete"
     document = {"file": str(out), **collected.document()}
     return output.CommandOutput(f"{collected.text()}\nwritten: {out}", document, exit_code=code, aside=aside)
 

@@ -53,7 +53,7 @@ def sets_audit(
 
     >>> audited = sets_audit(["ppafo2011-printed"])
     >>> print(str(audited).splitlines()[0])
-    error: reported.velocity_over_acceleration is inverted: its unit is that of the reciprocal
+    error: reported.velocity_over_acceleration is inverted: its unit belongs to the reciprocal
     [velocity-over-acceleration-upside-down]
     >>> audited.passed
     False

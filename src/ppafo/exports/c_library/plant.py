@@ -183,7 +183,7 @@ def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -
     limits = settings[f"motion.{name}"].quantity
     torque = Input(name, "N m", f"torque on the ankle, {summary}", start, limits.minimum, limits.maximum)
     return _Drive(
-        motion="The torque is held until the next value.",
+        motion="The torque is constant until the next value.",
         inputs=(torque,),
         settings=((c_identifier(f"motion.{name}"), f"{{{name}}}"),),
         parameters=(("plant.external_torque", f"{load}{{{name}}}"),),

@@ -114,7 +114,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     }
     strides = without_odd_shapes(curves, strides)
     curves = _over_taken_strides(curves, walk, strides, wrong)
-    missing = [f"{name} is left out: in no whole stride was it measured throughout the stance" for name in unmeasured]
+    missing = [f"{name} is left out: no whole stride has it measured throughout the stance" for name in unmeasured]
     remarks = [*source.remarks, *footfalls.remarks, *missing]
     if any(name not in curves for name in REQUIRED):
         raise_noted(wrong)
@@ -291,7 +291,7 @@ def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> 
     if scatter > _NOISY_FORCE:
         remarks.append(
             f"the vertical force scatters by {scatter:.2g} body weights while the foot is in the air: events are found "
-            f"at 0.05 and 0.03; a low pass of the plate, or {setting_text('low_pass')}, makes them surer"
+            f"at 0.05 and 0.03; filter the force plate or give {setting_text('low_pass')} to detect them reliably"
         )
     return remarks
 

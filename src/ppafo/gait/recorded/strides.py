@@ -151,6 +151,6 @@ def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: StrideSel
         odd = [stride for stride, is_it in zip(curve.strides, is_odd.tolist(), strict=True) if is_it]
         if len(odd) <= _MOST_ODD * len(curve.strides):
             strides = strides.without(
-                [stride for stride in odd if stride in strides.taken], f"{name} is unlike all others"
+                [stride for stride in odd if stride in strides.taken], f"{name} differs from all others"
             )
     return strides

@@ -134,7 +134,7 @@ def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
         yield AuditFinding(
             id=f"{name}-upside-down",
             severity="error",
-            title=f"{path} is inverted: its unit is that of the reciprocal",
+            title=f"{path} is inverted: its unit belongs to the reciprocal",
             values=evidence.values_of(path),
             sides=(
                 ComparedNumber("as reported", value, inverse_unit),
@@ -142,7 +142,7 @@ def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
             ),
             paragraph=(
                 f"{path} = {number_text(entry)} is meant as: {quantity.summary}. That has the unit {quantity.unit}; "
-                f"the reported unit {entry.unit} is that of the reciprocal. Invert the ratio and keep the number: "
+                f"the reported unit {entry.unit} belongs to the reciprocal. Invert the ratio and keep the number: "
                 f"taken literally it would be {1.0 / value:.3g} {quantity.unit}."
             ),
         )

@@ -40,7 +40,7 @@ class ClaimEntry(StrictTable):
         "equal", description="kind of statement: a number, a maximum ('up to'), or less or more, which needs a limit"
     )
     where: Text = Field(description="page, section or figure of the source")
-    source: str = Field("", description="publication, if other than that of the file")
+    source: str = Field("", description="publication, if other than the one of the file")
     computation: str = Field("", description="name of a computation of 'ppafo reproduce'")
     arguments: dict[str, str] = Field(default_factory=dict, description="arguments of the computation, with units")
     at_least: float | None = Field(None, allow_inf_nan=False, description="lowest value that agrees, in 'unit'")

@@ -66,7 +66,7 @@ def _slow_decisions(case: Case) -> TrackingCause | None:
         return None
     rates = (10.0 / period, 100.0 / period, _USUAL_RATE)
     text = (
-        f"its controller decides every {1.0e3 * period:.3g} ms, {settled / period:.2g} times in the settled "
+        f"its controller decides every {1.0e3 * period:.3g} ms, {settled / period:.2g} times within the settled "
         f"{settled:.3g} s"
     )
     remedies = (Remedy({}, (f"controller.rate={rate:g} Hz",)) for rate in rates if rate <= _USUAL_RATE)
@@ -80,7 +80,7 @@ def _shut_valve(case: Case) -> TrackingCause | None:
     # A loop that rests at the edge of the band is a little beyond it now and then.
     typical = float(np.max(command)) if np.mean(command <= _EDGE * band) < _MOSTLY else float(np.median(command))
     if typical <= SHUT and case.failure != "overshoots":
-        return TrackingCause("its law asks for nothing: its gains are 0, or its dead zone is wider than the error")
+        return TrackingCause("its law commands nothing: its gains are 0, or its dead zone is wider than the error")
     if typical > _EDGE * band or settled.turns or case.failure == "overshoots":
         return None
     known_band = float(scenario.controller.settings.get("dead_band", 0.0))
@@ -104,7 +104,7 @@ def oscillation(case: Case) -> TrackingCause | None:
     if not (case.oscillates or case.only_switches):
         return None
     if law is None:
-        return TrackingCause("its controller is of yours", (), "give it smaller gains")
+        return TrackingCause("its controller is user-defined", (), "give it smaller gains")
     angle = float(np.mean(case.recording["angle"][case.settled.samples]))
     # Gains are those of where the joint is to be, where that is known.
     is_known = scenario.motion.motion_kind.sees(scenario).places is not anywhere
@@ -127,9 +127,11 @@ def oscillation(case: Case) -> TrackingCause | None:
         return TrackingCause(text, (*gradual, *smaller_pair(scenario, ratio)), "take faster or smaller valves")
     names = [quantity.name for quantity in speed_settings(scenario, law).values()]
     if not names:
-        return TrackingCause("its law is too fast for what is late", (), "give its law smaller gains, or a slower one")
+        return TrackingCause(
+            "its law is too fast for the delays of the loop", (), "give its law smaller gains, or a slower one"
+        )
     sensors = scenario.sensors
-    reason = "look for what delays it (sensors, lines)"
+    reason = "find the source of the delay (sensors, lines)"
     if sensors.angle_noise or sensors.pressure_noise:
         noise = f"{change_text(ANGLE, sensors.angle_noise)} and {change_text('pressure_1', sensors.pressure_noise)}"
         reason = f"the noise of its sensors ({noise}) turns the command"
@@ -200,7 +202,7 @@ def _opened_away(case: Case) -> TrackingCause | None:
         f"its valve is fully open for {100.0 * np.mean(is_open):.0f} % of the time, away from the reference for "
         f"{100.0 * np.mean(is_away):.0f} % of it"
     )
-    return TrackingCause(text, (), "turn the sign of its command or of what it measures")
+    return TrackingCause(text, (), "reverse the sign of its command or of its measurement")
 
 
 def _lag(case: Case) -> TrackingCause | None:
@@ -212,7 +214,7 @@ def _lag(case: Case) -> TrackingCause | None:
     if squares == 0.0 or case.settled.rests or case.only_switches:
         return None
     delay = float(np.mean(slope * error)) / squares
-    text = "its reference moves more quickly than the loop follows"
+    text = "its reference changes faster than the loop can follow"
     if delay > 0.0 and delay**2 * squares >= _EXPLAINED * case.settled.error**2:
         text = f"it is {1.0e3 * delay:.3g} ms behind its reference"
     remedies = [*stiffened(scenario, (2.0, 4.0)), *larger_gains(scenario, case.law, (2.0, 4.0))]
@@ -228,7 +230,7 @@ def gains_of_another_device(case: Case) -> TrackingCause | None:
         return None
     # Without its integral a loop rests beside its reference with any gain.
     others = () if case.oscillates else default_integral_remedy(case.scenario, case.law)
-    return TrackingCause("its gains are not this device's", (default_gain, *others))
+    return TrackingCause("its gains do not suit this device", (default_gain, *others))
 
 
 def _poor_sensors(case: Case) -> TrackingCause | None:
@@ -240,7 +242,7 @@ def _poor_sensors(case: Case) -> TrackingCause | None:
         return None
     remedies = [remedy(scenario, {path: number / factor}) for path, number in found.items() for factor in _LESS]
     told = ", ".join(f"`{path} = {level_text(declared[path].unit, number)}`" for path, number in found.items())
-    return TrackingCause(f"its sensors tell too little of what it controls ({told})", tuple(remedies))
+    return TrackingCause(f"its sensors are too poor for the controlled quantity ({told})", tuple(remedies))
 
 
 def _law_without_torque_loop(case: Case) -> TrackingCause | None:
@@ -267,7 +269,7 @@ def _not_settled(case: Case) -> TrackingCause:
     settings = case.scenario.controller.settings
     stop = stop_of(case.scenario, case.recording["angle"][case.settled.samples])
     if stop and case.scenario.controlled == ANGLE:
-        return TrackingCause(f"the joint lies on its {stop} stop", (), "look at what presses it")
+        return TrackingCause(f"the joint lies on its {stop} stop", (), "check the load that presses it there")
     if _is_settling(case):
         longer = [remedy(case.scenario, {"run.duration": times * case.scenario.run.duration}) for times in (2.0, 4.0)]
         quicker = larger_gains(case.scenario, case.law, (2.0, 4.0))
@@ -276,8 +278,10 @@ def _not_settled(case: Case) -> TrackingCause:
     integral = next((name for name in settings if "integral" in name and settings[name] == 0.0), "")
     if integral:
         remedies = tuple(default_integral_remedy(case.scenario, case.law))
-        return TrackingCause("what stays is left to an integral, which is 0", remedies, f"give some `{integral}`")
-    return TrackingCause("reach, dead band, friction and opening do not tell why", (), "look at the figure")
+        return TrackingCause(
+            "the remaining error needs integral action, whose gain is 0", remedies, f"set `{integral}` above 0"
+        )
+    return TrackingCause("torque limit, dead band, friction and valve opening do not explain it", (), "see the figure")
 
 
 CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (

@@ -122,8 +122,8 @@ def flung_at_start(case: Case) -> TrackingCause | None:
     needed = supply_for(device, start, load)
     text = (
         f"at the start its chambers give {level_text('N m', load - lacking)} for a load of "
-        f"{level_text('N m', load)}: the joint is flung {change_text(ANGLE, deviation)} away before "
-        "they are filled"
+        f"{level_text('N m', load)}: the joint moves {change_text(ANGLE, deviation)} away "
+        "before they are filled"
     )
     pressures = {"initial.pressure_1": atmosphere, "initial.pressure_2": atmosphere}
     if needed is not None:

@@ -19,6 +19,7 @@ from ppafo.simulation.tracking.rule import (
     smallest_change,
     torque_limit,
 )
+from ppafo.units import without_exponent
 from ppafo.units.shown import in_units
 from ppafo.wording import subject_text
 
@@ -57,8 +58,8 @@ def unlimited_switching(result: "RecordedResult") -> str:
         return ""
     missing = ", ".join(f"`valve.{name}`" for name in limits)
     return (
-        f"its valves are reversed {often:.3g} times a second, and no value of the parameter set limits the "
-        f"rate ({missing} are 0): give the values of the valve, or a lower `controller.rate`"
+        f"its valves are reversed {without_exponent(often, '.3g')} times a second, and no value of the "
+        f"parameter set limits the rate ({missing} are 0): give the values of the valve, or a lower `controller.rate`"
     )
 
 

@@ -31,6 +31,7 @@ from ppafo.simulation.tracking.rule import (
     torque_limit,
 )
 from ppafo.simulation.tracking.walk_causes import CAUSES_OF_WALK
+from ppafo.units import without_exponent
 from ppafo.units.shown import in_units, units_in_force
 from ppafo.wording import override_text
 
@@ -111,7 +112,7 @@ class Tracking:
             if self.span:
                 swing = change_text(self.controlled, self.span)
                 return f"the {words} swings by {swing}, of {wanted} wanted{time_text(self.since)}"
-            often = f"{self.reversals:.3g} reversals a {self.per}"
+            often = f"{without_exponent(self.reversals, '.3g')} reversals a {self.per}"
             return f"the {words} loop oscillates: {often}, RMS {plain_error} of {wanted} wanted{time_text(self.since)}"
         if self.kind == "overshoots":
             return f"the {words} overshoots: {plain_moved} of {wanted} wanted at most"

@@ -23,9 +23,13 @@ from ppafo.units.shown import shown_text
 
 BOTTLE = "bottle"
 BOTTLE_NAME = f"{BOTTLE}.name"
-FILL = Quantity("fill", "1", "gas in the bottle over a full one's", 1.0, 0.0, 1.0, minimum_allowed=False)
+FILL = Quantity(
+    "fill", "1", "initial gas in the bottle, as a fraction of a full bottle", 1.0, 0.0, 1.0, minimum_allowed=False
+)
 TEMPERATURE = Quantity("temperature", "K", "temperature of bottle, regulator and hose at the start", None, 200.0, 400.0)
-LEAST_TORQUE = Quantity("least_torque", "1", "torque that ends the walk, over that at the set pressure", 0.9, 0.0, 1.0)
+LEAST_TORQUE = Quantity(
+    "least_torque", "1", "torque below which the walk ends, as a fraction of the torque at set pressure", 0.9, 0.0, 1.0
+)
 COUPLING = Quantity("coupling", "s", "time between two exchanges of bottle and device", 0.1, 1.0e-3, 1.0)
 _SET_PRESSURE = "regulator.set_pressure"
 BOTTLE_OVERRIDES = {path if path.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{path}": path for path in PATHS}

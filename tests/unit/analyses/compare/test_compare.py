@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import ppafo
+from ppafo.analyses.compare.answer import _change_panels, _pareto_panels
 from ppafo.analyses.compare.pairs import best_probabilities, compare_pairs, pareto_front
 from ppafo.analyses.compare.question import compare
 from ppafo.errors import StudyError
@@ -91,6 +92,7 @@ def test_the_front_has_what_nothing_beats_in_all_goals() -> None:
 
 
 STUDY = "torque-task-uncertainty"
+PANELS = (_pareto_panels, _change_panels)
 
 
 def test_the_paper_comes_out_and_holds_over_the_uncertainty_of_the_device() -> None:
@@ -212,6 +214,16 @@ def test_an_override_that_one_configuration_lacks_names_it_and_the_way_to_anothe
     assert "for 'torque-task-proportional' alone: overrides=['torque-task-proportional:PATH=" in str(caught.value)
     with pytest.raises(StudyError, match="there is no configuration 'solenoid', did you mean 'torque-task-solenoid'"):
         compare(given, overrides=["solenoid:valve.area=5 mm^2"])
+
+
+def test_a_configuration_has_one_colour_in_all_figures() -> None:
+    compared = compare(study=STUDY, draws=32).found
+    pareto, change = (
+        {mark.label: mark.colour for mark in panels(compared)[0].marks if mark.label} for panels in PANELS
+    )
+    assert set(pareto) == {"proportional", "solenoid"}
+    assert pareto["solenoid"] == change["solenoid"]
+    assert pareto["proportional"] != pareto["solenoid"]
 
 
 def test_mistakes_are_one_line() -> None:

@@ -3,6 +3,7 @@
 import io
 import json
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.linearise.answer import finding_of, steps_of
+from ppafo.analyses.linearise.answer import finding_of, frequency_panels, steps_of
 from ppafo.analyses.linearise.model import LinearModel, SlopeKink
 from ppafo.analyses.linearise.question import linearise
 from ppafo.constants import STANDARD_GRAVITY
@@ -352,6 +353,16 @@ def test_margins_and_crossover_are_those_of_loop_shaping() -> None:
     assert margins.gain_crossover == pytest.approx(5.107, abs=1e-3)
     assert "phase margin       79.2 deg at 5.11 Hz" in text_of(finding)
     assert "no margins of the loop: controller 'constant' is no PID" in text_of(linearise("step-response"))
+    assert re.search(
+        r"gain margin .* at 500 Hz, half the sample rate: the phase reaches -180 deg there only", text_of(finding)
+    )
+    gain, phase = frequency_panels(finding.found)[:2]
+    # The dots stand where the margins are read.
+    at = {mark.label: (mark.x[0], mark.y[0]) for mark in gain.marks[2:]}
+    assert at["phase margin at 5.11 Hz"] == pytest.approx((margins.gain_crossover, 1.0), rel=1e-3)
+    assert at["gain margin at 500 Hz"] == pytest.approx((500.0, 1.0 / margins.gain_margin), rel=1e-3)
+    assert phase.marks[2].y[0] - phase.marks[1].y[0] == pytest.approx(79.2, abs=0.1)
+    assert len(frequency_panels(linear("step-response"))) == 2
     # Of the two integrators of two sealed chambers the loop has one.
     sealed = linear(TASK, overrides=[*HOLD, "actuator.leak.area=0 mm^2"]).margins
     assert sealed is not None

@@ -110,6 +110,6 @@ def _sections(requirements: DesignRequirements, device: SizedDevice) -> tuple[fi
     masses = ((name, MASS.text(mass, ".0f")) for name, mass in device.masses.items())
     return (
         finding.Section("The walk on its bottle", facts(rows), remarks=remarks, code=device.command),
-        finding.Section("What it weighs", facts(masses)),
+        finding.Section("Masses", facts(masses)),
         finding.Section("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
     )
