@@ -141,7 +141,7 @@ def test_several_recordings_stand_side_by_side(tmp_path: Path, capsys: pytest.Ca
     one, two = (folder_of(walk_gas(solenoid()), tmp_path / name) for name in ("one", "two"))
     assert main(["bottle", str(one), str(two), "--longest", "5 s"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    titles = ["gas use", "gas per stride (g)", "walking (min)", "strides", "ended"]
+    titles = ["gas use", "gas per stride (g)", "walking (s)", "strides", "ended"]
     assert re.split(r"\s{2,}", lines[2].replace("gas use", "gas use ")) == titles
     assert lines[3].split()[0] == str(one)
     assert lines[3].split()[1:] == lines[4].split()[1:]
@@ -151,7 +151,7 @@ def test_several_recordings_stand_side_by_side(tmp_path: Path, capsys: pytest.Ca
     ("more", "words"),
     [
         (["--stride-time", "1.1 s"], "one stride of its walk"),
-        (["--peak-flow", "4 g/s"], "belongs to --gas-per-stride"),
+        (["--peak-flow", "4 g/s"], "--peak-flow needs --gas-per-stride"),
         (["--gas-per-stride", "1 g"], "give either a recording or --gas-per-stride"),
     ],
 )
