@@ -3,6 +3,7 @@
 Documents may come from any source; each error names the key with an invalid value.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ppafo.arguments import checked
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, UnitError
+from ppafo.metrics.metric import Metric, Metrics
 from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.report.notebook import shown
 from ppafo.report.recording_figure import recording_figure
@@ -42,10 +44,25 @@ def read_result(folder: str | Path) -> StoredResult:
     >>> import ppafo
     >>> folder = ppafo.simulate("step-response").save("step")
     >>> stored = ppafo.read_result(folder)
-    >>> stored.document["status"], len(stored.plot().axes)
-    ({'kind': 'completed', 'time': None, 'message': 'completed'}, 5)
+    >>> stored.document["status"]["kind"], len(stored.plot().axes), round(max(stored["pressure_1", "psi_g"]))
+    ('completed', 5, 55)
     """
-    return replace(read_stored(folder), drawn_by=draw_stored_result)
+    stored = read_stored(folder)
+    file = stored.folder / RUN_FILE
+    metrics = Metrics()
+    for name, stated in _under(file, stored.document, "metrics").items():
+        try:
+            metrics[name] = _stored_metric(stated)
+        except (KeyError, TypeError, ValueError) as error:
+            raise _other_form(file, f"metrics.{name}", stated, "a value with unit and summary") from error
+    atmosphere = _stated_atmosphere(file, stored.document, "scenario", "device")
+    return replace(stored, metrics=metrics, atmosphere=atmosphere, drawn_by=draw_stored_result)
+
+
+def _stored_metric(stated: Mapping[str, Any]) -> Metric:
+    # JSON has no nan, which a metric without a value has.
+    value = math.nan if stated["value"] is None else float(stated["value"])
+    return Metric(value, str(stated["unit"]), str(stated["summary"]))
 
 
 def draw_stored_result(stored: StoredResult, width: float | str | None = None) -> "Figure":
@@ -98,13 +115,18 @@ def stated_units(
             conversion(str(unit), si_unit)
         except UnitError as error:
             raise _other_form(file, f"shown.{one_line(si_unit)[:_LONGEST_SHOWN]}", unit, "a unit for it") from error
-    path = (*keys, *device, "supply", "atmospheric_pressure")
+    return counted_from(stated, _stated_atmosphere(file, document, *keys, *device))
+
+
+def _stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) -> float:
+    """Return the atmosphere of the device at some keys of a document [Pa absolute], standard if it is missing."""
+    path = (*device, "supply", "atmospheric_pressure")
     atmosphere = _under(file, document, *path[:-1]).get(path[-1], STANDARD_ATMOSPHERE)
     # JSON has true and false, which Python takes for 1 and 0.
     is_number = isinstance(atmosphere, int | float) and not isinstance(atmosphere, bool)
     if not is_number or not 0.0 < atmosphere < _LARGEST:
         raise _other_form(file, ".".join(path), atmosphere, "a pressure in Pa")
-    return counted_from(stated, float(atmosphere))
+    return float(atmosphere)
 
 
 def _ending(file: Path, document: Mapping[str, Any]) -> str:

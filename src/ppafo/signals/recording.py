@@ -327,17 +327,20 @@ class Recording:
         }
         return Recording(self.label, wanted, moved, self.kind)
 
-    def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
+    def to_dataframe(
+        self, units: Mapping[str, str] | None = None, atmosphere: float = STANDARD_ATMOSPHERE
+    ) -> "pandas.DataFrame":
         """Return the channels as columns indexed by time [s], in SI or in ``units``, such as ``{"angle": "deg"}``.
 
-        Gauge pressures count from the standard atmosphere. Raises DataError for an unknown channel, and UnitError for a
-        unit that does not fit the channel.
+        Gauge pressures are relative to ``atmosphere`` [Pa absolute]. Raises DataError for an unknown channel, and
+        UnitError for a unit that does not fit the channel.
         """
         from pandas import DataFrame, Index
 
         shown = {**{name: channel.unit for name, channel in self.channels.items()}, **(units or {})}
         columns = {
-            name: self.in_unit(name, unit) if name in (units or {}) else self[name] for name, unit in shown.items()
+            name: self.in_unit(name, unit, atmosphere) if name in (units or {}) else self[name]
+            for name, unit in shown.items()
         }
         frame = DataFrame(columns, Index(self.time, name=TIME))
         frame.attrs = {"title": self.label, "kind": self.kind, "units": shown}

@@ -6,9 +6,11 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError
 from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import csv_bytes
 from ppafo.storage.files import add_files, read_bytes
 from ppafo.storage.netcdf import netcdf_bytes
@@ -37,22 +39,33 @@ SCHEMA_VERSION = 1
 
 @dataclass(frozen=True, slots=True, repr=False)
 class StoredResult:
-    """Content of a result folder: the recording, and ``run.json`` as plain data.
+    """Content of a result folder: the recording, the metrics by name, and ``run.json`` as plain data.
 
-    ``drawn_by`` is the function that draws the figure at a width.
+    ``stored["torque"]`` and ``stored["pressure_1", "psi_g"]`` are the values of a channel, as of a ``Result``.
+    ``atmosphere`` [Pa absolute] is the reference of gauge pressures, ``drawn_by`` draws the figure at a width.
     """
 
     folder: Path
     recording: Recording
     document: Mapping[str, Any]
+    metrics: Mapping[str, Any] = field(default_factory=dict)
+    atmosphere: float = STANDARD_ATMOSPHERE
     drawn_by: "Callable[[StoredResult, float | str | None], Figure] | None" = field(default=None, compare=False)
 
     def __repr__(self) -> str:
         return f"StoredResult in {self.folder}: {', '.join(self.document)}\n{self.recording!r}"
 
+    def __getitem__(self, channel: str | tuple[str, str]) -> Floats:
+        """Return a channel's values, in SI or in a given unit; ``time`` are the times of the samples [s]."""
+        if channel == "time":
+            return self.recording.time
+        if isinstance(channel, str):
+            return self.recording[channel]
+        return self.recording.in_unit(*channel, self.atmosphere)
+
     def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
         """Return the channels as columns indexed by time [s]: ``Recording.to_dataframe``."""
-        return self.recording.to_dataframe(units)
+        return self.recording.to_dataframe(units, self.atmosphere)
 
     def plot(self, width: float | str | None = None) -> "Figure":
         """Return the same figure as ``Result.plot``; ``.savefig(...)`` writes it to a file."""

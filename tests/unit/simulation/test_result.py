@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 import re
 from pathlib import Path
 
@@ -88,6 +89,11 @@ def test_a_controller_written_in_python_is_named_in_the_document(step_response: 
 def test_a_saved_result_is_read_back(result: Result, tmp_path: Path) -> None:
     stored = read_result(result.save(tmp_path / "task", {"figure.png": b"png"}))
     assert stored.recording == result.recording
+    assert stored.metrics["angle_range"] == result.metrics["angle_range"]
+    assert math.isnan(stored.metrics["broken"].value)
+    # Values of channels as of a result, gauge pressures from the atmosphere of its device.
+    assert stored["pressure_1", "psi_g"].tolist() == result["pressure_1", "psi_g"].tolist()
+    assert (stored["time"].tolist(), stored["angle"].tolist()) == (result["time"].tolist(), result["angle"].tolist())
     assert stored.document["scenario"] == json.loads(json.dumps(scenario_document(result.scenario)))
     assert (tmp_path / "task" / "figure.png").read_bytes() == b"png"
 

@@ -87,8 +87,8 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
 def _sections(requirements: DesignRequirements, device: SizedDevice) -> tuple[finding.Section, ...]:
     walked = device.walked
     share = device.torque / requirements.torque
-    # A walk on a bottle may end at nine tenths of the request, so how far it fell short is said.
-    short = f" ({100.0 * share:.0f} % of the request: pressure falls with the bottle)" if share < 1.0 else ""
+    # A device is granted from 95 % of the request on, so how far it fell short is said.
+    short = f" ({100.0 * share:.0f} % of the request)" if share < 1.0 else ""
     duration, lasts = duration_text(requirements.seconds), duration_text(device.life.discharge.walking_time)
     last = TORQUE.text(float(walked.peak_torques[-1]))
     rows = (
