@@ -76,8 +76,8 @@ def endurance_of_gas_use(
             species = override.text if override.text in SPECIES else "NAME"
             again = override_text([f"{SPECIES_PATH}={species}"])
             raise ParameterError(
-                f"override '{override}': a bottle has no value '{override.typed}'; its gas is that of its file, and "
-                f"the device's that of the run: repeat the run of {name} with {again}, then give its folder"
+                f"override '{override}': a bottle has no value '{override.typed}'; its file names the gas, and the "
+                f"scenario of the run the device's: repeat the run of {name} with {again}, then give its folder"
             )
     gas = walk_gas(use) if isinstance(use, WalkResult) else None
     if isinstance(use, str | Path) and (Path(use) / WALK_FILE).is_file():
