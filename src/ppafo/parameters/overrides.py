@@ -167,7 +167,7 @@ def in_two_forms(paths: Collection[str], forms: Forms = FORMS) -> tuple[str, str
 
 
 def either(path: str, forms: Forms = FORMS) -> str:
-    """Return the request for a message about a quantity given in two forms."""
+    """Return the sentence of a message that asks for a single form of a quantity."""
     section = path.rpartition(".")[0]
     ways = forms["valve" if section.startswith(NAMED_VALVE) else section]
     return f"give either {' or '.join(' and '.join(f'{section}.{name}' for name in way) for way in ways)}, not both"
@@ -267,7 +267,7 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
 
 
 def _in_conductance(override: Override) -> str:
-    """Return the two equivalent ISO 6358 settings for a Cv, Kv or nominal flow; empty for any other value."""
+    """Return a note with the equivalent ISO 6358 settings of a Cv, Kv or nominal flow; empty for any other value."""
     section, _, name = override.typed.rpartition(".")
     if name.lower() not in ("cv", "kv", "qn"):
         return ""

@@ -1,4 +1,4 @@
-"""Gas bottles by name: of a bottle file, or of the catalogue of parts.
+"""Gas bottles by name, from bottle files or the catalogue of parts.
 
 The catalogue of parts states only the gas of a bottle and its mass. All other values are scaled from the paper's bottle
 at the same filling density: volume in proportion to the gas, heat capacity of the wall to the mass, surfaces to the 2/3
@@ -117,7 +117,7 @@ class Bottle:
 
 
 def is_of_catalogue(name_or_path: str | Path) -> bool:
-    """Return True if a name is a part of a catalogue file, ``CATALOGUE.toml/PART``."""
+    """Tell whether a name has the form ``CATALOGUE.toml/PART`` of a part in a catalogue file."""
     return Path(name_or_path).parent.suffix == ".toml"
 
 
