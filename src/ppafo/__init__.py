@@ -86,7 +86,7 @@ __all__ = list(_HOME_OF)
 
 
 def _compiler_of_c(name: str) -> Compiler:
-    """Return a compiler of C, which knows the translation above the engine."""
+    """Return the C compiler ``gcc``, ``clang`` or ``zig``, imported only when needed."""
     from ppafo.translation.native import compiler
 
     return compiler(name)

@@ -1,4 +1,4 @@
-"""Start of the command line, ``ppafo`` or ``python -m ppafo``; an interrupt while modules load is no traceback."""
+"""Start of the command line, ``ppafo`` or ``python -m ppafo``; Ctrl-C during imports prints no traceback."""
 
 import os
 import sys

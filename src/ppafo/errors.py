@@ -20,7 +20,7 @@ class ArgumentError(PpafoError):
 
 
 class UnitError(PpafoError):
-    """Text that is not a quantity, or has an unsuitable unit; the file reader adds the file and the key."""
+    """Text that is no quantity or has an unsuitable unit; file readers prefix file and key."""
 
 
 class ParameterError(PpafoError):
@@ -32,7 +32,7 @@ class DataError(PpafoError):
 
 
 class ScenarioError(PpafoError):
-    """Scenario file or object that asks for something impossible."""
+    """Invalid scenario file or object."""
 
 
 class SimulationError(PpafoError):
@@ -48,7 +48,7 @@ class KindError(PpafoError):
 
 
 class StudyError(PpafoError):
-    """Study file that asks for something impossible, or results that belong to another study."""
+    """Invalid study file, or results that belong to another study."""
 
 
 class IdentificationError(PpafoError):
@@ -78,7 +78,7 @@ def refused_as(kind: Callable[[str], PpafoError], place: object, *caught: type[E
 
 
 def check_all(chains: Iterable[Sequence[Callable[[], None]]]) -> None:
-    """Call all checks; raise one PpafoError, of the class of the first fault, with the messages of all faults.
+    """Run all checks; raise one PpafoError of the class of the first fault, with the messages of all faults.
 
     Each check of a chain relies on the previous ones and is skipped once one of them has failed.
     """

@@ -1,6 +1,6 @@
-"""An interrupt while Python still loads what the command line begins with: one line, where there would be a traceback.
+"""Handling of Ctrl-C during the first imports of the command line: a one-line message instead of a traceback.
 
-Only what every Python has loaded already is imported here, so that little comes before it.
+Only modules that Python has already loaded are imported here, so that the handler is active early.
 """
 
 import _signal  # type: ignore[import-not-found]
@@ -13,13 +13,13 @@ _COMMANDS = ("ppafo", "ppafo.exe", "ppafo-script.py")
 
 
 def end(_number: int, _frame: object) -> None:
-    """End the process by an interrupt, at once: nothing was begun."""
+    """End the process immediately on an interrupt; no work has started yet."""
     os.write(2, _LINE)
     os._exit(_EXIT_CODE)
 
 
 def is_command_line() -> bool:
-    """Tell whether this process was started as ``ppafo`` or ``python -m ppafo``, and not by a program that imports."""
+    """Return whether this process was started as ``ppafo`` or ``python -m ppafo`` rather than imports the package."""
     started = sys.orig_argv
     by_module = any(started[place : place + 2] == ["-m", "ppafo"] for place in range(1, len(started) - 1))
     return by_module or os.path.basename(sys.argv[0] if sys.argv else "") in _COMMANDS  # noqa: PTH119

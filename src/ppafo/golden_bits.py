@@ -34,7 +34,7 @@ VARIED = {
 }
 """Scenarios with special settings, for features that no shipped scenario uses."""
 TASK_SEQUENCES = {"first-steps": "proportional"}
-"""Task sequences, and the walk for each."""
+"""Names of the task sequences that are run, each with the walk that performs it."""
 WALKED = 4.0
 """Duration of a walk [s]."""
 

@@ -1,4 +1,4 @@
-"""Early termination: Ctrl-C, a termination request and a closed terminal are handled alike.
+"""Handling of termination signals: Ctrl-C, a termination request and a closed terminal, all in the same way.
 
 Each signal raises KeyboardInterrupt in the main thread and is recorded. The record is needed because the exception is
 lost in finalisers, in compiled code that does not propagate it, and in libraries that catch it. Work in blocks checks

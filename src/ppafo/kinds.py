@@ -1,4 +1,4 @@
-"""Catalogues of kinds: kinds of this package, and kinds of other packages, which are found on request.
+"""Catalogues of components (kinds): valves, controllers, effects ... of this package and of installed plug-ins.
 
 A catalogue gives the location of each kind of this package as ``module:KIND`` and loads a kind when it is looked up: a
 run loads only its own valve and controller. A subpackage that no other one imports is reached only through such a
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 logger = logging.getLogger("ppafo")
 
 Kind = TypeVar("Kind")
-"""Entry of a catalogue: an object with a ``name``, or a function of another package named by its entry point."""
+"""Entry of a catalogue: a component with a ``name``, or a function of another package named by its entry point."""
 
 
 class Kinds(MutableMapping[str, Kind], Generic[Kind]):
-    """Kinds by name. Looking up a name loads its kind, also from another package; names are known without loading.
+    """Catalogue of components (kinds) by name; a component is imported when it is looked up.
 
     ``group`` is the group of entry points, ``word`` the name of a kind in messages, ``kind_type`` the class of the
     kinds. ``own`` maps the names of this package's kinds, in order, to kinds or to their locations, ``module:KIND``.
@@ -48,7 +48,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
             del self._own[name], self._places[name]
 
     def __getitem__(self, name: str) -> Kind:
-        """Return a kind; KeyError for an unknown name, KindError for a kind that cannot be used."""
+        """Return a component by name; KeyError for an unknown name, KindError for one that cannot be used."""
         if name in self._absent:
             raise KindError(f"{self.word} '{name}' is part of {self._absent[name]}, which is not installed")
         if name not in self._kinds:
@@ -59,41 +59,41 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         return self._kinds[name]
 
     def __setitem__(self, name: str, kind: Kind) -> None:
-        """Add a kind for the lifetime of the process."""
+        """Add a component for the lifetime of the process."""
         self._kinds[name] = kind
 
     def __delitem__(self, name: str) -> None:
-        """Remove a kind."""
+        """Remove a component from the catalogue."""
         del self._kinds[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Iterate over the names of this package's kinds, then of loaded kinds of other packages."""
+        """Iterate over component names: this package's, then those loaded from other packages."""
         return iter((*self._own, *(name for name in self._kinds if name not in self._own)))
 
     def __len__(self) -> int:
-        """Return the number of known names."""
+        """Return the number of component names over which the catalogue iterates."""
         return len(self._own.keys() | self._kinds.keys())
 
     def loaded(self) -> dict[str, Kind]:
-        """Return the loaded kinds by name: kinds of this package first, in order."""
+        """Return the loaded components by name: this package's first, in order."""
         return {name: self._kinds[name] for name in self if name in self._kinds}
 
     def loaded_or_own(self) -> dict[str, Kind]:
-        """Return the loaded kinds; if none is loaded, all kinds of this package."""
+        """Return the loaded components by name; if none is loaded, all components of this package."""
         if not self._kinds:
             self.load_own()
         return self.loaded()
 
     def is_own(self, name: str) -> bool:
-        """Tell whether a name belongs to a kind of this package."""
+        """Return whether a name belongs to a component of this package."""
         return name in self._own
 
     def load_own(self) -> None:
-        """Load every kind of this package."""
+        """Load every component of this package."""
         self._kinds |= {name: kind_at(location) for name, location in self._places.items() if name not in self._kinds}
 
     def load_all(self) -> tuple[str, ...]:
-        """Load every installed kind; return and log one line for each kind that cannot be used."""
+        """Load every installed component; return and log one line for each that cannot be used."""
         self.load_own()
         problems = []
         for point in _entry_points(self.group, _installed_path()):
@@ -136,7 +136,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         return self._checked(load, f"{self.word} '{one_line(point.name)}' of {_package(point)}", point.name)
 
     def _checked(self, load: Callable[[], Any], where: str, called: str) -> Kind:
-        """Return the loaded kind; KindError if it cannot be loaded, is no kind, or has another name than ``called``."""
+        """Return a loaded component; KindError if loading fails, its class is wrong, or its name is not ``called``."""
         try:
             kind: Kind = load()
         except KindError as error:
@@ -172,7 +172,7 @@ def _is_there(package: str) -> bool:
 
 
 def declared_kinds(group: str) -> dict[str, str]:
-    """Return the kinds that subpackages declare for a catalogue, as ``module:KIND`` by name.
+    """Return the components that subpackages add to a catalogue, as ``module:KIND`` by name.
 
     A catalogue cannot name kinds of packages that depend on it. A subpackage therefore declares its kinds in its
     ``kinds.toml``, like the entry points of another package: without the subpackage the kind is unknown, and nothing

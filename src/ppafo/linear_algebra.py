@@ -1,6 +1,6 @@
 """Thread limit of linear algebra libraries: one thread for the small matrices of a fit, a search or a study.
 
-If every processor runs models, several threads for one small product would only wait for each other.
+If every processor runs models, several threads per small matrix product would only slow each other down.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Loading of a scenario by name or file, for any motion of the ankle: a vane alone, or a leg that walks.
+"""Loading of a scenario by name or file, for any motion of the ankle: device alone, or on a walking leg.
 
 The extensive code of walks is only loaded on request.
 """
@@ -26,7 +26,7 @@ from ppafo.wording import nearest_name
 
 
 def list_all_scenarios() -> tuple[str, ...]:
-    """Return the names of the shipped scenarios: vanes alone first, then walks."""
+    """Return the names of the shipped scenarios: devices alone first, then walks."""
     from ppafo.walking.loading import list_walks
 
     return *of_vanes.list_scenarios(), *list_walks()

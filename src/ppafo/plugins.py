@@ -1,4 +1,4 @@
-"""User modules: of a word ``module:OBJECT``, only a module that the user named is imported.
+"""User modules (plug-ins): ``module:OBJECT`` in a file is imported only if the user has named the module.
 
 Files may come from other people and must not run code. A word in a file therefore finds an object only if the user
 named its module: on the command line, as ``plugins`` of a call in Python, or by importing the module.
@@ -156,7 +156,7 @@ def named_modules() -> Iterator[tuple[str, Mapping[str, Any]]]:
 
 
 def _remedy(module: str) -> str:
-    """Return the argument that names a module used by a file: its path if it is in the working folder."""
+    """Return the command-line or Python argument that allows a module: its path if in the working folder."""
     file = Path(*module.split(".")).with_suffix(_SUFFIX)
     if not file.is_file():
         return module if Path(module.partition(".")[0]).is_dir() else f"PATH/{file.as_posix()}"
@@ -182,7 +182,7 @@ def _imported(module: str, folder: str) -> Any:
 
 @contextmanager
 def without_working_folder() -> Iterator[None]:
-    """Context in which modules are only found in installed packages, on the search path without the working folder."""
+    """Remove the working folder from Python's search path within a ``with`` block."""
     before = sys.path[:]
     sys.path[:] = [folder for folder in before if not is_working_folder(folder)]
     try:
@@ -192,9 +192,9 @@ def without_working_folder() -> Iterator[None]:
 
 
 def is_working_folder(folder: str | Path) -> bool:
-    """Tell whether an entry of the search path is the working folder, which may contain files of other people.
+    """Return whether an entry of Python's search path is the working folder, whose files may be untrusted.
 
-    The folder of a package that somebody installed as editable is no such folder, wherever the command runs.
+    False for the source folder of an editable installation, even if the command runs in it.
     """
     try:
         is_here = os.path.samefile(folder or ".", ".")  # noqa: PTH121
@@ -206,7 +206,7 @@ def is_working_folder(folder: str | Path) -> bool:
 # Python reads path files when it starts, and every lookup of a kind in a notebook asks for them.
 @lru_cache(maxsize=4)
 def _pth_folders(*packages: str) -> frozenset[Path]:
-    """Return the folders that path files (``.pth``) in folders of packages put on the search path."""
+    """Return the folders that ``.pth`` files in package folders add to Python's search path."""
     folders = set()
     for file in (file for folder in packages for file in Path(folder).glob("*.pth")):
         lines = file.read_text(encoding="utf-8", errors="replace").splitlines()

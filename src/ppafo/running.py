@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from ppafo.simulation.tracking.remedies import Remedy
 
 MOST_TRIED = 16
-"""Largest number of remedies of a run that are tried."""
+"""Largest number of remedies of a run that are simulated."""
 _STRIDES_TRIED = 8.0
-"""Number of strides of a walk for trying a remedy."""
+"""Number of strides of a walk simulated to try a remedy."""
 
 
 @checked
@@ -78,9 +78,9 @@ def most_reversals(scenario: Scenario) -> float:
 
 
 def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
-    """Return a verdict with the first remedy that makes the run follow, from a run for each remedy.
+    """Return a tracking verdict with the first remedy that makes the run follow its reference; each is simulated.
 
-    Remedies are applied as the overrides that the verdict prints; a walk is tried on its first strides. If only a
+    Remedies are the overrides named in the verdict; for a walk, only the first strides are simulated. If only a
     remedy of a less certain cause succeeds, that cause becomes the cause of the verdict. If none succeeds, the verdict
     gets the remedy with the smallest remaining error, provided that this is less than half of the original one.
     """
@@ -127,7 +127,7 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
 
 
 def _trial_run(scenario: Scenario) -> RunSettings:
-    """Return the times of a run that tries a remedy: unchanged for a task, some strides for a walk."""
+    """Return the run times for a trial of a remedy: unchanged for a task, the first strides for a walk."""
     run, duration = scenario.run, _STRIDES_TRIED * scenario.motion.stride_time
     if scenario.follows_reference or not 0.0 < duration < run.duration:
         return run

@@ -1,3 +1,3 @@
-"""The version of the package, in a module that imports nothing, so that every other one may ask for it."""
+"""Version of the package, in a module without imports, so that every module can import it."""
 
 __version__ = "0.2.0"

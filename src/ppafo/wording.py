@@ -1,4 +1,4 @@
-"""Wording of messages: for their reader, nearest name, counts, lists of names, one-line text from other programs."""
+"""Wording of messages: arguments as the caller wrote them, nearest names, counts, lists of names, one-line text."""
 
 import contextlib
 import difflib
@@ -19,7 +19,7 @@ def count_of(number: int, noun: str) -> str:
 
 
 def said_missing(names: Sequence[str]) -> str:
-    """Return a statement on missing items: ``'a', 'b' and 'c' are missing``."""
+    """Return a statement that items are missing: ``'a', 'b' and 'c' are missing``."""
     quoted = [f"'{name}'" for name in names]
     listed = " and ".join(filter(None, (", ".join(quoted[:-1]), quoted[-1])))
     return f"{listed} is missing" if len(quoted) == 1 else f"{listed} are missing"
@@ -95,10 +95,10 @@ _reader: ContextVar[_Reader] = ContextVar("_reader", default="caller")
 
 @contextlib.contextmanager
 def read_by(reader: _Reader) -> Iterator[None]:
-    """Word errors within a ``with`` block for their reader: Python caller, function of the package, or command line.
+    """Word errors within a ``with`` block for a Python caller, a function of the package, or the command line.
 
-    A caller knows arguments, a command line user knows options. A function of the package passes arguments that its
-    caller never gave.
+    Messages name arguments for a Python caller and options on the command line, and neither for a function of the
+    package, whose arguments the user never gave.
     """
     token = _reader.set(reader)
     try:
@@ -140,7 +140,7 @@ def said_of_configuration(name: str) -> Iterator[None]:
 
 
 def subject_text(scenario: str) -> str:
-    """Return the subject of a message on a scenario: the configuration that is spoken of, else the scenario's name."""
+    """Return the subject of a message on a scenario: the configuration being processed, else the scenario's name."""
     return _configuration.get() or scenario
 
 

@@ -33,9 +33,9 @@ _REMEDIES = {"print": "; remove it: with PPAFO_BACKEND=python a debugger stops i
 
 
 def each(convert: Callable[[float], float], row: Row) -> Row:
-    """Return a row with each number converted, nested rows included: integers from floats, and back.
+    """Return a NamedTuple with ``convert`` applied to every number (float to int, or back), nested ones included.
 
-    The engine expands the call number by number, according to the declared class of the row.
+    In compiled code the call is expanded number by number, according to the declared class.
     """
     make: Any = type(row)
     made_row: Row = make(*(each(convert, value) if isinstance(value, tuple) else convert(value) for value in row))
@@ -58,7 +58,7 @@ class FunctionNames:
 
 
 def names_of(function: FunctionType) -> FunctionNames:
-    """Return the names of a function of the model as it is defined; its bound ``parts`` are known."""
+    """Return the names in a model function; ``parts``, if bound to the function, is a known value."""
     parts = parts_of(function)
     known = {} if parts is None else {"parts": parts}
     local, parameters = frozenset(function.__code__.co_varnames), frozenset(_parameters(function.__code__))
@@ -69,13 +69,13 @@ class ModuleText(Protocol):
     """Text of the module for which a function is composed."""
 
     def handed_to(self, name: str) -> tuple[str, ...]:
-        """Return the names passed to a function of the module before its own arguments."""
+        """Return the effect parameters and states that a generated function takes as leading arguments."""
 
     def constructed(self, row: Any) -> Any:
-        """Return the class that replaces a declared row in this module."""
+        """Return the class that replaces a declared NamedTuple class in this module."""
 
     def note_read(self, scope: Mapping[str, Any], name: str, value: Any) -> None:
-        """Record a name that was looked up, and its value."""
+        """Record an outside name and its value, on which the generated text depends."""
 
 
 class Composer(ast.NodeTransformer):

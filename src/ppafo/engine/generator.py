@@ -62,7 +62,7 @@ class StepText:
     composed: dict[FunctionType, ComposedFunction] = field(default_factory=dict)
     placeholders: dict[str, Any] = field(default_factory=dict)
     given: set[str] = field(default_factory=set)
-    """Groups of a step set by any phase so far, in the order of the loop."""
+    """Groups of intermediate values that the phases composed so far have set."""
 
     def __post_init__(self) -> None:
         """Look up the groups of the program, and link the functions of its components."""

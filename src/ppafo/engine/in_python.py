@@ -1,4 +1,4 @@
-"""Execution of model functions by Python as in a program: the same code, in which debuggers can stop.
+"""Interpreted execution of model functions with the replacements of a program; debuggers can stop in the code.
 
 A program may replace functions of the model by functions of its actuator and by laws of its effects. Copies of the
 calling functions then use the replacements: the same code with other global names, so that breakpoints in the source
@@ -68,7 +68,7 @@ class PythonFunctions:
         return SimpleNamespace(**{name: self.replaced(value) for name, value in values.items()})
 
     def replaced(self, value: Any) -> Any:
-        """Component of a program or an argument, with its functions replaced."""
+        """Return a program component or argument with the model functions in it replaced."""
         if isinstance(value, FunctionType | ModuleType):
             return self.of(value)
         if isinstance(value, Mapping):
@@ -81,7 +81,7 @@ class PythonFunctions:
         return value
 
     def of(self, value: Any, inside: Any = None) -> Any:
-        """Replacement of a value inside a function."""
+        """Return the replacement of a function, module or other global value that a function uses."""
         if self._is_plain:
             return value
         value = getattr(value, "__wrapped__", value)
@@ -141,7 +141,10 @@ def _names_of(code: CodeType) -> frozenset[str]:
 
 
 def functions_of(program: Program, rows: _EffectRows, operations: "Operations | None" = None) -> PythonFunctions:
-    """Return the model functions as replaced in a program, with rows of its effects; ProgramError as for linking."""
+    """Return the model functions as replaced in a program, given the parameters and states of its effects.
+
+    Raises ProgramError for an effect that cannot act.
+    """
     return PythonFunctions(_replacements_in(program), rows, operations)
 
 
@@ -195,7 +198,7 @@ def rewritten(function: FunctionType, writer: Callable[[FunctionType], ast.NodeT
 
 
 def over_samples(function: PlainFunction, *arguments: Any) -> Any:
-    """Return the value of a model function for rows and numbers, any of which may be columns (samples,).
+    """Evaluate a model function for NamedTuples and numbers, any of which may be arrays (samples,).
 
     Results that are the same for all samples may remain a single number.
     """
@@ -223,7 +226,7 @@ def _for_columns(function: PlainFunction) -> tuple[PythonFunctions, PlainFunctio
 def over_samples_in(
     program: Program, effects: Sequence[Any], function: PlainFunction, states: Mapping[str, Any], *arguments: Any
 ) -> Any:
-    """Return the value of a model function as replaced in a program, for columns (samples,) of arguments and states."""
+    """Evaluate a model function as replaced in a program, for arrays (samples,) of arguments and effect states."""
     if _copied(program, function) is function:
         # No law of an effect acts in it.
         return over_samples(function, *arguments)
@@ -237,7 +240,7 @@ def _copied(program: Program, function: PlainFunction) -> Any:
 
 
 def _over_samples(make: Callable[[Operations | None], PlainFunction], arguments: Sequence[Any]) -> Any:
-    """Return the value over samples of the function that ``make`` builds for given operations."""
+    """Evaluate the function that ``make`` builds for given operations, for arrays (samples,) of arguments."""
     sizes = {column.size for argument in arguments for column in _columns_of(argument)}
     if not sizes:
         return make(None)(*arguments)
@@ -275,7 +278,7 @@ def _samples_of(argument: Any, size: int) -> Iterable[Any]:
 
 
 def _stacked(results: list[Any]) -> Any:
-    """Return columns of the numbers of results of one shape."""
+    """Stack the results of all samples into arrays (samples,), nested as each single result."""
     first = results[0]
     if not isinstance(first, tuple):
         return np.array(results, dtype=np.float64)

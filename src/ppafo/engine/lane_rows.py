@@ -28,7 +28,7 @@ FIRST_CACHE = 48 * 1024
 
 
 HANDED = ("held.", "carried.")
-"""Groups of rows passed from one step to the next."""
+"""Prefixes of the groups of intermediate values that are passed from one step to the next."""
 
 
 @lru_cache(maxsize=64)

@@ -115,7 +115,7 @@ def effort_for(batch: Batch) -> Effort:
 
 
 def load_program(program: Program, effort: Effort = Effort.FULL) -> RunnableProgram:
-    """Return the compiled module of a program, from the cache if possible; or the program as run by Python.
+    """Return the compiled module of a program, from the cache if possible, or its pure-Python equivalent.
 
     The text is regenerated if a number or function used in it has changed. The text is also generated if Python runs
     the program, so that code which cannot be compiled is refused with the same message on every computer.

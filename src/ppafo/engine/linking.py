@@ -47,10 +47,10 @@ TEST_ANGLES = (1.0, 1.5)
 
 
 def check_net_torque() -> None:
-    """Refuse a spring in the sum of torques on the joint, with its file and line.
+    """Raise ProgramError for a spring that acts on the net joint torque but is missing in ``load_torque``.
 
-    Friction and stops are given the load of the joint by ``load_torque``: a spring that only the sum contains would not
-    be held at rest.
+    ``load_torque`` is the load that friction and stops balance at rest: a spring missing there would move a joint at
+    rest.
     """
     at_rest = [net_torque(0.0, 0.0, 0.0, angle, 0.0) for angle in TEST_ANGLES]
     if any(at_rest):

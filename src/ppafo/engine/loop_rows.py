@@ -100,7 +100,7 @@ class RowsOfLanes:
         return written
 
     def any_of(self, condition: ast.expr, is_none: bool) -> tuple[list[str], str]:
-        """Lines that count runs, because a sum of integers can be vectorised and a maximum of floats cannot."""
+        """Lines that count the runs with a condition, and the test of the count, which can be vectorised."""
         text = ast.unparse(self.with_cells(condition))
         lines = ["counted = 0", "for lane in range(width):", f"    counted += 1 if {text} else 0"]
         return lines, "counted == 0" if is_none else "counted > 0"
@@ -127,7 +127,7 @@ class RowsOfLanes:
         return [*copied, *(_for_each_lane(lines) if lines else [])]
 
     def value(self, method: str, arguments: Sequence[str]) -> str:
-        """Expression for whether a sample is traced, or for its index in the trace, a ring buffer."""
+        """Expression for a sample query: ``traces`` (whether it is traced) or ``slot`` (its index in the trace)."""
         index, trace_every = arguments
         return f"{index} % {trace_every} == 0" if method == "traces" else f"{index} // {trace_every} % trace.shape[0]"
 
@@ -166,7 +166,7 @@ class RowsOfRun:
         return written
 
     def any_of(self, condition: ast.expr, is_none: bool) -> tuple[list[str], str]:
-        """Expression of the condition for the single run."""
+        """No lines, and the condition itself: a single run needs no count of runs."""
         text = ast.unparse(self.with_cells(condition))
         return [], f"not {text}" if is_none else text
 
@@ -175,7 +175,7 @@ class RowsOfRun:
         return ["pass"]
 
     def value(self, method: str, arguments: Sequence[str]) -> str:  # noqa: ARG002 - a protocol
-        """Constant: every sample is traced, at the first index."""
+        """Constant result of a query on a sample: every sample is traced, at the first index of the trace."""
         return "True" if method == "traces" else "0"
 
     def heading(self, function: FunctionType) -> list[ast.stmt]:

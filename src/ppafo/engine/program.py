@@ -92,12 +92,12 @@ class Program:
         gas: module of ``engine.step`` for the gas
         late_signals: True for delayed signals
         late_readings: True for sensors of a walk that may be delayed by whole samples
-        leg: module ``walk`` for a walking leg, whose foot is free or led by ground and gait, with sensors of its own
+        leg: module ``walk`` for a walking leg, whose foot is free or moved by ground and gait, with sensors
         takes_task_sequence: True for a leg that stands, starts, changes speed and stops; False for equal strides
         faults: module ``failing`` for plant faults or a shut-off valve in a walk
         feed: module ``lines`` for supply lines; None for constant supply pressures
         is_adaptive: True for steps divided by error control
-        rests_whole: True if a step with a prescribed joint at rest is not divided when a locked joint would not need it
+        rests_whole: True if steps with a prescribed joint at rest are undivided under the conditions for a locked joint
         samples_inside: True if recorded samples lie inside steps
         meters: meters, updated at every sample that a recording would have
         traced: names of channels, or paths of state variables, stored at some of the samples

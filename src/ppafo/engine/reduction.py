@@ -292,7 +292,7 @@ class Reduction:
         return self.visit(node) if value is _UNKNOWN else ast.Constant(bool(value))
 
     def of_name(self, node: ast.Name) -> ast.expr:
-        """Return a name in its present spelling."""
+        """Return a local name, renamed where the module requires it."""
         return ast.Name(self.spellings.get(node.id, node.id), node.ctx)
 
     def of_ifexp(self, node: ast.IfExp) -> ast.expr:
@@ -324,7 +324,7 @@ class Reduction:
         return ast.UnaryOp(node.op, inner)
 
     def of_attribute(self, node: ast.Attribute) -> ast.expr:
-        """Return a group or a field."""
+        """Return a reduced attribute access: a group of numbers, or one field of a group."""
         name = self.group_path(node)
         return self.group_read(name) if name else self.with_reduced_operands(node)
 
@@ -424,7 +424,7 @@ class Reduction:
         return [(name, given[name]) for name in names]
 
     def arguments(self, node: ast.expr) -> Iterator[ast.expr]:
-        """Yield an argument, or the arguments of an expanded ``*(... for ... in ...)``."""
+        """Yield the arguments of a call; ``*(... for ... in ...)`` is expanded to single arguments."""
         if not isinstance(node, ast.Starred) or not isinstance(node.value, ast.GeneratorExp):
             yield self.visit(node)
             return
@@ -446,7 +446,7 @@ class Reduction:
     # Statements.
 
     def block(self, statements: Iterable[ast.stmt]) -> list[ast.stmt]:
-        """Return reduced statements, without statements after a certain ``return``."""
+        """Return reduced statements, without unreachable statements after an unconditional ``return``."""
         made: list[ast.stmt] = []
         for statement in statements:
             made += [ast.copy_location(line, statement) for line in self.statement(statement)]
@@ -600,7 +600,7 @@ class Reduction:
             yield from self.numbers_of(inside, self.member_of(row, way))
 
     def member_of(self, owner: ast.expr, way: str) -> ast.expr:
-        """Return a field or an item of a row; evaluated if the row is known."""
+        """Return the expression of a field or item of a NamedTuple or tuple; a value if these are known."""
         key = int(way[1:-1]) if way[0] == "[" else way[1:]
         if isinstance(owner, ast.Name) and owner.id in self.module.placeholders:
             value = self.module.placeholders[owner.id]
@@ -665,7 +665,7 @@ class _Renaming(ast.NodeTransformer):
     hidden: set[str]
 
     def spelling(self, name: str) -> str:
-        """Return the name in the module."""
+        """Return a local name, with an underscore appended if a group has the same name."""
         return f"{name}_" if name in self.hidden else name
 
     def visit_Name(self, node: ast.Name) -> ast.expr:

@@ -37,7 +37,7 @@ Floats = NDArray[np.float64]
 
 NEVER_FAILED = 1.0e300
 AT_REST = LaneResult(command=0.0, failure_time=NEVER_FAILED, too_many_parts=0.0)
-"""Result of a device before its first step."""
+"""Command and failure flags of a device before its first step."""
 TOO_MANY_PARTS = (
     f"one step needs more than {MAXIMUM_PARTS:,} substeps: use a smaller run.step, and check the delays of the valve, "
     "the inertia and the volumes (ppafo sets audit)"
@@ -224,7 +224,7 @@ def _states_of(run: Run) -> dict[str, Any]:
 
 
 def _alike_together(run: Run, runs: int, members: Members) -> Members:
-    """Return an order of runs in which neighbouring runs do similar things at about the same time.
+    """Return runs sorted by the time that their valves take to move the gas, so that blocks contain similar runs.
 
     The runs of a block wait for the slowest at every step. The time at which a vane moves depends on how long the valve
     takes to move the gas.
@@ -238,7 +238,7 @@ def _alike_together(run: Run, runs: int, members: Members) -> Members:
 
 
 def gas_at_start(run: Run) -> Any:
-    """Return the initial state of the gas in addition to ``PlantState``; with columns if the run has columns."""
+    """Return the initial gas state beyond ``PlantState``, such as true masses; arrays (runs,) if the run has arrays."""
     program, start = run.program, run.program.gas.START
     if start is None:
         return NoParameters()
@@ -255,7 +255,7 @@ def gas_at_start(run: Run) -> Any:
 
 
 def states_at_start(run: Run) -> list[Any]:
-    """Return the initial effect states of a run, in the order of the program; with columns if the run has columns."""
+    """Return the initial effect states of a run, in the order of the program; arrays (runs,) if the run has arrays."""
     initial, program = run.initial, run.program
     if not program.effect_states:
         return []
@@ -269,13 +269,13 @@ def states_at_start(run: Run) -> list[Any]:
 
 
 def moment_at_start(plant: PlantParameters, initial: PlantState, *, parts: ActuatorFunctions) -> PlantSnapshot:
-    """Return the state of the plant for effects at the start of the run."""
+    """Return the motion and pressures, without flow, from which effect laws compute their initial states."""
     pressure_1, pressure_2 = parts.pressures(plant, initial.angle, initial.mass_1, initial.mass_2)
     return _at_rest(initial, pressure_1, pressure_2)
 
 
 def _at_rest(initial: PlantState, pressure_1: float, pressure_2: float) -> PlantSnapshot:
-    """Return a state of the plant with absolute pressures [Pa] and no flow."""
+    """Return the input of effect laws for absolute pressures [Pa], zero flows and zero command."""
     return PlantSnapshot(
         angle=initial.angle,
         angular_velocity=initial.angular_velocity,

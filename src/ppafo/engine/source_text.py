@@ -74,7 +74,7 @@ class Replacements:
     rows: dict[PlainFunction, tuple[str, ...]] = field(default_factory=dict)
 
     def called(self, function: Any, caller: Any = None) -> Any:
-        """Return the function that is called instead of a function, inside a caller if one is given.
+        """Return the replacement of a called function, specific to ``caller`` if given; by default the function itself.
 
         A NamedTuple class is returned as it is.
         """
@@ -86,8 +86,8 @@ class Replacements:
 class SourceCollector:
     """Collector of definitions in dependency order; ``adapt`` may rewrite a definition.
 
-    A function that ``replacements`` replaces is never added, but its replacement. Rows that a replacement takes are
-    parameters of all its callers too, up to the text around the module (``needs``, ``composed_lines``).
+    Functions in ``replacements`` are added in their replaced form. Effect rows that a replacement takes become
+    parameters of all its callers, up to the text around the module (``needs``, ``composed_lines``).
     """
 
     decorator: str
@@ -103,7 +103,7 @@ class SourceCollector:
         return self._add(self.replacements.called(function))
 
     def _add(self, item: Any) -> str:
-        """Add a function or NamedTuple class itself, not its replacement. ProgramError if it cannot be compiled."""
+        """Add a function or NamedTuple class without replacement. ProgramError if it cannot be compiled."""
         if not is_row(item):
             check_is_plain(item)
         name = emitted_name(item)
@@ -127,15 +127,15 @@ class SourceCollector:
         return "\n\n\n".join(self.definitions.values())
 
     def note_read(self, scope: Mapping[str, Any], name: str, value: Any) -> None:
-        """Record a name that was looked up during composition, and its value."""
+        """Record an outside name and its value, on which the generated text depends."""
         self.made_from.reads.append(NameRead(scope, name, value))
 
     def handed_to(self, name: str) -> tuple[str, ...]:
-        """Return the names passed to a function of the module before its own arguments."""
+        """Return the effect parameters and states that a generated function takes as leading arguments."""
         return self.needs.get(name, ())
 
     def constructed(self, row: Any) -> Any:
-        """Return the class that replaces a declared row in this module."""
+        """Return the class that replaces a declared NamedTuple class in this module."""
         return self.replacements.constructed.get(row, row)
 
     def decorated(self, tree: ast.FunctionDef, file: str) -> str:

@@ -1,7 +1,7 @@
-"""Export of the torque of a walk to OpenSim: a table with its names, zeros and signs. OpenSim is not required.
+"""Export of the torque of a walk to OpenSim: a table with OpenSim's names, zeros and signs.
 
-Inverse dynamics of OpenSim 4.6 applied the torque by PrescribedController and PrescribedForce alike, to 1e-4 N m.
-Static optimisation controls every actuator itself and set the device torque to 0 N m.
+OpenSim is not required. Inverse dynamics of OpenSim 4.6 applied the torque by PrescribedController and PrescribedForce
+alike, to 1e-4 N m. Static optimisation controls every actuator itself and set the device torque to 0 N m.
 """
 
 from collections.abc import Sequence

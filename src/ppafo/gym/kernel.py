@@ -30,7 +30,7 @@ class Action(NamedTuple):
 
 
 class _ObservationFlag(NamedTuple):
-    """Flag of an environment: 1 if it is observed in this call, else 0."""
+    """Flag of an environment: 1 if its sensors, reward and end are evaluated in this call, else 0."""
 
     is_observed: float
 
@@ -125,7 +125,7 @@ def observe(
 
 
 def tables_judged(program: Program, task: Task) -> dict[str, Mapping[str, Any]]:
-    """Groups of the arrays that ``judge`` takes, by name."""
+    """Groups of numbers in each array that ``judge`` takes, by array name."""
     return {
         "states": program.state_rows(),
         "parameters": program.parameter_rows(),
@@ -137,7 +137,7 @@ def tables_judged(program: Program, task: Task) -> dict[str, Mapping[str, Any]]:
 
 
 class PythonKernel:
-    """The three calls of a kernel in plain Python."""
+    """Pure-Python kernel with the three functions of a compiled one: ``command``, ``advance`` and ``judge``."""
 
     def __init__(self, program: Program, task: Task) -> None:
         self._program, self._task = program, task

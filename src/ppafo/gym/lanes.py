@@ -56,7 +56,7 @@ class EpisodeStarts:
     goals: Floats
 
     def repeated(self, count: int) -> "EpisodeStarts":
-        """Starts of ``count`` equal episodes, from the start of one."""
+        """Return the starts of ``count`` equal episodes, given the start of a single one."""
         return EpisodeStarts(*(np.repeat(rows, count, axis=1) for rows in (self.parameters, self.states, self.goals)))
 
 

@@ -69,7 +69,7 @@ def picture(moments: Sequence[EpisodeFrame], unit: str, period: float, device: D
 
 
 def _finish(axes: "Axes", end: float, label: str, level: float) -> None:
-    """Label the axes of a curve over time up to ``end`` [s], and draw a line at ``level``."""
+    """Label the axes of a curve over time up to ``end`` [s], and draw a horizontal line at ``level``."""
     axes.axhline(level, color=GREY, linewidth=0.8, linestyle="--")
     axes.set_ylabel(label)
     axes.set_xlim(0.0, end)

@@ -31,7 +31,7 @@ class Goal(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Gas from the supply so far [kg]; in a walk also the time of the last heel strike [s], and 1 for a loaded heel."""
+    """Values kept between samples: supplied gas [kg], and in a walk last heel strike [s] and 1 for a loaded heel."""
 
     supplied_mass: float
     strike: float
@@ -132,12 +132,12 @@ def view_walk(
 
 
 def remember(memory: Memory, supplied_mass: float, seen: Measurement, time: float) -> Memory:
-    """Memory after a sample, with the gas [kg] supplied so far."""
+    """Return the kept values after a sample, with the gas [kg] supplied so far."""
     return Memory(supplied_mass, memory.strike, memory.loaded)
 
 
 def remember_strike(memory: Memory, supplied_mass: float, seen: GaitMeasurement, time: float) -> Memory:
-    """Memory of a walk after a sample; the heel sensor force [N] at ``time`` [s] reveals a heel strike."""
+    """Return the kept values of a walk after a sample; a heel strike is detected from the heel force [N]."""
     # Two thresholds, so that noise about one of them is not counted as a row of strikes.
     strikes = (memory.loaded < 0.5) & (seen.heel_force > LOADED)
     stays = 0.0 if seen.heel_force < UNLOADED else memory.loaded
@@ -170,7 +170,7 @@ def finite(value: float) -> float:
 
 
 def within(value: float, lowest: float, highest: float) -> float:
-    """The value, limited to two bounds, as by a converter; the lowest for nan."""
+    """The value, clipped to two bounds, as by a converter; the lower bound for nan."""
     above = value if value >= lowest else lowest
     return above if above <= highest else highest
 

@@ -243,7 +243,7 @@ class World:
         return self._scaled(lanes.begin(places, columns)), drawn
 
     def act(self, lanes: Environments, actions: Any) -> BatchStep:
-        """Return the result of actions that apply to ``frame_skip`` samples, or up to the end of an episode.
+        """Apply actions for ``frame_skip`` samples, or up to the end of an episode, and return the result.
 
         Rewards are added up. Raises SimulationError for an action that is not finite.
         """

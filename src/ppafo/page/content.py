@@ -273,7 +273,7 @@ def _shown(entry: Mapping[str, Any], joint: JointNames) -> dict[str, str]:
 
 
 def _gauge_texts(scenario: Scenario, settings: Iterable[Mapping[str, Any]]) -> dict[str, str]:
-    """Return texts of the gauge pressures that follow the atmosphere, as in Python."""
+    """Return settings given as gauge pressures, as texts; their absolute values follow the atmosphere."""
     following = {entry["key"] for entry in settings if entry["follows"]}
     gaps = {
         path: link.gap

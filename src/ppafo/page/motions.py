@@ -1,4 +1,4 @@
-"""Presentation of scenarios and walks on a page: tab, and setting limits known only from files."""
+"""Presentation of scenarios and walks on a page: tab title, and limits of settings that only files declare."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -49,7 +49,7 @@ def usual_changes(scenario: Scenario) -> dict[str, str]:
 
 
 def with_limits(entry: Mapping[str, Any], scenario: Scenario) -> dict[str, Any]:
-    """Return a setting with additional limits, which its file has and its program lacks."""
+    """Return a setting with the additional limits that a scenario file checks and a program does not."""
     if is_walk(scenario):
         from ppafo.walking.motion import LONGEST_MINUTES, SHORTEST_STRIDES
 
@@ -63,7 +63,7 @@ def with_limits(entry: Mapping[str, Any], scenario: Scenario) -> dict[str, Any]:
 
 
 def relations_in_files(keys: Collection[str], scenario: Scenario) -> list[dict[str, Any]]:
-    """Return the relations between settings that a file checks and the program does not."""
+    """Return the relations between settings that a scenario file checks and a program does not."""
     if not is_walk(scenario):
         return []
     from ppafo.walking.contradictions import COMPRESSION

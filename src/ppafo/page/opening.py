@@ -23,12 +23,12 @@ from ppafo.simulation.scenario import Scenario
 
 MOST_FIRST = 12
 LEAST_CHANGE = 1e-3
-"""Relative change below which the effect of a setting is invisible."""
+"""Relative change of a result below which the effect of a setting counts as invisible."""
 _STEP = 0.2
 """Change of a setting up and down, as a fraction of its value (of the gauge value for a pressure)."""
 _MOST_POINTS = 300
 _NATURE = ("gas.", "gas_model.", "flow.", "run.", "sensors.seed", "supply.atmospheric_pressure")
-"""Settings excluded from the first sliders: constants of nature, and step and duration of a run."""
+"""Settings excluded from the first sliders: physical constants, and step and duration of a run."""
 _RANKED = ("published", "task", "changed", "identified", "fitted", "datasheet", "derived", "assumed", "default")
 """Provenances in order of preference: of two settings with the same effect, the better known one is displayed."""
 

@@ -175,7 +175,7 @@ def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:
 def known_intervals() -> Mapping[str, Interval]:
     """Return 95 % intervals in SI, by key, of numbers for which the parameter set states no uncertainty.
 
-    They result from a study that takes long to read: ``scripts/known_intervals.py`` writes the file.
+    ``scripts/known_intervals.py`` writes them to a file, because the underlying study takes long to read.
     """
     described = json.loads(files("ppafo.page").joinpath("intervals.json").read_text(encoding="utf-8"))
     return {path: (low, high) for path, (low, high) in described.items()}

@@ -14,11 +14,11 @@ from ppafo.wording import nearest_name
 # mspdebug's simulator of an MSP430, driven by its console.
 
 _CYCLES = re.compile(rb"MCLK:\s+(\d+)")
-"""Form of mspdebug's cycle counter."""
+"""Regular expression of the cycle counter in mspdebug's output."""
 _QUERIES = "asked.txt"
-"""File of the queries for some samples."""
+"""Name of the file with mspdebug commands for some samples."""
 _SHOW_OUTPUTS = "simio info counter\nmd simulated_outputs 4"
-"""Query to mspdebug after each sample: cycle count, and the four output bytes."""
+"""Command to mspdebug after each sample: cycle count, and the four output bytes."""
 
 
 @final

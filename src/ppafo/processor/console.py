@@ -1,4 +1,4 @@
-"""Simulator as a local program, controlled by its standard input and output, and the stack depth that it reports."""
+"""Simulator process, controlled by its standard input and output, and the stack depth in its memory."""
 
 import os
 import select

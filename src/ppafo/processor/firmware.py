@@ -1,4 +1,4 @@
-"""Firmware of a scenario's controller for a small processor: proof, translated C, a thin layer, make file, README."""
+"""Firmware of a scenario's controller for a small processor: range proof, translated C, board layer, make file."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -156,7 +156,7 @@ def parameters_header(fixed: "FixedPointController") -> str:
 
 
 def _nested(row: type, ranges: Iterator[IntegerRange]) -> Range:
-    """Return the ranges of a NamedTuple in its nested form."""
+    """Return the ranges of a NamedTuple's numbers, nested like the NamedTuple."""
     return tuple(next(ranges) if is_number(kind) else _nested(kind, ranges) for _, kind in members(row))
 
 
@@ -186,7 +186,7 @@ class FixedPointController(NamedTuple):
 
 
 def integer_form(scenario: Scenario) -> Scenario:
-    """Return the scenario with its controller in integer form, with default converter settings if it had none.
+    """Return the scenario with its controller in integer arithmetic; default converter settings are added.
 
     Raises ScenarioError if the controller has no integer form.
     """

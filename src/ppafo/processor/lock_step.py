@@ -1,4 +1,4 @@
-"""Comparison of a controller on the processor's simulator and in Python: for drawn samples, or in a run."""
+"""Comparison of a controller on the processor's simulator and in Python: for random samples, or in a run."""
 
 import random
 from collections.abc import Iterator, Sequence
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 
 EPISODE = 200
-"""Number of drawn samples between two resets."""
+"""Number of random samples between two resets of the controller."""
 
 TURN = 50
-"""Number of drawn samples per query to the processor."""
+"""Number of random samples per query to the simulated processor."""
 
 
 class PythonProcessor:
@@ -127,7 +127,7 @@ class DecisionComparison:
 
 
 def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str = TARGETS[0]) -> DecisionComparison:
-    """Compare decisions for drawn readings on the simulator and in Python, with a reset every ``EPISODE`` samples."""
+    """Compare decisions for random readings on the simulator and in Python, with a reset every ``EPISODE`` samples."""
     fixed, chosen = fixed_point_controller(scenario), target_of(target)
     reference = PythonProcessor(fixed)
     expected: list[tuple[int, int]] = []

@@ -50,7 +50,7 @@ class Debugger:
         self._expect(self.packet(f"Z0,{address:x},2"), "OK")
 
     def go_on(self, address: int | None = None) -> None:
-        """Run the machine, from an address if one is given, until it stops."""
+        """Run the machine, from ``address`` if given, until the next breakpoint."""
         # Bit 0 of an address says that the instruction is Thumb; a Cortex-M has no other.
         self._expect(self.packet("c" if address is None else f"c{address | _THUMB:x}")[:3], "T05")
 

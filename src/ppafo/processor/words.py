@@ -1,4 +1,4 @@
-"""Results of controllers on a processor's simulator as text, data and figure."""
+"""Output of comparisons on a processor simulator: text, data and figure."""
 
 import itertools
 from collections.abc import Callable, Sequence

@@ -104,6 +104,8 @@ _SETTINGS: Any = MappingProxyType(
         "savefig.dpi": RESOLUTION,
         # Letters as outlines, as a page fetches no font; ids that are the same every time.
         "svg.fonttype": "path",
+        # TrueType: many publishers refuse the Type 3 fonts that Matplotlib embeds by default.
+        "pdf.fonttype": 42,
         "svg.hashsalt": "ppafo",
     }
 )

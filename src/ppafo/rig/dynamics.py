@@ -92,7 +92,7 @@ class RigState(NamedTuple):
 
 
 class _Node(NamedTuple):
-    """Gas state at one point: absolute pressure [Pa], temperature [K], specific enthalpy [J/kg]."""
+    """Gas state in a volume: absolute pressure [Pa], temperature [K], specific enthalpy [J/kg]."""
 
     pressure: float
     temperature: float

@@ -25,7 +25,7 @@ _LARGEST_SEED = 2**32 - 1
 _DEFAULT_DEVICE = "ppafo2011"
 _DEFAULT_PRESET = "paper-bench"
 NOTICE = "synthetic: made by the simulated test bench of ppafo in place of a measurement"
-"""Mark of every recording of the rig, in its files too."""
+"""Statement in the metadata of every recording of the rig that the data are synthetic."""
 
 EXPERIMENTS: dict[str, tuple[str, Callable[[ExperimentRequest], ExperimentResult]]] = {
     "static-torque": ("torque on a scale over pressure, three times up and down", record_static_torque),

@@ -24,7 +24,7 @@ from ppafo.signals.recording import Recording
 
 @dataclass(frozen=True, slots=True)
 class ExperimentRequest:
-    """Request for an experiment on the rig.
+    """Request for an experiment on the simulated bench (rig).
 
     ``preset``: deviations of the rig from the identified model
     ``seed``: random seed of sensor noise and friction scatter

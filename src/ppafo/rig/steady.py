@@ -22,7 +22,7 @@ from ppafo.simulation.plan import exact_orifice
 _STEP, _HIGHEST = 5.0 * PASCALS_PER_PSI, 95.0 * PASCALS_PER_PSI
 """Step and largest pressure difference [Pa] of the static torque."""
 _TURN = 20.0 * PASCALS_PER_PSI
-"""Pressure [Pa] above the highest reading from which the pressure returns, so that friction has reversed before."""
+"""Overshoot of the pressure [Pa] beyond the highest reading before it falls, so that friction reverses before it."""
 _TORQUE_REPETITIONS = 3
 """Number of times that the pressure goes up and down."""
 _TORQUE_READING_INTERVAL = 10.0
@@ -170,7 +170,7 @@ def _read_off(
     settings: Mapping[str, float],
     fraction_of_flow_range: float = 1.0,
 ) -> ExperimentResult:
-    """Return sensor readings of true values [SI] by channel, every ``interval`` [s].
+    """Return a result with sensor readings of true values [SI] by channel, every ``interval`` [s].
 
     A channel without a sensor is exact.
     """

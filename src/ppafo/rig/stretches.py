@@ -60,7 +60,8 @@ def solve_stretch(
     """Return times [s] and unknowns (times, unknowns) from ``start`` to ``end``, or to the first root of ``distances``.
 
     The unknowns of ``RigState`` come first, then the unknowns of the valve; rows at the ``wanted`` times [s] are
-    included. A root function that is 0 at the start ends nothing. Raises SimulationError if the solver fails.
+    included. A root function that is 0 at the start does not end the integration. Raises SimulationError if the solver
+    fails.
     """
     from scipy.integrate import LSODA
 

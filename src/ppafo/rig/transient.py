@@ -27,7 +27,7 @@ _LEAK_RATE = 20.0
 """Sample rate [Hz] of a leak experiment that takes half a minute."""
 
 _SUPPLIES = {"supply_pressure": "supply_drop_1", "dorsiflexion_pressure": "supply_drop_2"}
-"""Unknown of the droop by channel of a supply pressure."""
+"""Field of ``RigState`` with the regulator droop, by channel of the supply pressure."""
 _SENSED = ("angle", "pressure_1", "pressure_2")
 _IN_MOTION = (*_SENSED, *_SUPPLIES, "command")
 """Channels that the sensors of the device read, and channels of a recording of motion."""
@@ -39,13 +39,13 @@ _CLOSED_VALVE = {"kind": "constant", "command": 0, "rate": "1 kHz"}
 
 
 def record_step_response(request: ExperimentRequest) -> ExperimentResult:
-    """Return the step response of figure 7: the valve opens fully and the vane turns from stop to stop."""
+    """Return the step response of figure 7 of the paper: the valve opens fully and the vane turns from stop to stop."""
     scenario = _of_package("step-response", request)
     return _recorded("step-response", scenario, rig_run(scenario, request), (*_IN_MOTION, "torque"))
 
 
 def record_torque_task(request: ExperimentRequest) -> ExperimentResult:
-    """Return the torque task of figure 8 with the controller for the kind of valve."""
+    """Return the torque task of figure 8 of the paper, with the controller for the type of valve."""
     # Overrides may be of the scenario, which is chosen by the valve first.
     kind = load_device(request.parameter_set, valve=request.valve).valve.kind
     scenario = _of_package(f"torque-task-{kind}", request)

@@ -20,7 +20,7 @@ from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.metered import command_turning, needed_metrics, tracking_excess
+from ppafo.simulation.tracking.metered import TrackingExcess, command_turning, needed_metrics, tracking_excess
 from ppafo.simulation.tracking.rule import smallest_change
 from ppafo.studies.distributions import Floats
 from ppafo.studies.limits import check_metrics
@@ -169,13 +169,14 @@ def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ..
 
 def excess(
     rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
-) -> Floats:
-    """Return the largest tracking number of each run divided by its limit (runs,); nan if unknown.
+) -> TrackingExcess:
+    """Return the numbers of each run by which its tracking is judged, divided by their limits (runs,).
 
     ``columns`` are the values of the runs by path; paths in ``gauge`` hold gauge pressures.
     """
     if not set(needed_metrics(scenario)) & set(rows):
-        return np.full(next(iter(rows.values())).size, np.nan)
+        unknown = np.full(next(iter(rows.values())).size, np.nan)
+        return TrackingExcess(unknown, unknown)
     varied = {path: column for path, column in absolute(scenario, columns, gauge).items() if path not in TIMES}
     least = smallest_change(scenario) if scenario.follows_reference else 0.0
     return tracking_excess(with_numbers(scenario, varied), rows, most_reversals(scenario), least)
@@ -185,7 +186,7 @@ def follows(
     rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
 ) -> Floats:
     """Return for each run (runs,) 1 if it follows its reference, 0 if not, nan if unknown."""
-    share = excess(rows, scenario, columns, gauge)
+    share = excess(rows, scenario, columns, gauge).largest
     return np.where(np.isfinite(share), np.where(share > 1.0, 0.0, 1.0), share)
 
 
@@ -198,7 +199,15 @@ def tracking_violation(
     """
     if scenario.beyond_reach and not changes_reach(columns):
         return np.zeros(next(iter(rows.values())).size)
-    return np.fmax(excess(rows, scenario, columns, gauge) - 1.0, 0.0)
+    return np.fmax(excess(rows, scenario, columns, gauge).largest - 1.0, 0.0)
+
+
+def oscillates(
+    rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
+) -> Floats:
+    """Return for each run (runs,) 1 if its loop oscillates, 0 if not, nan if unknown."""
+    share = excess(rows, scenario, columns, gauge).oscillation
+    return np.where(np.isfinite(share), np.where(share > 1.0, 1.0, 0.0), share)
 
 
 def oscillating(rows: Mapping[str, Floats], scenario: Scenario) -> NDArray[np.bool_]:

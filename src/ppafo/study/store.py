@@ -14,11 +14,9 @@ import numpy as np
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, ScenarioError, StudyError, refused_as
 from ppafo.metrics import METRICS
-from ppafo.running import most_reversals
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
 from ppafo.simulation.ensemble.columns import absolute
-from ppafo.simulation.tracking.rule import REVERSALS
 from ppafo.storage.parquet import (
     TableColumn,
     encode_texts,
@@ -33,7 +31,7 @@ from ppafo.studies.study import Study
 from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, samples_of, varied_columns
 from ppafo.study.folder import StudyFolder
 from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, read_manifest
-from ppafo.study.runs import follows, unvaried, with_companions
+from ppafo.study.runs import follows, oscillates, unvaried, with_companions
 from ppafo.wording import argument_text, one_line
 
 if TYPE_CHECKING:
@@ -224,14 +222,12 @@ def _columns_of_endings(
     """Return the columns of status, time and reason of failure, oscillation, and tracking of the reference."""
     configuration = study.configurations[part.configuration]
     varied = varied_columns(study, configuration, dict(values))
-    counted = result.metrics.get(REVERSALS, np.full(result.status.size, np.nan))
-    most = most_reversals(configuration.scenario)
     return {
         "status": TableColumn(encode_texts(result.status, STATUSES), _PLAIN, "how the run ended"),
         "failure_time": TableColumn(result.failure_time, "s", "time at which the run diverged"),
         "reason": TableColumn(texts_of_some(result.reasons, result.status.size), _PLAIN, "why the run has no metrics"),
         OSCILLATES: TableColumn(
-            np.where(np.isfinite(counted) & np.isfinite(most), (counted > most).astype(np.float64), np.nan),
+            oscillates(result.metrics, configuration.scenario, varied, study.gauge),
             _PLAIN,
             "1 where the loop oscillates, empty where that is not known",
         ),

@@ -77,7 +77,7 @@ def documents_of(collector: SourceCollector) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class ReadableUnit:
-    """Options for a translation unit meant for readers: short names, and no unused definitions.
+    """Options for a human-readable translation unit: short names, and no unused definitions.
 
     ``names`` maps names in the module to unique short names. ``declared`` maps rows to structs that the surrounding
     file declares. ``around`` is the text of the surrounding file. All functions are static.
@@ -149,7 +149,7 @@ def _prelude_for(prelude: str, used: str) -> str:
 
 
 def _comment(text: str, further: Iterable[str] = ()) -> str:
-    """Return a block comment with the lines of ``text`` and ``further``."""
+    """Return a C block comment with the lines of ``text`` and ``further``."""
     # A docstring may contain the end of a C comment.
     lines = [line.rstrip() for line in text.replace("*/", "* /").replace("/*", "/ *").strip().splitlines()] + list(
         further

@@ -77,7 +77,7 @@ class Expressions:
         return handler(node)
 
     def scalar(self, node: ast.expr, least: Scalar = BOOL) -> Term:
-        """Return the term of an expression that must be a single number, converted to ``least`` or a wider type."""
+        """Return the term of an expression that must be a single number, in type ``least`` or a wider one."""
         term = self.term(node)
         if not isinstance(term.type, Scalar):
             raise self.refused(node, f"'{ast.unparse(node)}' must be a single number")

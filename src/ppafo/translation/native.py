@@ -136,7 +136,7 @@ def _file_identity(command: str) -> tuple[str, int, int]:
 
 @cache
 def described_processor() -> str:
-    """Return the description of the processor by the operating system."""
+    """Return the processor model as named by the operating system."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:

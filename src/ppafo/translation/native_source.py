@@ -27,8 +27,9 @@ int {ROUNDS_AS_WRITTEN}(double a, double b, double c, double d)
     return a * b + c == 0.0 && (b + d) - b == 0.0;
 }}
 """
-"""Function that returns 1 if each operation is rounded separately; fused or reordered operations leave a remainder for
-the arguments in ``fill_module``.
+"""C function that returns 1 if each operation is rounded separately.
+
+Fused or reordered operations leave a remainder for the arguments in ``fill_module``.
 """
 
 

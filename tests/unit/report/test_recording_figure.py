@@ -121,6 +121,7 @@ def test_every_format_is_written_and_the_same_recording_gives_the_same_bytes() -
     assert files[0]["png"].startswith(b"\x89PNG")
     assert b"<svg" in files[0]["svg"]
     assert files[0]["pdf"].startswith(b"%PDF")
+    assert b"/Type3" not in files[0]["pdf"]
     assert not re.search(rb"<dc:date>", files[0]["svg"])
 
 

@@ -11,7 +11,7 @@ from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats
 from ppafo.study.blocks import runs_at_once
-from ppafo.study.runs import FAILED, Rows, RunCounter, Runs, scenario_runs, settled
+from ppafo.study.runs import FAILED, Rows, RunCounter, Runs, oscillates, scenario_runs, settled, with_companions
 from tests.model_runs import model_runs
 
 SHORT = ("run.duration=0.2 s",)
@@ -29,6 +29,18 @@ def test_each_run_gives_what_it_gives_alone() -> None:
     assert rows["rms_error"][1] == pytest.approx(alone["rms_error"].value, rel=1e-9)
     assert rows["gas_supplied"][1] == pytest.approx(alone["gas_supplied"].value, rel=1e-9)
     assert runs.failures == 0
+
+
+def test_a_run_of_a_study_oscillates_where_it_does_alone() -> None:
+    # At 40 ms its command hardly reverses: the swing of the torque alone tells.
+    task = "torque-task-slow-valve"
+    changes = ["reference.level=4 N m", "supply.pressure=80 psi_g", "controller.dead_band=0"]
+    changes += ["controller.proportional_gain=0.5 1/(N m)", "controller.integral_gain=1 1/(N m s)"]
+    scenario, columns = load_scenario(task, changes), {"sensors.delay": np.array([0.0, 20e-3, 40e-3])}
+    rows = scenario_runs(scenario, with_companions(["rms_error"], scenario), RunCounter(3, None)).run(columns)
+    alone = [simulate(task, [*changes, f"sensors.delay={delay:g} s"]).tracking for delay in columns["sensors.delay"]]
+    assert [None if verdict is None else verdict.kind for verdict in alone] == [None, "oscillates", "oscillates"]
+    assert oscillates(rows, scenario, columns).tolist() == [0.0, 1.0, 1.0]
 
 
 def test_a_run_that_is_refused_is_a_failure_with_its_reason() -> None:

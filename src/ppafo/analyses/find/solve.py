@@ -17,7 +17,7 @@ from ppafo.studies.draws import seeds_of_noise
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, given_in, varied_path
-from ppafo.study.runs import RunCounter, Runs, oscillating, scenario_runs, settled, tracking_violation, with_companions
+from ppafo.study.runs import RunCounter, Runs, oscillates, scenario_runs, settled, tracking_violation, with_companions
 from ppafo.units import split_quantity
 from ppafo.wording import one_line
 
@@ -143,7 +143,7 @@ class FindResult:
         # One instant of a value that swings may meet the condition by chance.
         judged = settled(rows, metric)
         # A loop whose command turns all the time meets no condition that anybody would build on.
-        turns = oscillating(rows, base)
+        turns = oscillates(rows, base, columns) > 0.0
         fails = tracking_violation(rows, base, columns) > 0.0
         by_stream = (
             each.reshape(streams, values.size)

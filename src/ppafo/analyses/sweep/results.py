@@ -14,7 +14,7 @@ from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import as_numpy, column_names, matrix_of, read_parquet
 from ppafo.study.folder import StudyFolder
 from ppafo.study.runs import joined
-from ppafo.study.store import check_types, chunk_file, stored_rows, trace_column
+from ppafo.study.store import FOLLOWS, check_types, chunk_file, stored_rows, trace_column
 from ppafo.wording import nearest_name
 
 if TYPE_CHECKING:
@@ -153,5 +153,7 @@ class StudyResults:
 
 def metric_kind(results: StudyResults, metric: str) -> Kind:
     """Return label, unit and format of a metric from the stored unit, also for a metric that no longer exists."""
-    # Whether a run follows is a column of every study, and none of the metrics that it asked for.
-    return of_stored_metric(metric, results.document["metrics"].get(metric, {"unit": "-"})["unit"])
+    if metric == FOLLOWS:
+        # A column of every study, and none of the metrics that it asked for.
+        return Kind("Follows its reference; 1: yes, 0: no")
+    return of_stored_metric(metric, results.document["metrics"][metric]["unit"])

@@ -1,4 +1,4 @@
-"""Actuators of any kind: chamber and torque functions for compiled steps, and their evaluation from Python."""
+"""Actuators of any type: chamber and torque functions for compiled steps, and their evaluation from Python."""
 
 from functools import lru_cache, partial
 from typing import Any
@@ -51,7 +51,7 @@ def rest_pressures_per_mass(plant: PlantParameters, angle: float, *, parts: Actu
 def pressures_held(
     plant: PlantParameters, held: HeldChambers, state: PlantState, *, parts: ActuatorFunctions
 ) -> tuple[float, float]:
-    """Absolute pressures [Pa] of a state at the angle of ``held``, for chambers that may expand under pressure."""
+    """Absolute chamber pressures [Pa] at the angle stored in ``held``, for chambers that may expand under pressure."""
     return parts.pressures(plant, held.angle, state.mass_1, state.mass_2)
 
 

@@ -542,7 +542,7 @@ def thermal_error(plant: PlantParameters, begun: ThermalGas, second: ThermalFlow
 
 
 def warming(begun: ThermalGas, added: ThermalFlows, step: float) -> float:
-    """Larger temperature error divided by the allowed error [-], from rates of content and mass errors [kg/s]."""
+    """Larger temperature error of both chambers divided by the allowed error [-], from error rates [kg/s]."""
     # The temperature over the reference is content over mass: what a little of both changes it by.
     mass_1, mass_2 = begun.end_masses.mass_1, begun.end_masses.mass_2
     warmer_1 = (added.content_1 - begun.end.mass_1 / mass_1 * added.mass_1) / mass_1
@@ -558,7 +558,7 @@ def thermal_opening_error(plant: PlantParameters, begun: ThermalGas, shift: floa
 
 
 def over_allowed(plant: PlantParameters, begun: ThermalGas, rate_1: float, rate_2: float, step: float) -> float:
-    """Larger pressure error divided by the allowed error [-], from content errors [kg/s] over a step [s]."""
+    """Larger pressure error of both chambers divided by the allowed error [-], from error rates [kg/s]."""
     end_1, end_2 = end_pressures(plant, begun)
     larger = max(
         abs(rate_1) / (begun.ended.volume_1 * pressure_that_matters(plant, end_1)),
@@ -589,7 +589,7 @@ def after_motion(
 
 
 def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlows) -> tuple[PlantState, ThermalState]:
-    """State, true masses and totals after adding the changes [kg] of one step, without the work of the gas."""
+    """Plant state, gas masses and energy totals after the changes [kg] of one step, without the work of the gas."""
     vented = change.supplied - change.mass_1 - change.mass_2
     return (
         PlantState(
@@ -613,7 +613,7 @@ def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlo
 
 
 def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, after: PlantState) -> ThermalState:
-    """True masses and totals after adding the work of the gas between two states along the actual motion."""
+    """Gas masses and energy totals, updated by the gas work on the vane between two states."""
     before_1, before_2 = chamber_pressures(plant, before.angle, before.mass_1, before.mass_2)
     after_1, after_2 = chamber_pressures(plant, after.angle, after.mass_1, after.mass_2)
     # The mean of the pressures at both ends, over the motion that happened: the trapezoidal rule, as for the vane.
@@ -634,7 +634,7 @@ def masses_at_start(
     *,
     parts: ActuatorFunctions,  # noqa: ARG001 - those of a gas that is not ideal need them
 ) -> ThermalState:
-    """True masses [kg] of gas at the reference temperature, equal to the masses in the state; energy totals are 0."""
+    """Initial gas masses [kg] at the reference temperature, equal to the masses in the plant state, and zero totals."""
     return ThermalState(
         mass_1=initial.mass_1,
         mass_2=initial.mass_2,

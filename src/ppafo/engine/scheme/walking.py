@@ -150,7 +150,7 @@ class WalkState(NamedTuple):
 
 
 class WalkStep(NamedTuple):
-    """First stage: free motion of the foot, ankle motion prescribed by the ground, and decaying difference [rad]."""
+    """First stage of a walking step: free foot motion, ankle motion prescribed by the ground, decaying offset [rad]."""
 
     free: FreeStep
     led: ground.Ankle
@@ -158,7 +158,7 @@ class WalkStep(NamedTuple):
 
 
 class WalkEnd(NamedTuple):
-    """Second stage: torque of the leg including the foot plate [N m], direction of the foot, and motion of the vane.
+    """Second stage of a walking step: leg torque with foot plate [N m], foot direction, and vane motion.
 
     ``motion.departs`` is 1 only if the foot is free.
     """

@@ -16,7 +16,7 @@ from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, Th
 def widening(
     now: Chambers, here: Chambers, ahead: Chambers, pressure_1: float, pressure_2: float, step: float
 ) -> WarmChambers:
-    """Both chambers with the volumes of ``now``, growing from ``here`` to ``ahead`` in a step [s]; pressures [Pa]."""
+    """Chamber volumes and compliances at ``now``, growing by ``ahead`` minus ``here`` in a step [s]; pressures [Pa]."""
     duration = max(step, SHORTEST)
     return WarmChambers(
         volume_1=now.volume_1,
@@ -94,7 +94,7 @@ def after_motion(
 def with_work(
     plant: PlantParameters, masses: ThermalState, before: PlantState, after: PlantState, *, parts: ActuatorFunctions
 ) -> ThermalState:
-    """True masses and totals after adding the work of the gas between two states, on shaft and walls."""
+    """Gas masses and energy totals, updated by the gas work on shaft and expanding walls between two states."""
     before_1, before_2 = parts.pressures(plant, before.angle, before.mass_1, before.mass_2)
     after_1, after_2 = parts.pressures(plant, after.angle, after.mass_1, after.mass_2)
     first = parts.chambers(plant, before.angle, before_1, before_2)

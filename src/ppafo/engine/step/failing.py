@@ -36,7 +36,7 @@ def failed_plant(parts: Program, lane: Lane, time: float) -> PlantParameters:
 def failed_ports(
     parts: Program, lane: Lane, source: PlantParameters, port_1: Any, port_2: Any, time: float
 ) -> tuple[Any, Any]:
-    """Return the ports of both chambers under the faults active at a time [s], for the port class of the valve."""
+    """Return the valve ports of both chambers, modified by the faults active at a time [s]."""
     return plant_faults.FAILED_PORTS[parts.valve.port](
         source, lane.plant_faults, lane.shut_off, lane.unpowered, port_1, port_2, time
     )

@@ -74,7 +74,7 @@ class NoParameters(NamedTuple):
 
 
 class Now(NamedTuple):
-    """Present step of all runs: step number, controller sample, and end of the present interval.
+    """Present step of all runs: step number, controller sample, and end of the present part of the step.
 
     The other fields are indices into ring buffers of delayed values, computed once for all runs; 0 without delays.
     """

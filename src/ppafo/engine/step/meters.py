@@ -59,7 +59,10 @@ def make_sample(parts: Program, lane: Lane, elapsed: float, index: int, interval
 
 
 def temperature(thermal: ThermalParameters, content: float, mass: float) -> float:
-    """Temperature of the gas in a chamber [K], from its energy content [kg] and its true mass [kg]."""
+    """Gas temperature in a chamber [K]: reference temperature times content per mass.
+
+    The content [kg] is the mass that would have the same pressure at the reference temperature.
+    """
     return thermal.temperature * (content / mass)
 
 
@@ -154,7 +157,7 @@ def update_largest_reference(parts: Program, lane: Lane, interval: float, index:
 
 
 def search_final_hold(parts: Program, lane: Lane, interval: float, index: int) -> None:
-    """Set the start of the final hold, if this sample is the last one away from the final value."""
+    """Set the start of the final hold after this sample, if it is the last that differs from the final value."""
     value = reference_of_sample(parts, lane, index, interval)
     is_last_away = lane.course.hold_start == 0.0 and is_away(value, lane.course.last, lane.course.tolerance)
     lane.course = lane.course._replace(hold_start=index + 1.0 if is_last_away else lane.course.hold_start)

@@ -126,7 +126,7 @@ def ports_behind(parts: Program, lane: Lane, now: Now, source: PlantParameters) 
 
 
 def plant_now(parts: Program, lane: Lane, now: Now) -> PlantParameters:
-    """Return the plant with the leakage due to faults."""
+    """Return the plant parameters with the additional leakage due to active faults."""
     plant: PlantParameters = lane.plant
     if parts.faults is not None:
         plant = parts.faults.failed_plant(parts, lane, time_of(parts, lane, now))

@@ -13,7 +13,7 @@ LARGEST = 1.0e300
 def moment(
     parts: Program, lane: Lane, state: PlantState, supplied: float, vented: float, command: float
 ) -> PlantSnapshot:
-    """Return the state of the plant for effects, with mean flows [kg/s]."""
+    """Return the input of effect laws: motion, absolute pressures [Pa], mean flows [kg/s] and command [-]."""
     pressure_1, pressure_2 = parts.actuator.pressures(lane.plant, state.angle, state.mass_1, state.mass_2)
     return PlantSnapshot(
         angle=state.angle,
@@ -27,7 +27,7 @@ def moment(
 
 
 def begun_moment(parts: Program, lane: Lane, command: float) -> PlantSnapshot:
-    """Return the state of the plant for effects at the start of a step, with the flows of the first stage."""
+    """Return the input of effect laws at the start of a step, with the flows of the first stage [kg/s]."""
     supplied, mass_1, mass_2 = parts.gas.first_flows(parts, lane)
     return moment(parts, lane, lane.state, supplied, supplied - mass_1 - mass_2, command)
 

@@ -106,7 +106,7 @@ def hold_ahead(parts: Program, lane: Lane) -> None:
 
 
 def reach(parts: Program, lane: Lane) -> None:
-    """Set the end of the step without an event."""
+    """Set the state at the end of a step in which the foot neither reverses nor starts to move."""
     parts.gas.add(parts, lane)
     lane.ended, lane.carried = walking.reach_end(
         lane.plant,

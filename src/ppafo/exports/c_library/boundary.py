@@ -20,7 +20,7 @@ class Arrays:
         return f"{array}[{place}]"
 
     def taken(self, array: str, group: str, groups: Mapping[str, type], name_of: NameOf) -> str:
-        """Expression that reads the row of one group from the array of all numbers."""
+        """Expression that reads the numbers of one group from the array of all numbers, as a struct."""
         cells = {path: f"{array}[{index}]" for index, path in enumerate(_paths(groups))}
         return row_expression(groups[group], group, cells, name_of)
 
@@ -41,7 +41,7 @@ class Structs:
         return f"{array}.{name}"
 
     def taken(self, array: str, group: str, groups: Mapping[str, type], name_of: NameOf) -> str:  # noqa: ARG002
-        """Expression that reads the row of a group."""
+        """Expression that reads the struct of a group."""
         return f"{array}.{group}" if leaf_paths(groups[group], group) else "()"
 
     def given(self, array: str, groups: Mapping[str, type]) -> list[str]:
@@ -54,7 +54,7 @@ class Structs:
 
 
 Boundary = Arrays | Structs
-"""Writer of the lines by which functions read their numbers from arguments and return results."""
+"""Interface by which exported functions read arguments and return results: arrays or structs."""
 
 
 def _paths(groups: Mapping[str, type]) -> list[str]:

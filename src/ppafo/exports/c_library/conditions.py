@@ -12,7 +12,7 @@ _SIGNS = {"below": "<", "at most": "<=", "at least": ">=", "above": ">"}
 
 
 def conditions_of_program(library: Library) -> list[tuple[str, str]]:
-    """C conditions under which the settings need another program, each with the name of the setting to report."""
+    """C conditions under which settings require another compiled program, each with the setting to report."""
     values = {setting.name: setting.value for setting in library.settings}
     conditions = []
     for names, is_above in library.switches:

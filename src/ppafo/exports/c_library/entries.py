@@ -1,4 +1,4 @@
-"""Entries of an exported module that prepare a run: source lines that wrap the preparation functions."""
+"""Source of the exported functions that prepare a run, composed of the preparation functions."""
 
 import ast
 from collections.abc import Mapping, Sequence
@@ -80,9 +80,10 @@ def follow_entry(
     collector: SourceCollector,
     boundary: Boundary,
 ) -> str:
-    """Return the source of ``follow``: settings at their default follow other settings; see ``Graph``.
+    """Return the source of ``follow``, which computes settings left at their defaults from other settings.
 
-    ``absent`` are numbers that links name and the library does not set, as text by name.
+    ``links`` maps these settings to their sources (``Graph``). ``absent`` maps sources that are no settings of the
+    library to their values, as C text.
     """
     places = {setting.path: index for index, setting in enumerate(settings)}
 
@@ -113,7 +114,7 @@ def follow_entry(
 
 
 def _term(term: LinkFunction, rows: list[str], collector: SourceCollector) -> str:
-    """Return the source of one term of a link; structs used only there are appended to ``rows``."""
+    """Return the source of one term in the sum for a dependent setting; its structs are appended to ``rows``."""
 
     def filled(row: type, numbers: Sequence[str]) -> str:
         name = f"Followed{len(rows)}"

@@ -1,4 +1,4 @@
-"""Exported part of a program: lane loops, metrics and outputs, with their C names."""
+"""Exported part of a program: time-stepping loops, metrics and outputs, with their C names."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -22,9 +22,9 @@ Further = Callable[[SourceCollector, Boundary], str]
 """Function that returns the source of a further composed function, after collecting the functions it calls."""
 
 WHOLE, IN_PARTS = "advance", "advance_in_parts"
-"""C names of the lane loops: with whole steps (or the only loop), and with steps in parts if there are both."""
+"""C names of the time-stepping loops: with whole steps (or the only loop), and with steps in parts."""
 TOGETHER = "_together"
-"""Suffix to the name of a lane loop for several runs at once."""
+"""Suffix to the name of a time-stepping loop for several runs at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class ExportedProgram:
 
     @property
     def loops(self) -> dict[str, Program]:
-        """Programs of the lane loops by C name.
+        """Programs of the time-stepping loops by C name.
 
         There are two loops if the settings decide on error control of the parts of a step.
         """
@@ -65,6 +65,6 @@ def exported(program: Program) -> ExportedProgram:
 
 
 def places_of(groups: Mapping[str, type]) -> dict[str, str]:
-    """Return the C names of the array indices of all numbers in groups of rows, by path."""
+    """Return the C constant for the array index of each number in some groups, by path such as ``state.angle``."""
     paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
     return {path: f"AT_{re.sub(r'[^A-Za-z0-9]+', '_', path).strip('_').upper()}" for path in paths}

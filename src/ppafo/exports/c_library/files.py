@@ -139,7 +139,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
 
 
 def _returning(conditions: Iterable[tuple[str, str]]) -> str:
-    """C lines that return a name if its condition is true."""
+    """C lines that return the name of the setting at fault for the first condition that is true."""
     return "\n".join(f'    if ({condition}) {{\n        return "{name}";\n    }}' for condition, name in conditions)
 
 

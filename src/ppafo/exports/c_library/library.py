@@ -53,7 +53,7 @@ Rule = tuple[str, str, tuple[str, ...]]
 
 
 Switch = tuple[Sequence[str], bool]
-"""Settings, and True if any is above 0, False if none is; the opposite case needs another program."""
+"""Settings that select a program, and True if any of them is above 0; the opposite case needs another program."""
 
 
 @dataclass(frozen=True, slots=True)

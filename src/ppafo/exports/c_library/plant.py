@@ -63,7 +63,7 @@ class _Drive:
 
 @dataclass(frozen=True, slots=True)
 class _PlantAlone:
-    """Plant driven from outside: its library, its drive, and the input interval ``step`` [s].
+    """Plant with external inputs: its library, its inputs and motion, and the input interval ``step`` [s].
 
     ``clock`` is the path of the setting for this interval: the engine step, or the controller period if parts of the
     plant act at controller samples. ``hidden`` are the paths of settings without effect, since inputs replace them.
@@ -201,7 +201,7 @@ EXAMPLE = 0.5
 
 
 def half_open(scenario: Scenario) -> Scenario:
-    """Return the example as a scenario for Python: the plant under a constant command for 0.1 s or longer."""
+    """Return the plant under a constant command for at least 0.1 s, the example of the library, as a scenario."""
     plant = _commanded(scenario.motion, scenario)
     command = replace(plant.controller, settings={**plant.controller.settings, "command": EXAMPLE})
     duration = max(0.1, declared_numbers(plant)["run.duration"].minimum)

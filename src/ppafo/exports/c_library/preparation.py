@@ -1,4 +1,4 @@
-"""Preparation of a run from its settings: plain functions in the same form as the functions of a step.
+"""Preparation of a run from its settings: initial state, parameters, and time grid.
 
 All functions take ``parts``, the data independent of the settings (``Preparation``), ``lane``, the groups of the run to
 be filled, and ``settings``, one number each in SI units. Python runs these functions directly. A library contains them
@@ -111,7 +111,7 @@ def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 
 def put_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Add a foot on a prescribed shank to the plant; of a gait only the start is a setting."""
+    """Add a foot on a prescribed shank to the plant; for a gait, only start time and toe lever can be set."""
     if parts.leg is not None:
         lane.load = foot_load(
             lane.plant.inertia,
@@ -169,7 +169,7 @@ def set_timing(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 
 def choose_parts(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Decide, for a locked joint with rigid chambers, if error control divides the steps into parts."""
+    """Set whether error control divides the steps, which a locked joint with rigid chambers may not need."""
     if not parts.program.chooses_parts:
         lane.needs_parts = True
     else:
@@ -190,7 +190,7 @@ def choose_parts(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 
 def set_laws(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set the parameters of controller, reference and prescribed angle."""
+    """Set the parameters of the controller, the reference and the prescribed angle."""
     controller, reference, path = parts.program.controller, parts.program.reference, parts.program.angle
     if controller is not None:
         lane.controller = rebuilt(

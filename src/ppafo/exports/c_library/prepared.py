@@ -122,20 +122,20 @@ class Preparation:
         return self.row(f"{effect.name.title().replace('_', '')}Settings", names_of(effect.quantities))
 
     def orifice_row(self, section: str) -> Any:
-        """Return a NamedTuple class of an orifice in its given form."""
+        """Return a NamedTuple class of orifice settings: ISO 6358 coefficients, or area and discharge coefficient."""
         if self.is_sonic(section):
             return self.row("SonicOrifice", ("sonic_conductance", "critical_ratio"))
         return self.row("Orifice", ("area", "discharge_coefficient"))
 
     def is_sonic(self, section: str) -> bool:
-        """True for an orifice in the form of ISO 6358."""
+        """True for an orifice specified by ISO 6358 sonic conductance and critical ratio."""
         return isinstance(self.device.valve.orifice if section == "valve" else self.device.actuator.leak, SonicOrifice)
 
     def constant(self, row: Any) -> Any:
-        """Return a NamedTuple of numbers that no setting changes, all as floats."""
+        """Return a NamedTuple of constants that no setting changes, converted to floats."""
         return rebuilt(type(row), numbers(row))
 
 
 def names_of(quantities: Iterable[Quantity]) -> list[str]:
-    """Return the names of declared numbers."""
+    """Return the names of declared quantities."""
     return [quantity.name for quantity in quantities]

@@ -34,7 +34,7 @@ def for_one_run(function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDe
 
 
 class _ForOneRun(ast.NodeTransformer):
-    """Rewriter of one definition for a single run; ``scope`` contains the visible names."""
+    """Rewriter of one function definition for a single run; ``scope`` contains the visible names."""
 
     def __init__(self, scope: dict[str, Any]) -> None:
         self.scope = scope
@@ -63,7 +63,7 @@ class _ForOneRun(ast.NodeTransformer):
 
 
 def _collector() -> SourceCollector:
-    """Return a collector that also accepts functions applied to columns in Python, specialised for one run."""
+    """Return a collector of functions that specialises array functions for a single run."""
     return SourceCollector(INLINE, for_one_run, replacements=Replacements(everywhere=dict(FOR_ONE_RUN)))
 
 
@@ -85,7 +85,7 @@ def c_text_of_run(
     around: str,
     worded: Callable[[str], str],
 ) -> str:
-    """Return all functions of an exported program as readable C: for a single run, without lanes, with structs.
+    """Return all functions of an exported program as readable C, for a single run and with structs.
 
     ``name`` is the prefix of the structs of settings and metrics, which the enclosing file declares. ``further`` may
     add functions that take ``settings``. ``worded`` puts comments in the words of the actuator and joint.
@@ -148,7 +148,7 @@ _DOCUMENTS = {
 
 @cache
 def _names_around() -> frozenset[str]:
-    """Names of functions in the files of a library, some of which include its source, and of its own entries."""
+    """Names of C functions in the template files of a library, which its other functions must not have."""
     folders = [folder.joinpath("templates") for folder in files("ppafo.exports").iterdir()]
     texts = [
         [file.read_text(encoding="utf-8") for file in folder.iterdir() if file.name.endswith(".c")]
@@ -179,7 +179,7 @@ class ComposedLibrary(NamedTuple):
 def composed_library(exported: ExportedProgram, further: Further | None, together: int) -> ComposedLibrary:
     """Compose all functions of an exported program; ``further`` may add one that takes settings.
 
-    Each lane loop is written twice: for one run, and with the suffix ``TOGETHER`` for ``together`` runs at once.
+    Each time-stepping loop is written twice: for one run, and for ``together`` runs with the suffix ``TOGETHER``.
     """
     from ppafo.translation.c99 import documents_of
 
@@ -195,7 +195,7 @@ def composed_library(exported: ExportedProgram, further: Further | None, togethe
 
 
 def c_text(exported: ExportedProgram, composed: ComposedLibrary, title: str, settings: Sequence[str]) -> str:
-    """Return the composed functions of an exported program in C, after the places of its numbers and ``settings``."""
+    """Return the functions of an exported program in C, after the constants for the array indices of its numbers."""
     from ppafo.translation.c99 import c_source
     from ppafo.translation.walk import walk_module
 
@@ -249,7 +249,7 @@ def outline_of(exported: ExportedProgram, composed: ComposedLibrary, settings: S
 
 
 def _steps_of(exported: ExportedProgram, collector: SourceCollector) -> dict[str, StepText]:
-    """Return the steps of the lane loops by C name; functions common to both are written once."""
+    """Return the step functions of the time-stepping loops by C name; functions common to both are written once."""
     return {name: StepText(program, collector, _ENDINGS[name]) for name, program in exported.loops.items()}
 
 

@@ -81,7 +81,7 @@ def words_of_walk(walk: Scenario, links: Graph, failing: "Mapping[str, FaultSett
 def _followers(links: Graph, absent: Mapping[str, str]) -> str:
     """Return the README line on parameters that follow others; ``absent`` gives numbers of a missing chamber by name.
 
-    Its pressures are named as what they are, the atmosphere; its other numbers are constants, which nothing follows.
+    Pressures of a missing chamber appear as the atmospheric pressure; its other numbers are constants and omitted.
     """
     followers = []
     for path, follows in links.items():

@@ -89,9 +89,9 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
 
 
 def second_chamber(scenario: Scenario) -> dict[str, str]:
-    """Return numbers of a second chamber that the actuator does not have, as text by name in C.
+    """Return substitutes for the numbers of a missing second chamber, as C text by name; empty if it exists.
 
-    The pressures are those of the atmosphere, so that no gas flows; all other numbers are constants.
+    Pressures are atmospheric, so that no gas flows; all other numbers are constants.
     """
     return {
         c_identifier(path): c_identifier(ATMOSPHERE_PATH) if "pressure" in path else repr(number)
@@ -100,7 +100,7 @@ def second_chamber(scenario: Scenario) -> dict[str, str]:
 
 
 def numbers_of_second_chamber(scenario: Scenario) -> dict[str, float]:
-    """Return numbers [SI] of a second chamber by path if the actuator does not have it, else none."""
+    """Return substitutes [SI] for the numbers of a missing second chamber by path; empty if it exists."""
     if not scenario.device.actuator.has_one_chamber:
         return {}
     unused = {f"actuator.leak.{name}" for name in other_form(scenario.device, "actuator.leak")}
@@ -108,7 +108,7 @@ def numbers_of_second_chamber(scenario: Scenario) -> dict[str, float]:
 
 
 def declared_settings(scenario: Scenario) -> dict[str, Quantity]:
-    """Return declarations by path, without the unused form of an orifice, inactive effects and alternative paths."""
+    """Return declarations by path, without unused orifice coefficients, inactive effects and alternative paths."""
     device = scenario.device
     unused = {"controller.rate"}
     unused |= {f"{section}.{name}" for section in ("valve", "actuator.leak") for name in other_form(device, section)}

@@ -143,7 +143,7 @@ def _attributes(variable: FmuVariable) -> tuple[dict[str, str], dict[str, str]]:
 
 
 def _shown(unit: str) -> str:
-    """Return a ppafo unit without the kind of a pressure, which FMI does not have; empty for a plain number."""
+    """Return a ppafo unit without the pressure suffix (gauge, absolute), unknown to FMI; empty for a plain number."""
     bare = unit.removesuffix("_a").removesuffix("_d")
     return "" if bare in ("", "-", "1") else bare
 

@@ -17,14 +17,14 @@ _LOOP_TUNING = (
     "The controller reads them at its next sample, the plant one engine step later. If the reference changes during "
     "the run, the metrics of ramp and hold keep the times of the initial reference."
 )
-"""When the closed loop takes a changed parameter, for the page of the unit."""
+"""Statement on when a changed parameter takes effect in the closed loop, for the page of the unit."""
 _PLANT_TIME = (
     "Inputs are read at the beginning of a communication step. It is a multiple of <code>{clock}</code>; the engine "
     "divides it further where its error asks for that. {motion} There is no stop time."
 )
 """Time stepping of the plant, for the page of the unit; ``motion`` is the motion of its vane."""
 _PLANT_TUNING = "They take effect at the next communication step."
-"""When the plant takes a changed parameter, for the page of the unit."""
+"""Statement on when a changed parameter takes effect in the plant, for the page of the unit."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from ppafo.storage.files import temporary_folder
 
 _NAME = b"trial"
 _CO_SIMULATION = 1
-"""fmi2CoSimulation, the kind of an instance of FMI 2."""
+"""Instance type fmi2CoSimulation of FMI 2."""
 
 
 @final

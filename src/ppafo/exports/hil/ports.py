@@ -81,7 +81,7 @@ class _UdpPort:
 
 @final
 class _SerialPort:
-    """Serial port, by pyserial."""
+    """Serial port opened with pyserial."""
 
     is_stream = True
     strangers = 0

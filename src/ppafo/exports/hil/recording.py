@@ -226,7 +226,7 @@ _FURTHEST = 10_000
 
 
 def _why_not(before: wire.WireSample, packet: wire.WireSample) -> str:
-    """Return the reason why a sample does not continue another one, nor shortly precedes it; empty if it does."""
+    """Return the reason why a sample does not belong to the same sequence as an earlier one; empty if it does."""
     if packet.run != before.run:
         return _OF_OTHERS[0]
     # Columns of a file are fixed by its first sample.

@@ -17,7 +17,7 @@ LOWEST_RATE, HIGHEST_RATE = 50, 2000
 MARK = b"\xa5\x5a"
 VERSION = 1
 SAMPLE, ANSWER = 1, 2
-"""Kinds of packet."""
+"""Packet types."""
 BEGIN, VENTED, OVER, COMPUTED = 1, 2, 4, 8
 """Flags of a sample."""
 UNSOUND = 1

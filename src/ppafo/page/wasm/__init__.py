@@ -155,7 +155,7 @@ def compose(library: Library) -> "ComposedLibrary":
 
 
 def outline_of_unit(library: Library, composed: "ComposedLibrary") -> str:
-    """Return the translation unit of a library with its functions still untranslated, which determines its C text."""
+    """Return the translation unit of a library with its functions still in Python, which determines its C text."""
     from ppafo.exports.c_library.program import outline_of
 
     return _unit(library, outline_of(library.program, composed, [setting.name for setting in library.settings]))
@@ -208,7 +208,7 @@ _ARRAYS = {
 
 
 def _chosen_loop(program: ExportedProgram, ending: str) -> str:
-    """Return C lines that call the lane loop selected by the clock."""
+    """Return C lines that call the time-stepping loop selected by the clock."""
     if not program.program.chooses_parts:
         return f"GO_ON({WHOLE}{ending});"
     in_parts, whole = (f"        GO_ON({name}{ending});\n" for name in (IN_PARTS, WHOLE))

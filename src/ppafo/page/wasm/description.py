@@ -116,7 +116,7 @@ def description_of(scenario: Scenario, library: Library) -> dict[str, Any]:
 
 
 def _kept(library: Library) -> dict[str, str]:
-    """Settings, by C name, that must stay zero or above zero: the only positive setting of a switch is fixed."""
+    """Settings, by C name, that must stay ``zero`` or ``above zero``, because they select the program."""
     values = {setting.name: setting.value for setting in library.settings}
     kept: dict[str, str] = {}
     for names, is_above in library.switches:

@@ -40,7 +40,7 @@ class FixedLaw:
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """Plan of an integer law, with the arguments and results of ``ControllerKind.plan``.
+    """Conversion of controller settings to the integers of a law, callable like ``ControllerKind.plan``.
 
     ``prepare(settings, period, torque_step)`` computes the numbers after the converter's, for one run; ``quantities``
     declare all numbers in order. ``largest`` returns the largest ratio of a number to the limit of its range, above 1
@@ -55,7 +55,7 @@ class Numbers:
     def __call__(
         self, settings: Mapping[str, Any], period: Any, torque_constant: Any, reference: tuple[Any, Any]
     ) -> tuple[dict[str, Any], tuple[Problem, ...]]:
-        """Integers by name, and problems of the settings."""
+        """Return the integers of a law by name, and the problems of settings that cannot be represented."""
         bits, pressure_range = (settings[quantity.name] for quantity in SETTINGS)
         steps, limits = over_runs(converter_of, bits, pressure_range, torque_constant)
         names = tuple(settings)

@@ -1,7 +1,7 @@
-"""Tracking rule for runs with metrics only: the rule for recordings, as far as meters provide its numbers."""
+"""Tracking rule for runs without a recording, from metrics only."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -54,8 +54,20 @@ def command_turning(scenario: Scenario, metrics: Mapping[str, Floats], most_reve
     return np.nan_to_num(metrics["settled_reversals"]) / often
 
 
-def tracking_excess(scenario: Scenario, metrics: Mapping[str, Floats], most_reversals: float, least: float) -> Floats:
-    """Largest number of each run divided by its limit (runs,): up to 1 the run follows; nan if unknown.
+class TrackingExcess(NamedTuple):
+    """Numbers of each run divided by their limits (runs,); nan if unknown.
+
+    With ``largest`` up to 1 the run follows its reference, with ``oscillation`` up to 1 its loop does not oscillate.
+    """
+
+    largest: Floats
+    oscillation: Floats
+
+
+def tracking_excess(
+    scenario: Scenario, metrics: Mapping[str, Floats], most_reversals: float, least: float
+) -> TrackingExcess:
+    """Numbers of each run by which its tracking is judged, divided by their limits.
 
     Numbers of the scenario may be arrays (runs,). ``metrics`` are the available ``needed_metrics``; ``most_reversals``
     is the number of command reversals above which the loop oscillates; ``least`` is the ``smallest_change``.
@@ -63,6 +75,7 @@ def tracking_excess(scenario: Scenario, metrics: Mapping[str, Floats], most_reve
     runs = next(iter(metrics.values())).size
     none = np.full(runs, np.nan)
     turning = command_turning(scenario, metrics, most_reversals)
+    counted = np.isfinite(metrics.get(REVERSALS, none)) & np.isfinite(most_reversals)
     numbers = {name: metrics.get(name, none) for name in needed_metrics(scenario)}
     with np.errstate(divide="ignore", invalid="ignore"):
         if not scenario.follows_reference:
@@ -73,7 +86,7 @@ def tracking_excess(scenario: Scenario, metrics: Mapping[str, Floats], most_reve
             # A law that requests no torque is judged by the peak alone.
             excess = excess_of_walk(settled, turning, limit)
             known = (np.isfinite(error) & (requested > 0.0)) | (np.isnan(error) & np.isfinite(peak) & (limit > 0.0))
-            return np.where(known, excess, np.nan)
+            return TrackingExcess(np.where(known, excess, np.nan), np.where(counted | known, turning, np.nan))
         settled = _settled_task(scenario, {name.removeprefix("settled_"): row for name, row in numbers.items()}, least)
         found = excess_of_task(settled, only_switches(scenario, scenario.law))
         # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does.
@@ -81,7 +94,12 @@ def tracking_excess(scenario: Scenario, metrics: Mapping[str, Floats], most_reve
         is_short = (shortfall(scenario) > 0.0) & ~np.asarray(settled.ends_on_ramp)
         missing = np.where(is_short, np.abs(settled.missing) / (LARGEST_SHARE * settled.wanted), 0.0)
     known = np.isfinite(numbers["settled_error"])
-    return np.where(known, np.max([turning, *found, missing], axis=0), np.nan)
+    # A value that does not move is no oscillation, however far it is from the reference.
+    oscillation = np.fmax(turning, np.where(found.still > 1.0, 0.0, found.swings))
+    return TrackingExcess(
+        largest=np.where(known, np.max([turning, *found, missing], axis=0), np.nan),
+        oscillation=np.where(counted | known, oscillation, np.nan),
+    )
 
 
 def shortfall(scenario: Scenario) -> Floats:
@@ -136,6 +154,6 @@ def _settled_task(scenario: Scenario, numbers: Mapping[str, Floats], least: floa
 
 
 def _settled(**numbers: Any) -> SettledPart:
-    """Settled part whose numbers are arrays (runs,)."""
+    """Numbers of the settled part, as arrays (runs,)."""
     none: dict[str, Any] = dict.fromkeys(("duration", "missing", "swing", "turns", "moved", "peak"), 0.0)
     return SettledPart(**{"samples": slice(None), "rests": False, **none, **numbers})

@@ -1,9 +1,10 @@
-"""Step of a pair of on/off valves: the change during its dead time, known before a run."""
+"""Smallest change of the controlled quantity by a pair of on/off valves: the change during their dead time."""
 
 import logging
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import ANGLE, CONTROLLED
 from ppafo.simulation.default_gains import DEAD_TIME, RATE
@@ -44,9 +45,9 @@ def pair_step(scenario: Scenario, law: ControllerKind) -> tuple[float, float]:
 
 
 def unlimited_switching(result: "RecordedResult") -> str:
-    """Remark on valves that switch quickly in a task, with no number in their set that limits the rate; "" for others.
+    """Remark on valves that switch faster than known valves because their data limit no rate; "" for others.
 
-    Quickly means above the switching frequency that the paper reports of its solenoid valves.
+    The limit is the switching frequency that the paper reports of its solenoid valves.
     """
     scenario = result.scenario
     if not (scenario.follows_reference and only_switches(scenario, scenario.law)) or REVERSALS not in result.metrics:
@@ -74,8 +75,8 @@ def warn_of_coarse_pairs(scenarios: Iterable[Scenario]) -> None:
 def coarse_pair(scenario: Scenario) -> str:
     """Warning for a pair whose step exceeds a quarter of the wanted change of torque or pressure; "" without one.
 
-    In a walk the wanted change is the largest torque of its controller. Angle loops are not checked, because their step
-    depends on the joint as much as on the pair.
+    In a walk the wanted change is the largest torque of a torque controller. Angle loops are not checked, because their
+    step depends on the joint as much as on the pair.
     """
     law, controlled = scenario.law, CONTROLLED[scenario.controlled]
     if law is None or not is_pair(scenario) or controlled.name == ANGLE:
@@ -86,7 +87,8 @@ def coarse_pair(scenario: Scenario) -> str:
         extent = max(abs(float(bound) - start) for bound in profile_bounds(scenario.reference))
         wanted = max(extent, smallest_change(scenario))
     else:
-        wanted = torque_limit(scenario.controller.settings)
+        # A walking controller such as event_on_off holds one state of the pair for each phase, and tracks no torque.
+        wanted = torque_limit(scenario.controller.settings) if law.name in CONTROLLERS else 0.0
     if wanted == 0.0:
         return ""
     step, dead_time = pair_step(scenario, law)

@@ -17,6 +17,6 @@ GRID = {
 
 def test_a_map_is_drawn_of_what_differs_and_of_whether_the_run_follows() -> None:
     finding = ppafo.sweep(GRID)
-    drawn = [axes.get_ylabel() for axes in finding.plot().axes if axes.get_label() == "<colorbar>"]
+    drawn = [axes.get_ylabel().replace("\n", " ") for axes in finding.plot().axes if axes.get_label() == "<colorbar>"]
     assert set(finding.found.table(["follows"])["follows"]) == {0.0, 1.0}
-    assert drawn == ["RMS error (N m)", "Follows"]
+    assert drawn == ["RMS error (N m)", "Follows its reference; 1: yes, 0: no"]
