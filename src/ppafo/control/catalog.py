@@ -5,7 +5,7 @@ from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.kinds import Kinds
 
 FIXED_POINT = "_fixed_point"
-"""Ending of the name of a controller in its fixed-point form."""
+"""Suffix of the names of fixed-point controllers."""
 
 CONTROLLERS: Kinds[ControllerKind] = Kinds(
     "ppafo.controllers",

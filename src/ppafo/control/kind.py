@@ -35,7 +35,7 @@ DEAD_BAND = Quantity(
     follows=(nominal_term("dead_band"),),
 )
 BelievedBand = Annotated[float, DEAD_BAND]
-"""Setting of a law that compensates the dead band of the valve, by ``control.torque_loop.beyond_dead_band``."""
+"""Dead band of the valve [-] that a law compensates, by ``control.torque_loop.beyond_dead_band``."""
 
 Plan = Callable[[Mapping[str, Any], Any, Any, tuple[Any, Any]], tuple[dict[str, Any], tuple[Problem, ...]]]
 """Function that computes the parameters of a law from its settings."""
@@ -83,7 +83,7 @@ class ControllerKind:
 
 
 def unbounded(_parameters: Any) -> tuple[float, float]:
-    """Bounds of a profile that follows a recording, whose parameters change at each sample: none."""
+    """Infinite bounds, for a profile that follows a recording and has unknown extremes."""
     return -math.inf, math.inf
 
 

@@ -27,7 +27,7 @@ def gas_imbalance(supplied: Numeric, vented: Numeric, mass_1: Numeric, mass_2: N
 
 
 def gas_taken(supplied: Numeric) -> Numeric:
-    """Gas [kg] taken from a supply, or drawn in by a vacuum."""
+    """Gas mass exchanged with a supply [kg], without sign: taken from it, or drawn in by a vacuum."""
     return abs(supplied)
 
 

@@ -73,7 +73,7 @@ class Readings:
 
 @dataclass(frozen=True, slots=True)
 class ReadAt:
-    """Reader of a metric: a number at a path of the readings, such as ``meters.work.work``, or a function of several.
+    """Rule that reads a metric from meters: a number at a path such as ``meters.work.work``, or a function of several.
 
     Declared as data, so that an exported library has one expression for the metric instead of a function.
     """

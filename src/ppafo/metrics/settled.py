@@ -127,7 +127,7 @@ def update_settled(state: _SettledSums, course: ReferenceSummary, sample: Sample
 
 
 def is_long_enough(hold_start: float, samples: float) -> bool:
-    """Tell whether a reference that rests from sample ``hold_start`` on does so for long enough to be judged there."""
+    """Tell whether the hold of a reference, from sample ``hold_start`` on, is long enough for a verdict."""
     length = samples - 1.0 - hold_start
     return length >= 1.0 and length >= SHORTEST_HOLD * (samples - 1.0)
 

@@ -14,7 +14,7 @@ from ppafo.signals.meter import REQUESTED, STEADY, WALK, MeterKind, ReferenceSum
 SETTLING = 2
 """Number of first strides excluded from averages, in which the controller learns the stride time."""
 NOT_YET = -1.0
-"""Time [s] that stands for no event."""
+"""Placeholder time [s] for an event that has not occurred."""
 
 
 @dataclass(frozen=True, slots=True)

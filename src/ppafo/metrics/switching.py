@@ -36,7 +36,7 @@ OSCILLATION_THRESHOLD = 0.05
 """Smallest reversal that counts as an oscillation, as a fraction of the reference's extent."""
 
 SHUT = 1.0e-6
-"""Command up to which a valve counts as off or shut, so that rounding at the start of a task opens nothing."""
+"""Command [-] up to which a valve counts as off or shut, above rounding error."""
 
 _NEEDED = ("torque", "reference")
 
@@ -112,7 +112,7 @@ SWITCHINGS = MeterKind("switchings", Switchings, start_switchings, update_switch
 
 
 class Swing(NamedTuple):
-    """State of ``reversals`` as three numbers.
+    """State of the count of reversals, updated sample by sample.
 
     ``play`` follows the signal with a backlash of one swing: it stays between the signal and one swing below, and moves
     only if the signal goes on or turns back by more. ``turns`` is positive while the signal rises and negative while it

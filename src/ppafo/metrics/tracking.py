@@ -17,7 +17,7 @@ _NEEDED = ("torque", "reference")
 ONE_INSTANT = frozenset(
     f"final_{name}error" for name in ("" if controlled == TORQUE else f"{controlled}_" for controlled in CONTROLLED)
 )
-"""Metrics of a single instant, arbitrary where the value swings."""
+"""Names of metrics of a single instant, which are arbitrary if the controlled quantity oscillates."""
 SUSTAINED = 4
 """Number of reversals on the hold from which a loop oscillates; a settling loop has one or two."""
 

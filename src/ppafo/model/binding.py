@@ -1,4 +1,4 @@
-"""Functions with parts: one formula for many devices; the functions that differ between devices are an argument.
+"""Functions with bound parts: one formula for many devices, with the device-dependent functions as an argument.
 
 Such a function takes ``*, parts: P``, where ``P`` is a NamedTuple of functions, of row classes, of constants or
 of further parts, and calls ``parts.NAME(...)``. ``made_of`` binds the parts; the engine compiles each of them in.
@@ -28,7 +28,7 @@ class _Recipe(NamedTuple):
 
 
 def is_made_of(value: object) -> bool:
-    """Return whether a value is parts of a function: a NamedTuple with a function, a class or further parts."""
+    """Tell whether a value can be bound as ``parts``: a NamedTuple with a function, a class or further parts."""
     if not isinstance(value, tuple) or not hasattr(value, "_fields"):
         return False
     return any(isinstance(part, types.FunctionType | type) or is_made_of(part) for part in value)

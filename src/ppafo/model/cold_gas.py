@@ -223,7 +223,7 @@ def advance_supply(
     mass: float,
     step: float,
 ) -> SupplyState:
-    """State after a step [s] in which a mass [kg] passed the seat at a constant rate, by Heun's rule.
+    """Advance a supply by a step [s] in which a mass [kg] passes the regulator seat at a constant rate, by Heun's rule.
 
     ``content`` is the content of the bottle before the step. The step is subdivided where little gas, or a part of
     small heat capacity, responds too fast for the rule. Raises SimulationError if the bottle contains no more than the

@@ -104,7 +104,7 @@ def rounded_up(number: Numeric) -> Numeric:
 
 
 def whole(number: Any) -> Any:
-    """Integer value of a number without fraction, as an int; as an array of integers for a column."""
+    """Convert a float with an integer value to int; a column to an array of integers."""
     return number.astype(np.int64) if isinstance(number, np.ndarray) else int(number)
 
 

@@ -42,7 +42,7 @@ def controlled_difference(angle: float, pressure_1: float, pressure_2: float, to
 
 
 def steered(error: float) -> float:
-    """Error with the sign that a law needs: positive where a positive command is needed."""
+    """Error unchanged, for a quantity that a positive command raises."""
     return error
 
 
@@ -114,7 +114,7 @@ def _in_order(one: Any, other: Any) -> tuple[Any, Any]:
 
 @dataclass(frozen=True, slots=True)
 class ControlledQuantity:
-    """Quantity that a reference can prescribe.
+    """Controlled quantity: quantity that a reference can prescribe and a law controls.
 
     ``name`` is also its channel in a recording, which has a pressure difference only if that is controlled. ``words``
     name the quantity in a sentence, ``level`` declares a value, ``difference`` is the unit of a difference of
@@ -226,4 +226,4 @@ def error_functions(name: str, has_vacuum: bool) -> ErrorFunctions:
 
 
 ANYTHING = tuple(CONTROLLED)
-"""Controlled quantities of a law that acts on the error alone: all."""
+"""Names of all controlled quantities, for a law that acts on the error alone."""

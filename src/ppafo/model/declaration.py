@@ -64,7 +64,7 @@ def number_of(hint: Any) -> Quantity | None:
 
 
 class EmptyRow(NamedTuple):
-    """Row without numbers: settings of a component without settings, or state of one without memory."""
+    """Row without numbers, for a component without settings or without state."""
 
 
 class PlainFunction(Protocol):

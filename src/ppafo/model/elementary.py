@@ -99,10 +99,10 @@ QUARTER_TURN = 1.5707963267948966
 TURNS_OF_RADIAN = 1.0 / TURN
 
 DOUBLINGS = 12
-"""Doublings from the fraction of a step at which a series is evaluated to the whole step."""
+"""Number of doublings from the small fraction of a step, at which a series is evaluated, to the whole step."""
 SMALLEST_FRACTION = 0.5**DOUBLINGS
 TERMS = 9
-"""Number of terms of such a series, including order 0."""
+"""Number of terms of the series that are doubled, including order 0."""
 
 
 def sine_and_cosine_of_turns(turns: float) -> tuple[float, float]:

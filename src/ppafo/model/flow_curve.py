@@ -105,7 +105,7 @@ def _polynomial_through(nodes: Terms, values: Terms) -> Terms:
 
 
 def _with_item(items: Terms, index: int, value: float) -> Terms:
-    """Return numbers with the one at an index reindexd."""
+    """Return a copy of a sequence with the item at an index replaced."""
     return (
         value if index == 0 else items[0],
         value if index == 1 else items[1],

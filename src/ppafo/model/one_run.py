@@ -32,7 +32,7 @@ def truncated(number: float) -> float:
 
 
 def whole(number: float) -> int:
-    """Integer value of a number without fraction, as an int."""
+    """Convert a float with an integer value to int."""
     return int(number)
 
 

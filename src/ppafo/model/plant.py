@@ -21,7 +21,7 @@ from ppafo.model.orifice import FlowCurve, check_valve_flow, check_valve_flow_sl
 from ppafo.model.ports import exhaust_path, load_torque, supply_path
 
 HALF_TURN = 0.5 * TURN
-"""rad."""
+"""Angle of half a turn [rad]."""
 
 
 class PlantParameters(NamedTuple):

@@ -13,7 +13,7 @@ from ppafo.model.plant import ActuatorFunctions, PlantParameters
 
 MASK = 0xFFFFFFFF
 ARRIVAL = 40.0
-"""Time, in time constants of a sensor, after which the sensor has settled to rounding."""
+"""Settling time to rounding accuracy of a sensor, in time constants [-]."""
 
 
 class Measurement(NamedTuple):
@@ -36,7 +36,7 @@ class SensorParameters(NamedTuple):
 
 
 def decay_factors(rate: float, step: float) -> tuple[float, float]:
-    """Factor exp(-rate step) and its mean over the step [-], by series at a small fraction of the step and doubling."""
+    """Decay factor exp(-rate step) and its mean over the step [-], by a power series and doubling."""
     # Beyond ARRIVAL exp is 0 to rounding and its mean falls as one over the step: the last line scales it.
     whole = rate * step
     small = -min(whole, ARRIVAL) * SMALLEST_FRACTION

@@ -90,7 +90,7 @@ def nodes_around(table: FluidTable, temperature: float) -> Nodes:
 
 
 def across(rows: tuple[Column, ...], table: FluidTable, nodes: Nodes, density: float) -> float:
-    """Value of some rows at given temperature nodes and a density [kg/m^3], by bilinear interpolation.
+    """Bilinear interpolation of a table between temperature nodes and at a density [kg/m^3].
 
     The second coordinate is the density divided by the density of the densest gas.
     """

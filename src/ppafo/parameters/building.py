@@ -171,14 +171,14 @@ def growth_and_problem(device: Device) -> tuple[Any, Problem]:
 
 
 def _present(parameter_set: ParameterSet, section: str) -> tuple[Quantity, ...]:
-    """Return the quantities of a section that the actuator of the set has."""
+    """Return the declared quantities of a section, without those of chamber 2 for an actuator with one chamber."""
     absent = declaration.OF_SECOND_CHAMBER if parameter_set.has_one_chamber else frozenset()
     members = declaration.members(section, parameter_set.actuator_kind)
     return tuple(member for member in members if f"{section}.{member.name}" not in absent)
 
 
 def _actuator(parameter_set: ParameterSet, read: Reader) -> Actuator:
-    """Return the actuator: a vane, or one of another kind with its settings."""
+    """Return the actuator of a set: a vane, or another actuator with its settings."""
     kind = ACTUATORS[parameter_set.actuator_kind]
     numbers = read("actuator", _present(parameter_set, "actuator"))
     has_one_chamber = parameter_set.has_one_chamber

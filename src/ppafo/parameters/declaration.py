@@ -98,14 +98,14 @@ def is_within(value: Any, quantity: Quantity) -> Any:
 
 
 def actuator_quantities(kind: str) -> tuple[Quantity, ...]:
-    """Return the quantities that a set may state for a kind of actuator, leak excluded; ``ACTUATOR`` for the vane."""
+    """Return the quantities that a set may state for an actuator type, leak excluded; ``ACTUATOR`` for the vane."""
     if kind == VANE.name:
         return ACTUATOR
     return (*ACTUATORS[kind].quantities, *(quantity for quantity in ACTUATOR if quantity.name not in _OF_A_VANE))
 
 
 def members(section: str, actuator_kind: str) -> tuple[Quantity, ...]:
-    """Return the numbers of a section of ``SECTIONS``, for a kind of actuator."""
+    """Return the declared numbers of a section of ``SECTIONS``, for an actuator type."""
     return actuator_quantities(actuator_kind) if section == "actuator" else SECTIONS[section]
 
 

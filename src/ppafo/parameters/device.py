@@ -17,7 +17,7 @@ from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.units.shown import counted_from, shown_in, shown_text
 
 VANE = "vane"
-"""Kind of the paper's actuator in the catalogue of actuators."""
+"""Catalogue name of the paper's actuator."""
 
 
 class _Holding(Protocol):
@@ -83,7 +83,7 @@ class SonicOrifice:
 
 @dataclass(frozen=True, slots=True)
 class Actuator:
-    """An actuator between two stops; chamber 1 grows with the angle. Equations (2), (4), (5).
+    """Actuator between two stops; chamber 1 grows with the angle. Equations (2), (4), (5).
 
     torque_constant [m^3], displacement_per_radian [m^3/rad], angle_min and angle_max [rad], dead_volume_1 and
     dead_volume_2 [m^3], restitution of the stops [-], leak between the chambers. ``kind`` is the name in the catalogue

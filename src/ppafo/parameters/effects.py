@@ -16,7 +16,7 @@ SEEN_BY_EFFECTS = ("gas", "actuator", "friction", "foot_plate", "supply")
 
 
 Sections = Mapping[str, Any]
-"""Objects with further effect settings as attributes, by file section; for effects outside the device."""
+"""Settings objects by file section, for effects whose settings are outside the device (such as the sensors)."""
 _NO_SECTIONS: Sections = {}
 
 
@@ -41,7 +41,7 @@ def number_under(node: Any, attributes: Iterable[str]) -> Any:
 
 
 def part_of(node: Any, name: str) -> Any:
-    """Return an attribute or entry of a part of a device, or of its owner."""
+    """Return an attribute of an object, or an entry of a mapping, by name."""
     # A device has settings of the effects that its set names; those of all others are their defaults.
     if name == SECTION and isinstance(node, Device):
         return all_settings(node)
@@ -95,7 +95,7 @@ def effect_row(effect: Effect, device: Device, others: Sections = _NO_SECTIONS) 
 
 
 def _number(device: Device, section: str, name: str) -> Any:
-    """Return a number of a device; a setting of the actuator's kind takes precedence over a field of the same name."""
+    """Return a number of a device; an actuator setting takes precedence over a field of the same name."""
     if section == "actuator" and name in device.actuator.settings:
         return device.actuator.settings[name]
     return getattr(getattr(device, section), name)

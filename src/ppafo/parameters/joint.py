@@ -1,4 +1,4 @@
-"""Joint turned by an actuator: its name and the names of its two movements."""
+"""Joint driven by an actuator: its name and the names of its two movements."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ OPPOSITES |= {second: first for first, second in OPPOSITES.items()}
 
 @dataclass(frozen=True, slots=True)
 class JointNames:
-    """Joint turned by the actuator: its name, and the movements of increasing and of decreasing angle."""
+    """Joint driven by the actuator: its name, and the movements of increasing and of decreasing angle."""
 
     name: str = "ankle"
     positive: str = "plantarflexion"

@@ -59,7 +59,7 @@ def _capital(kind: str) -> str:
 
 
 def _actuator_section(kind: str) -> Any:
-    """Return the model of the actuator section for a kind; ``kind`` is optional for a vane, as in older sets."""
+    """Return the model of the actuator section for an actuator type; key ``kind`` is optional for a vane."""
     described = ACTUATORS[kind].summary
     named = Field(kind, description=described) if kind == VANE else Field(description=described)
     leak = _section("Leak", declaration.ORIFICE)

@@ -47,7 +47,7 @@ _NEAREST_ANGLES = 0.01
 _NEAREST_PRESSURES = 1.0
 """Minimum distance of pressures [Pa]; closer ones count as one pressure written twice."""
 _STEPS = (1, 2, 5, 10, 20, 50, 100)
-"""Usual rounding steps of readings, in units of the last digit."""
+"""Possible rounding steps of readings, in units of the last digit."""
 _TELLING = 10
 """Count of different numbers above which a common step is no coincidence."""
 _LONGEST = 40

@@ -167,7 +167,7 @@ def in_two_forms(paths: Collection[str], forms: Forms = FORMS) -> tuple[str, str
 
 
 def either(path: str, forms: Forms = FORMS) -> str:
-    """Return the request for a message about a quantity given in two forms."""
+    """Return the sentence of a message that asks for a single form of a quantity."""
     section = path.rpartition(".")[0]
     ways = forms["valve" if section.startswith(NAMED_VALVE) else section]
     return f"give either {' or '.join(' and '.join(f'{section}.{name}' for name in way) for way in ways)}, not both"
@@ -245,7 +245,12 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
             allowed = [one_path(known, path.split(".")[1]) for known in allowed]
         # Nothing is spelt alike: values of the same section stand for what there is.
         near = [name for name in allowed if name.startswith(f"{override.typed.partition('.')[0]}.")] or allowed
-        hint = nearest_name(override.typed, allowed) or f"; for example {', '.join(near[:6])}"
+        # A gas is given by the name of its species, whatever the value was called.
+        is_species = "gas" in override.typed.split(".") and override.text in SPECIES
+        hint = (
+            f", did you mean '{SPECIES_PATH}={override.text}'?" if is_species else nearest_name(override.typed, allowed)
+        )
+        hint = hint or f"; for example {', '.join(near[:6])}"
         worked = _in_conductance(override)
         raise ParameterError(
             f"override '{override}': {parameter_set.file} has no value '{override.typed}'{hint}{worked}"
@@ -262,7 +267,7 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
 
 
 def _in_conductance(override: Override) -> str:
-    """Return the two equivalent ISO 6358 settings for a Cv, Kv or nominal flow; empty for any other value."""
+    """Return a note with the equivalent ISO 6358 settings of a Cv, Kv or nominal flow; empty for any other value."""
     section, _, name = override.typed.rpartition(".")
     if name.lower() not in ("cv", "kv", "qn"):
         return ""

@@ -151,14 +151,14 @@ _SPEAKING = {
     "N m": ("friction.static_torque",),
     "rad": ("actuator.angle_max", "actuator.angle_min"),
 }
-"""Paths whose unit is taken as the author's unit of a quantity, by SI unit."""
+"""Paths of values whose unit is used to display all values of the quantity, by SI unit."""
 _SPEAKING_ENDS = {
     "kg/s": (".mass_flow",),
     "m^3/(s Pa)": (".sonic_conductance",),
     "m^2": (".area",),
     "m^3": (".dead_volume_1", ".dead_volume"),
 }
-"""Endings of further such paths, which differ from set to set, by SI unit."""
+"""Suffixes of paths whose unit is used to display all values of the quantity, by SI unit."""
 
 
 def written_units(numbers: Mapping[str, Entry]) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Static torque limits of any actuator at an angle, from the torque function of its kind.
+"""Static torque limits of any actuator at an angle, from its torque function.
 
 At the upper limit chamber 1 is at its supply pressure and chamber 2 is vented, at the lower limit the reverse. With a
 vacuum supply, chamber 2 raises the torque and chamber 1 lowers it.

@@ -67,7 +67,7 @@ def _value_text(reading: DocumentReader, hardware: Hardware, path: str) -> str |
 
 
 def assumed_lines(reading: DocumentReader) -> tuple[Assumption, ...]:
-    """Return an assumption for each supply-line value that the file leaves at its default, with the reason."""
+    """Return one assumption, with its reason, for each supply-line value that the file leaves at its default."""
     if value_at(reading.document, SUPPLY_LINE) is None:
         return ()
     return tuple(

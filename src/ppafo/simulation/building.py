@@ -137,7 +137,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
 def origin_of(
     request: ScenarioRequest, document: Mapping[str, Any], hardware: Hardware, named: Iterable[str] = ()
 ) -> Origin:
-    """Return the origin of a scenario; ``named`` are the overrides that correspond to ``request.instead``."""
+    """Return the origin of a scenario; ``named`` are the overrides that state the paths of ``request.instead``."""
     overrides = (*(override.words for override in request.overrides), *named)
     set_name = document["device"]["set"]
     return Origin(request.path, set_name, hardware.valve, overrides, request.content, hardware.replaced)
@@ -147,7 +147,7 @@ def _initial(reading: DocumentReader, device: Device) -> tuple[Initial, Graph]:
     """Return the initial chamber pressures [Pa absolute] and their links to the supply pressures that they follow.
 
     Each pressure is given as a number or as a word: a word stands for the supply pressure that it names, and a gauge
-    pressure is relative to the atmosphere. A second chamber that the actuator lacks is at atmosphere.
+    pressure is relative to the atmosphere. For an actuator with one chamber, the second pressure is atmospheric.
     """
     supply = device.supply
     pressures: list[float] = []
@@ -181,7 +181,7 @@ def _control(
     motion: Motion,
     reference: ProfileChoice,
 ) -> tuple[Control, Graph]:
-    """Return the controller with its sample period [s], and the links of its settings [SI] to other numbers."""
+    """Return the controller, sampled at ``period`` [s], and the links of its settings [SI] to other numbers."""
     kind = kind_at(reading.document, "controller")
     controlled = controlled_in(reading.document)
     items = controller_settings(kind, controlled)

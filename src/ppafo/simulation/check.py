@@ -32,7 +32,7 @@ MARGIN = 1.5
 LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, LARGEST_OF_TEMPERATURE = 2.0e-4, 1.0e-3, 2.0e-3
 """Default error limits relative to the ranges of angle and pressures, and to the gas temperature [-]."""
 SMALLEST_TOLERANCE = 1.0e-6
-"""Smallest allowed ``run.tolerance`` [-]."""
+"""Smallest ``run.tolerance`` [-] that a scenario may have."""
 
 MOVE = 1.0e-7
 """Perturbation of a start or a measurement, as a fraction of its range."""
@@ -340,7 +340,7 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
 
 
 def _measurement_moved(run: Run, pressures: float) -> list[Run]:
-    """Runs with a little more or less noise on each sensor, as a fraction of the ranges of angle and pressures [Pa]."""
+    """Runs with slightly changed sensor noise, relative to the ranges of angle [rad] and pressure [Pa]."""
     sensors, angles = run.sensors, run.plant.angle_max - run.plant.angle_min
     # One draw alone seldom crosses a step of a coarse sensor without noise.
     draws = 1 if sensors.angle_noise or sensors.pressure_noise else DRAWS
@@ -377,7 +377,7 @@ def start_moved(run: Run, move: float, opposite: float) -> Run:
 
 
 def _metric_checks(result: RecordedResult, repeats: list[tuple[str, RecordedResult]]) -> tuple[NumberCheck, ...]:
-    """Changes of every metric that the run or a repeat has."""
+    """Changes between run and repeats, for each metric of either."""
     units: dict[str, str] = {}
     for compared in (result, *(repeat for _, repeat in repeats)):
         for name, metric in compared.metrics.items():

@@ -95,13 +95,13 @@ TEXTS = ("name", "description", "device.set", "device.valve")
 
 @dataclass(frozen=True, slots=True)
 class DeclaredContent:
-    """Possible content of the files of one kind of scenario; the functions take the document, whose kinds decide.
+    """Possible content of the files of one scenario type, as functions of a document and the components it names.
 
-    ``find_kinds`` loads the kinds of other packages. ``texts`` gives the paths of texts, ``quantities`` the
-    declarations of numbers by path. ``same`` maps a path to an equivalent path under which the document keeps the
-    value. ``appended`` maps a path to the section in whose own list of overrides the value belongs, and to the path
-    within that section. ``check_motion`` raises an error for a kind of motion that these files cannot have; its second
-    argument is the start of the message.
+    ``find_kinds`` loads components (controller, profile, motion) of other packages. ``texts`` gives the paths of texts,
+    ``quantities`` the declarations of numbers by path. ``same`` maps a path to an equivalent path under which the
+    document keeps the value. ``appended`` maps a path to the section in whose own list of overrides the value belongs,
+    and to the path within that section. ``check_motion`` raises an error for a motion that these files cannot have;
+    its second argument is the start of the message.
     """
 
     find_kinds: Callable[[Mapping[str, Any], str], None]
@@ -122,7 +122,7 @@ def changes_reach(paths: Iterable[str]) -> bool:
 
 
 def controller_settings(kind: str, controlled: str = TORQUE) -> tuple[Quantity, ...]:
-    """Return the settings of a controller kind, in units of the controlled quantity; empty for an unknown kind."""
+    """Return the settings of the named controller, in units of the controlled quantity; empty for an unknown name."""
     return law_settings(CONTROLLERS[kind], controlled) if kind in CONTROLLERS else ()
 
 
@@ -168,7 +168,7 @@ def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
 
 
 def shank_settings(kind: str) -> tuple[Quantity, ...]:
-    """Return the settings of the shank of a leg: settings of a profile, or the stride phase at which a gait starts."""
+    """Return the settings of the shank of a leg: settings of its profile, or the initial stride phase of its gait."""
     return (GAIT_START,) if kind == GAIT_SHANK else profile_settings(kind, SHANK_LEVEL)
 
 
@@ -178,13 +178,13 @@ def by_path(section: str, items: Iterable[Quantity]) -> dict[str, Quantity]:
 
 
 def section_of(document: Mapping[str, Any]) -> MotionSection | None:
-    """Return the ``[motion]`` section for the kind that a document names; None for an unknown kind and for a walk."""
+    """Return the ``[motion]`` section of the motion that a document names; None for an unknown motion and a walk."""
     kind = MOTIONS.get(kind_at(document, "motion"))
     return None if kind is None else kind.section
 
 
 def motion_quantities(section: MotionSection | None, profile_kind: str) -> dict[str, Quantity]:
-    """Return the declarations of the numbers of a motion, keyed by path, for a kind of its profile."""
+    """Return the declarations of the numbers of a motion with the named profile, keyed by path."""
     if section is None:
         return {}
     profile = section.profile
@@ -193,9 +193,9 @@ def motion_quantities(section: MotionSection | None, profile_kind: str) -> dict[
 
 
 def quantities(document: Mapping[str, Any], of_motion: Mapping[str, Quantity] | None = None) -> dict[str, Quantity]:
-    """Return the declaration of every number that a document with its kinds can contain, keyed by path.
+    """Return the declaration of every number that a document with its components can contain, keyed by path.
 
-    ``of_motion`` are the declarations of a motion that the document does not name.
+    ``of_motion`` are declarations of the motion, if the document does not name it.
     """
     if of_motion is None:
         section = section_of(document)
@@ -214,7 +214,7 @@ def quantities(document: Mapping[str, Any], of_motion: Mapping[str, Quantity] | 
 
 
 def profile_path(section: MotionSection | None) -> str:
-    """Return the path of the profile in the section of a motion; "" for a motion without one."""
+    """Return the path of the profile in a motion's section; "" for a motion without a profile."""
     return "" if section is None or section.profile is None else f"motion.{section.profile.name}"
 
 
@@ -230,9 +230,9 @@ def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
-    """Load the kinds of other packages that a document names; ``file`` is the document's name in messages.
+    """Load the motion, controller and profiles that a document names, from other packages too.
 
-    Raises ScenarioError if a kind cannot be loaded.
+    ``file`` is the document's name in messages. Raises ScenarioError if a component cannot be loaded.
     """
     check_motion_kind(kind_at(document, "motion"), f"{file}: motion.kind")
     kind = kind_at(document, "motion")
@@ -255,7 +255,7 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
 
 
 def check_motion_kind(kind: object, place: str) -> None:
-    """Raise ScenarioError for the motion of a leg that walks; the message starts with ``place``."""
+    """Raise ScenarioError if the motion is a walk; the message starts with ``place``."""
     with refused_as(ScenarioError, place, KindError):
         walks = isinstance(kind, str) and is_walk(kind)
     if walks:

@@ -60,14 +60,14 @@ GAIN_TERMS = frozenset(
 
 
 class _GainParts(NamedTuple):
-    """Functions for a gain: torque loop or reach of a device, and rule of ``control.torque_loop``."""
+    """Functions behind a gain: torque loop or torque reach of a device, and gain rule of ``control.torque_loop``."""
 
     number_of: Callable[..., Any]
     rule: Callable[..., float]
 
 
 class _LoopAndJoint(NamedTuple):
-    """Functions for the torque loop and the joint of a device."""
+    """Functions that compute the torque loop and the joint of a device."""
 
     torque_loop_of: Callable[..., TorqueLoop]
     joint_of: Callable[..., Joint]
@@ -83,7 +83,7 @@ def gain_of_device(
     *,
     parts: _GainParts,
 ) -> float:
-    """Gain from ``parts.rule`` for the torque loop or the reach of a device."""
+    """Default gain of a device, from its torque loop or torque reach by the rule ``parts.rule``."""
     return parts.rule(parts.number_of(settings, stops, around, numbers, valve, signals))
 
 
@@ -98,7 +98,7 @@ def gain_with_setting(
     *,
     parts: _GainParts,
 ) -> float:
-    """Gain from ``parts.rule`` for the torque loop of a device and another setting of the controller."""
+    """Default gain of a device, from its torque loop and another controller setting by the rule ``parts.rule``."""
     return parts.rule(parts.number_of(settings, stops, around, numbers, valve, signals), setting)
 
 
@@ -113,7 +113,7 @@ def opening_beyond_band(
     *,
     parts: _GainParts,
 ) -> float:
-    """Command [-] for the valve opening from ``parts.rule``, for a valve with a dead band."""
+    """Command [-] that opens a valve with a dead band by the opening from ``parts.rule``."""
     opening = parts.rule(parts.number_of(settings, stops, around, numbers, valve, signals), setting)
     return float(valve.dead_band + (1.0 - valve.dead_band) * opening)
 
@@ -129,7 +129,7 @@ def gain_of_joint(
     *,
     parts: JointGainParts,
 ) -> float:
-    """Gain from ``parts.rule`` for the torque loop and the joint of a device, with ``travel`` [rad] per move."""
+    """Default gain of a device, from torque loop, joint and ``travel`` [rad] per move by the rule ``parts.rule``."""
     loop = parts.torque_loop_of(settings, stops, around, numbers, valve, signals)
     return float(parts.rule(loop, parts.joint_of(settings, stops, around, signals, travel)))
 

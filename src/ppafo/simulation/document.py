@@ -25,7 +25,7 @@ REFERENCE_OF = "reference.of"
 
 
 def kind_at(document: Mapping[str, Any], section: str) -> str:
-    """Return the kind that a section names; "" if it names none."""
+    """Return the value of ``kind`` in a section; "" if the section has no ``kind``."""
     kind = value_at(document, f"{section}.kind")
     # Anything but a text is refused by the layout, with its place.
     return kind if isinstance(kind, str) else ""

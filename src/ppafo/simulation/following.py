@@ -22,7 +22,7 @@ def read_followers(
     device: Device,
     present: Mapping[str, float],
 ) -> tuple[dict[str, float], Graph]:
-    """Return the settings of some sections [SI] by path, and the links of settings that follow the device by default.
+    """Return the settings of sections [SI] by path, and links for the defaults that depend on the device.
 
     ``terms`` are the quantities that a default may follow, by name; ``present`` are numbers by path in addition to
     those on the device.

@@ -74,7 +74,7 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
 
 
 def _overrides_for(of_file: tuple[Override, ...], parameter_set: ParameterSet, is_own: bool) -> tuple[Override, ...]:
-    """Return the overrides of a file that another set than its own takes; one chamber has no second supply."""
+    """Return the file's overrides that apply to a parameter set; ``is_own`` is true for the set that the file names."""
     if is_own or not parameter_set.has_one_chamber:
         return of_file
     return tuple(item for item in of_file if item.typed not in OF_SECOND_CHAMBER)
@@ -83,7 +83,7 @@ def _overrides_for(of_file: tuple[Override, ...], parameter_set: ParameterSet, i
 def _replaced_text(
     parameter_set: ParameterSet, name: str, of_file: tuple[Override, ...], overrides: tuple[Override, ...]
 ) -> str:
-    """Sentence on values of a scenario's file in force in place of those of the set ``name``; "" without any."""
+    """Sentence on values of the scenario file that replace values of the parameter set ``name``; "" without any."""
     given = {override.typed for override in overrides}
     replaced = [item for item in of_file if item.typed not in given]
     if not replaced:

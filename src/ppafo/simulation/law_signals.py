@@ -94,7 +94,7 @@ MovedOnTable: Any = row_with("MovedOnTable", Signals, **_Table)
 
 
 def anywhere(stops: Range, _signals: Any) -> tuple[float, float]:
-    """Lowest and highest angle [rad] of a joint without prescribed angle: the usual angle for both."""
+    """Lowest and highest angle [rad] of a joint without prescribed angle; both are the usual angle."""
     place = usual_place(stops.angle_min, stops.angle_max)
     return place, place
 
@@ -178,7 +178,7 @@ def lag_of_sensor(bandwidth: float) -> float:
 
 
 def time_in_scenario(signals: Signals) -> float:
-    """Age of a measurement [s]: transport delay and lag of the pressure sensors."""
+    """Delay of a pressure measurement [s]: transport delay plus pressure-sensor lag."""
     return signals.delay + lag_of_sensor(signals.bandwidth)
 
 
@@ -188,7 +188,7 @@ def time_in_walk(signals: _SignalsOfWalk) -> float:
 
 
 def time_with_angle(signals: Any) -> float:
-    """Age of a measurement [s]: transport delay and lag of the slower sensors."""
+    """Measurement delay [s]: transport delay plus lag of the slower of angle and pressure sensors."""
     late: float = max(lag_of_sensor(signals.bandwidth), lag_of_sensor(signals.angle_bandwidth))
     age: float = signals.delay
     return age + late

@@ -1,4 +1,4 @@
-"""Foot on a shank with prescribed motion, without ground contact: its part in the plan and the recording of a run."""
+"""Foot on a shank with prescribed motion, without ground contact: planning and recording of such runs."""
 
 from collections.abc import Mapping
 from dataclasses import replace

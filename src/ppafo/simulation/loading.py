@@ -39,9 +39,9 @@ FILE = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Layout of the files of one kind of scenario: kind of file, possible content, models, builder.
+    """Layout of the files of one scenario type: file type, possible content, schema models, builder.
 
-    ``model`` has the sections and kinds of a document only; ``whole`` has all sections and kinds and is for messages.
+    ``model`` has only the sections and components that a document names; ``whole`` has all, for messages.
     """
 
     file: TomlKind
@@ -163,9 +163,9 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
 def _check_layout(
     document: dict[str, Any], file: str, layout: Layout, may_have_gaps: bool = False, of_kinds_alone: bool = False
 ) -> None:
-    """Raise ScenarioError for unknown keys and kinds, and for missing keys unless ``may_have_gaps``.
+    """Raise ScenarioError for unknown keys and components, and for missing keys unless ``may_have_gaps``.
 
-    With ``of_kinds_alone`` only unknown kinds are errors.
+    With ``of_kinds_alone`` only an unknown ``kind`` is an error.
     """
     # The whole layout has every kind of everything: it is made for a message alone.
     for model in (layout.model, layout.whole):

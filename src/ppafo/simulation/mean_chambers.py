@@ -1,4 +1,4 @@
-"""Chambers of an actuator of any kind at an angle: torque per pressure and volume of each.
+"""Chambers of any actuator at an angle: torque per pressure, and volume.
 
 If the joint angle is unknown, the chambers are evaluated at a right angle or, if the range has none, at mid-range.
 """
@@ -47,7 +47,7 @@ class MeanChambers(NamedTuple):
 
 
 class _RestingPlant(NamedTuple):
-    """Plant of an actuator alone at rest (``ShapedPlant``), as the functions of an actuator kind read it."""
+    """Actuator at rest in the layout of ``ShapedPlant``, the argument of an actuator's model functions."""
 
     shape: Any
     gas_product: float
@@ -59,7 +59,7 @@ class _RestingPlant(NamedTuple):
 
 
 class _MeasuredParts(NamedTuple):
-    """Shape of a measured actuator: the kind's function ``prepare``, and the measured table, its third argument."""
+    """Shape of a measured actuator: function ``prepare``, and its third argument, the measured table."""
 
     prepare: Callable[[Any, Range, Any], Any]
     table: Any
@@ -91,7 +91,7 @@ def usual_place(lowest: float, highest: float) -> float:
 
 
 def gauge_of(supply: float, room: float) -> float:
-    """Gauge pressure [Pa] of a supply relative to the atmosphere ``room``: negative for a vacuum, never 0."""
+    """Gauge pressure [Pa] of a supply in an atmosphere ``room`` [Pa absolute]: negative for a vacuum, never 0."""
     gauge = supply - room
     return gauge if gauge <= -LEAST_GAUGE else max(gauge, LEAST_GAUGE)
 
@@ -156,7 +156,7 @@ def shaped_growth(settings: Any, stops: Range, around: Surroundings, *, parts: _
 
 
 class _ChambersOf(NamedTuple):
-    """Functions of an actuator for its ``MeanChambers`` at the usual angle, at any angle, and for its mean ``growth``.
+    """Functions for an actuator's chambers at the usual angle and at any angle, and for its mean displacement.
 
     ``sources`` are the paths of their arguments and ``rows`` the types into which these are grouped. ``at`` takes the
     angle [rad] as an additional last argument; ``growth`` is in m^3/rad.
@@ -195,7 +195,7 @@ def chambers_of(device: Device) -> _ChambersOf:
 
 
 def quicker_at(device: Device, angle: float, controlled: str) -> float:
-    """Rate of a torque or pressure at an angle [rad], divided by the rate at the angle used for the gains [-].
+    """Ratio of torque or pressure rates [-]: at an angle [rad], to the angle used for the gains.
 
     Rates are per volume flow at full opening of the valve [N m/m^3 or Pa/m^3], for the faster chamber.
     """

@@ -1,6 +1,6 @@
-"""Kinds of motion of a vane alone: locked, free, along a profile, or with the foot of a leg.
+"""Motions of a vane alone: locked, free, along a profile, or with the foot of a leg.
 
-Each kind declares its section of a file, and how that section is read and checked against the stops of the device. Code
+Each motion declares its section of a file, and how that section is read and checked against the device's stops. Code
 that only a run or an ensemble needs is imported on use.
 """
 
@@ -48,9 +48,9 @@ _PROFILE, _SHANK = "motion.profile", "motion.shank"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VaneKind:
-    """Kind of motion of a vane alone; code that only its runs need is imported on use.
+    """Type of motion of a vane alone; code that only its runs need is imported on use.
 
-    Kinds differ in their section of the file, in the planning of a run, and in the recorded channels.
+    Motions differ in their section of the file, in the planning of a run, and in the recorded channels.
     """
 
     name: str
@@ -101,11 +101,11 @@ class VaneKind:
         return scenario.sensors.angle_noise + scenario.sensors.pressure_noise
 
     def law(self, scenario: Scenario) -> ControllerKind:
-        """Return the controller kind as its catalogue has it."""
+        """Return the catalogue entry of the scenario's controller."""
         return CONTROLLERS[scenario.controller.kind]
 
     def sees(self, scenario: Scenario) -> LawSignals:
-        """Return the signals of the controller, with the foot of a leg or without."""
+        """Return the signals that the controller reads, for a joint with or without a foot."""
         from ppafo.simulation.law_signals import seen_in_scenario
 
         motion, is_locked = vane_motion(scenario), self.name == "locked"
@@ -117,11 +117,11 @@ class VaneKind:
         return not scenario.controller.is_open_loop
 
     def asks_gradually(self, law: ControllerKind) -> bool:
-        """Tell whether a controller follows a reference with valve openings between shut and fully open."""
+        """Tell whether a controller commands partial valve openings to follow a reference."""
         return law.needs_reference and not law.only_switches
 
     def lacks(self, scenario: Scenario, metric: "MetricKind") -> str:
-        """Return the reason why a scenario cannot have a metric; "" if the scenario has it."""
+        """Return the reason why a metric does not apply to a scenario; "" if it applies."""
         from ppafo.simulation.ensemble.vane import lacks
 
         return lacks(scenario, metric)

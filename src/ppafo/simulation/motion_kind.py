@@ -1,6 +1,6 @@
-"""Kinds of motion by name: their contributions to the runs of their scenarios, and their locations.
+"""Motion types by name: interface of a motion type to runs of scenarios, and modules that define the types.
 
-A kind is loaded when a document or a scenario names it: scenarios of a vane alone load no walk.
+A motion is loaded when a document or a scenario names it: scenarios of a vane alone load no walk.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ppafo.signals.recording import Recording
 
 ScenarioType_contra = TypeVar("ScenarioType_contra", contravariant=True)
-"""Scenario type of a kind of motion, defined in a package above."""
+"""Scenario class of a motion type, defined in a package that imports this package."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,14 +54,14 @@ Measured = tuple["Recording", Mapping[str, "Metric"], str]
 
 @runtime_checkable
 class MotionKind(Protocol[ScenarioType_contra]):
-    """Contribution of a kind of motion to the runs of its scenarios.
+    """Motion type: functions that plan, check and measure the runs of its scenarios.
 
     Any number of a scenario may be an array (runs,).
     """
 
     @property
     def name(self) -> str:
-        """Name of the kind in its catalogue."""
+        """Name of the motion in its catalogue."""
 
     @property
     def section(self) -> "MotionSection | None":
@@ -69,11 +69,11 @@ class MotionKind(Protocol[ScenarioType_contra]):
 
     @property
     def layout(self) -> str:
-        """Layout of the kind's files, libraries and pages: ``vane`` or ``walk``."""
+        """Layout of the motion's files, libraries and pages: ``vane`` or ``walk``."""
 
     @property
     def places(self) -> Mapping[str, tuple[str, ...]]:
-        """Attribute names that lead to numbers not located at their path, keyed by path."""
+        """Attribute names of numbers whose path in the file differs from their attributes, keyed by path."""
 
     @property
     def command(self) -> str:
@@ -116,19 +116,19 @@ class MotionKind(Protocol[ScenarioType_contra]):
         """Return the sum of all noise levels of the controller's sensors, which is 0 only without noise."""
 
     def law(self, scenario: ScenarioType_contra, /) -> "ControllerKind":
-        """Return the controller with the additions of the motion."""
+        """Return the catalogue entry of the controller, extended for this motion."""
 
     def sees(self, scenario: ScenarioType_contra, /) -> LawSignals:
-        """Return the signals of the controller."""
+        """Return the signals that the controller reads."""
 
     def follows_reference(self, scenario: ScenarioType_contra, /) -> bool:
         """Tell whether the controller follows the reference of the scenario, and not one that it generates itself."""
 
     def asks_gradually(self, law: "ControllerKind", /) -> bool:
-        """Tell whether a controller follows its reference with valve openings between shut and fully open."""
+        """Tell whether a controller commands partial valve openings to follow its reference."""
 
     def lacks(self, scenario: ScenarioType_contra, metric: "MetricKind", /) -> str:
-        """Return the reason why a scenario cannot have a metric; "" if the scenario has it."""
+        """Return the reason why a metric does not apply to a scenario; "" if it applies."""
 
     def further_command(self, file: str, /) -> str:
         """Return the command that reports more about a scenario than a run does, in one line; "" if there is none."""
@@ -141,7 +141,7 @@ class MotionKind(Protocol[ScenarioType_contra]):
 
 @dataclass(frozen=True, slots=True)
 class MotionSection:
-    """Section ``[motion]`` of a kind of motion of a vane alone: its numbers, and the table of a profile, if any.
+    """Section ``[motion]`` for one motion of a vane alone: its numbers, and its profile table, if any.
 
     ``read(reading, device, duration, step, folder)`` returns the motion; ``duration`` and ``step`` are in seconds, and
     relative paths start from ``folder``.
@@ -155,10 +155,10 @@ class MotionSection:
 
 @dataclass(frozen=True, slots=True)
 class ProfileTable:
-    """Table within ``[motion]`` with the kind of a profile and its settings; ``name`` is also the motion's attribute.
+    """Table of a profile within ``[motion]``: its ``kind`` and settings; ``name`` is also the motion's attribute.
 
-    ``settings(kind)`` declares its numbers, ``layout()`` is the model of the table. ``own`` maps kinds that are no
-    profiles to the texts that each requires.
+    ``settings(kind)`` declares its numbers, ``layout()`` is the model of the table. ``own`` maps ``kind`` values that
+    are no profiles to the texts that each requires.
     """
 
     name: str
@@ -169,17 +169,17 @@ class ProfileTable:
 
 
 VANE, WALK = "vane", "walk"
-"""Layouts of a vane alone and of a leg led by a gait; the kind of motion of the latter is also named ``walk``."""
+"""File layouts of a vane alone and of a walking leg; the walking motion is also named ``walk``."""
 
 VANE_MOTIONS = ("free", "locked", "prescribed", "leg")
-"""Kinds of motion of a vane alone in this package."""
+"""Motions of a vane alone in this package."""
 
 _GROUP = "ppafo.motions"
 MOTIONS: Kinds[MotionKind[Any]] = Kinds(_GROUP, "motion", MotionKind, declared_kinds(_GROUP))
-"""Kinds of motion: of a vane alone, and of a leg that walks with the device."""
+"""Motions of a vane alone, and of a leg that walks with the device."""
 
 
 def is_walk(name: str) -> bool:
-    """Tell whether a kind of motion is a walk; KindError if the kind cannot be used."""
+    """Tell whether the named motion is a walk; KindError for a motion that cannot be used."""
     kind = MOTIONS.get(name)
     return kind is not None and kind.layout == WALK

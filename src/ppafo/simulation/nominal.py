@@ -114,17 +114,17 @@ def as_content(number: float, molar_mass: float, temperature: float) -> float:
 
 
 def converter_range(supply: float, dorsiflexion: float) -> float:
-    """Largest pressure [Pa] that the converter measures: 1 MPa, or 1.25 times the larger supply pressure [Pa]."""
+    """Full-scale pressure of the converter [Pa]: 1 MPa, or 1.25 times the larger supply pressure if that is more."""
     return max(USUAL_RANGE, COMPRESSED * max(supply, dorsiflexion))
 
 
 def time_of_joint(joining: float, holding: float) -> float:
-    """Sum of the time [s] for which both chambers are joined and the time for which chamber 2 then stays closed."""
+    """Sum of two times [s]: chambers joined, then chamber 2 kept closed."""
     return joining + holding
 
 
 class _NominalParts(NamedTuple):
-    """Function for the chambers of the actuator at the usual angle."""
+    """Function that computes the chambers of the actuator at the usual angle."""
 
     mean_chambers: Callable[[Any, Range, Surroundings], MeanChambers]
 
@@ -135,13 +135,13 @@ def torque_per_pressure(settings: Any, stops: Range, around: Surroundings, *, pa
 
 
 def dead_volume_1(settings: Any, stops: Range, around: Surroundings, *, parts: _NominalParts) -> float:
-    """Dead volume [m^3] of a vane whose chamber 1 has the same volume at mid-range."""
+    """Dead volume [m^3] of an equivalent vane: equal volume of chamber 1 at mid-range."""
     mean = parts.mean_chambers(settings, stops, around)
     return rest_of(mean.volume_1, mean.torque_per_pressure_1, stops)
 
 
 def dead_volume_2(settings: Any, stops: Range, around: Surroundings, *, parts: _NominalParts) -> float:
-    """Dead volume [m^3] of a vane whose chamber 2 has the same volume at mid-range."""
+    """Dead volume [m^3] of an equivalent vane: equal volume of chamber 2 at mid-range."""
     mean = parts.mean_chambers(settings, stops, around)
     return rest_of(mean.volume_2, mean.torque_per_pressure_1, stops)
 
@@ -211,7 +211,7 @@ def _conductance(device: Device, section: str) -> LinkFunction:
 
 
 def in_its_form(device: Device, section: str, of_area: LinkFunction, of_sonic: LinkFunction) -> LinkFunction:
-    """Return the function for an orifice's form (area or sonic conductance), linked to that for its other form."""
+    """Return the function for an orifice given as area or as sonic conductance, linked to the alternative."""
     orifice = device.valve.orifice if section == VALVE else device.actuator.leak
     of_area, of_sonic = replace(of_area, orifice=section), replace(of_sonic, orifice=section)
     if isinstance(orifice, SonicOrifice):

@@ -64,9 +64,9 @@ _PARTS = {
     "supply_line": SupplyLine,
     "links": Mapping,
 }
-"""Class of each part of a scenario, for any kind of motion; two of them may be None."""
+"""Class of each attribute of a scenario, for any motion; two attributes may be None."""
 _ACCEPTED: deque[Scenario] = deque(maxlen=16)
-"""Scenarios checked last: they are frozen, so that repeated simulation needs no new check."""
+"""Scenarios that were checked last; frozen, so that repeated simulation needs no new check."""
 
 
 def chosen_path(path: str, scenario: Scenario) -> str:
@@ -117,7 +117,7 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
 
 
 def of_its_chambers(by_path: Mapping[str, _Item], device: Device) -> dict[str, _Item]:
-    """Return items by path without those of a second chamber that the actuator does not have."""
+    """Return items by path, without items of chamber 2 for an actuator with one chamber."""
     absent = OF_SECOND_CHAMBER if device.actuator.has_one_chamber else frozenset()
     return {path: item for path, item in by_path.items() if path not in absent}
 
@@ -159,7 +159,7 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
 
 
 def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str, Any]:
-    """Return numbers by path, together with all numbers that follow them as in a file; ``TIMES`` do not follow.
+    """Return numbers by path, together with all linked numbers that follow from them, except ``TIMES``.
 
     Numbers changed since the scenario was loaded no longer follow others.
     """
@@ -171,12 +171,12 @@ def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str
 
 
 def links_that_hold(scenario: Scenario) -> Graph:
-    """Return the links of a scenario, except links of numbers changed since it was loaded."""
+    """Return the links of a scenario that still apply: without numbers changed since it was loaded."""
     return holding(scenario.graph, _numbers_of_graph(scenario))
 
 
 def _numbers_of_graph(scenario: Scenario) -> dict[str, Any]:
-    """Return the numbers that the links of a scenario name, keyed by path; for an orifice, of its present form."""
+    """Return the numbers that the links of a scenario name, keyed by path; for an orifice, in its present form."""
     absent = _numbers_of_other_form(scenario.device)
     present = (path for path in paths_in(scenario.graph) if path not in absent)
     return {path: number_under(scenario, _attributes(path, scenario)) for path in present}
@@ -188,18 +188,18 @@ def number_at(scenario: Scenario, path: str) -> float:
 
 
 def other_form(device: Device, section: str) -> tuple[str, ...]:
-    """Return the names of the numbers in the form that an orifice (``valve`` or ``actuator.leak``) does not have."""
+    """Return the number names of the orifice form (area or sonic conductance) that is not in use in a section."""
     orifice = device.valve.orifice if section == "valve" else device.actuator.leak
     return tuple(quantity.name for quantity in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM))
 
 
 def _numbers_of_other_form(device: Device) -> set[str]:
-    """Return the paths of the numbers of orifices in the form that these do not have."""
+    """Return the paths of orifice numbers in the form (area or sonic conductance) that is not in use."""
     return {f"{section}.{name}" for section in ORIFICES for name in other_form(device, section)}
 
 
 def _changing_form(scenario: Scenario, paths: Collection[str]) -> list[str]:
-    """Return the sections of the orifices that change to their other form."""
+    """Return the sections of orifices that change between area and sonic conductance."""
     return [
         section
         for section in ORIFICES

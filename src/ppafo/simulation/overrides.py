@@ -1,7 +1,7 @@
-"""Overrides of a scenario as a set: kinds first, outer ones before inner ones, then numbers; order is irrelevant.
+"""Overrides of a scenario, independent of their order: each ``kind``, outer sections first, then numbers.
 
-A value that a newly chosen kind cannot use is an error that names both overrides. A document, or the overrides of a
-file, is a layer below the caller's overrides: choosing another kind drops the lower layer's settings of the old kind.
+A value that a newly chosen component cannot use is an error that names both overrides. A document, or the overrides of
+a file, is a layer below the caller's overrides: choosing another ``kind`` drops the lower layer's settings of the old.
 """
 
 import copy
@@ -25,9 +25,9 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 """Number without a unit."""
 _SEED, _VALVE = "sensors.seed", "device.valve"
 _OF_ANY_KIND = {"controller": frozenset({"kind", "rate", "period"})}
-"""Keys of a section that every kind has."""
+"""Keys that a section has for every value of ``kind``."""
 _KIND = "kind"
-"""Last name of the paths of kinds, which decide the other values of their section."""
+"""Key of a section that names its component, such as a controller, and so decides the section's other keys."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ def over_layer(
     declared: DeclaredContent,
     valve: str = "",
 ) -> tuple[Override, ...]:
-    """Return two layers of overrides of a document as one set: later ones replace earlier ones by path, form and kind.
+    """Merge two layers of overrides: a later one replaces earlier ones of the same path, orifice form or ``kind``.
 
     ``valve`` is the name of the valve in use unless the later overrides choose another.
     """
@@ -121,7 +121,7 @@ def _is_kind_path(path: str) -> bool:
 
 
 def deciding_kinds(path: str, kind_paths: Iterable[str]) -> list[str]:
-    """Return the kind paths that decide whether a path exists, the innermost last."""
+    """Return the paths of the ``kind`` values that decide whether a path exists, the innermost last."""
     deciding = [
         kind_path
         for kind_path in kind_paths
@@ -133,9 +133,9 @@ def deciding_kinds(path: str, kind_paths: Iterable[str]) -> list[str]:
 def _choose_kinds(
     document: dict[str, Any], override_at: Mapping[str, Override], file: str, declared: DeclaredContent
 ) -> tuple[str, ...]:
-    """Set the given kinds, outer sections first, and return the remaining paths.
+    """Set the overridden ``kind`` of each section, outer sections first, and return the remaining paths.
 
-    A kind of a missing section is among the remaining paths.
+    The ``kind`` of a missing section is among the remaining paths.
     """
     # A kind of an outer section decides which sections there are inside it.
     kind_paths = sorted(filter(_is_kind_path, override_at), key=lambda path: (path.count("."), path))
@@ -171,12 +171,12 @@ def device_paths() -> tuple[str, ...]:
 
 
 def is_of_device(path: str) -> bool:
-    """Tell whether a path starts in the device, which then checks the rest of the path."""
+    """Tell whether the first name of a path is a section of the device; the rest of the path is not checked."""
     return path.partition(".")[0] in {*SECTIONS, EFFECTS_SECTION, "valve", "valves"}
 
 
 def unknown_value(override: Override, known: tuple[str, ...], owner: str) -> ScenarioError:
-    """Return the error for an unknown path; ``owner`` is the start of its text, such as ``task.toml has``."""
+    """Return the error for an override of an unknown path; ``owner`` starts the message, such as ``task.toml has``."""
     EFFECTS.load_own()
     allowed = [*known, *device_paths()]
     section = override.typed.partition(".")[0]
@@ -217,7 +217,7 @@ def _set(document: dict[str, Any], path: str, text: str, file: str, declared: De
 
 
 def _setting_names(document: dict[str, Any], section: str, declared: DeclaredContent) -> frozenset[str]:
-    """Return the keys that a section can have in addition to its kind."""
+    """Return the keys that a section can have in addition to ``kind``."""
     prefix = f"{section}."
     paths = [path.removeprefix(prefix) for path in declared.paths(document) if path.startswith(prefix)]
     return frozenset(path.partition(".")[0] for path in paths) - {"kind"}

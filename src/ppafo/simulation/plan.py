@@ -98,7 +98,7 @@ class Components:
 
 @dataclass(frozen=True, slots=True)
 class CarriedLeg:
-    """Leg on an unconstrained vane: profile of its shank, and function ``put_on``.
+    """Leg on a free vane: profile of its shank, and a function that adds the leg to a plant.
 
     ``put_on(plant)`` returns the plant with the foot's load and the leg as the engine takes it.
     """
@@ -130,7 +130,7 @@ def compose_run(
     initial_state_of: Callable[[PlantParameters], PlantState],
     walk: Walk | None = None,
 ) -> Run:
-    """Return the run of components: every controller, valve, motion, gas and supply can be combined with every other.
+    """Assemble a run from components; every controller, valve, motion, gas and supply can be combined.
 
     ``time_grid_of`` gives the time grid and ``initial_state_of`` the initial state, both of the plant with lines and
     leg; ``plant`` is the plant without them. ``walk`` is a walking leg; a leg without ground contact is one of the
@@ -255,7 +255,7 @@ def _program(components: Components, grid: TimeGrid, walk: Walk | None, has_dela
 
 
 def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, tuple[Problem, ...]]:
-    """Run of a scenario of a vane alone, with a leg or without, and its possible problems.
+    """Return the planned run of a scenario without walking, and its possible problems; ``leg`` adds a foot in the air.
 
     Numbers may be arrays (runs,) of an ensemble of one program: each setting of the valve and the sensors is then
     either 0 for all runs or nonzero for all.
@@ -416,7 +416,7 @@ def state_with_volumes(
     pressure_1: float,
     pressure_2: float,
 ) -> PlantState:
-    """State of the vane at an angle [rad] and rate [rad/s], with chambers [m^3] filled to absolute pressures [Pa]."""
+    """Plant state from angle [rad], angular velocity [rad/s], chamber volumes [m^3] and pressures [Pa absolute]."""
     return PlantState(
         angle=angle,
         angular_velocity=angular_velocity,

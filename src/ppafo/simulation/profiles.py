@@ -98,7 +98,7 @@ def limits_of(device: Device, followed: ControlledQuantity) -> Limits:
 def profile_problem(
     limits: Limits, profile: ProfileChoice, duration: float, step: float, section: str = "motion.profile"
 ) -> str:
-    """Return the point at which the profile of a section leaves its limits, in words; "" if it stays within."""
+    """Return a sentence on the time at which a section's profile leaves its limits; "" if it stays within."""
     kind, parameters = PROFILES[profile.kind], profile_parameters(profile)
     # The times that the engine asks for, as far as they can be gone through one by one.
     lowest, highest = limits.allowed

@@ -22,7 +22,7 @@ _REPORTED_CLASSES: "WeakSet[type]" = WeakSet()
 
 
 def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
-    """Run a batch of one with a Python controller.
+    """Run a batch that holds a single run, with a Python controller.
 
     A command beyond the valve's range is limited; a warning is logged once for each class of controllers. Raises
     SimulationError for a command that is no finite number, and for a programming error in the controller.
@@ -44,7 +44,7 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
 
 
 def _valve_command(command: Any, controller: PythonController, time: float, walks: bool) -> float:
-    """Return a command within the valve's range [-]; in a walk one more command vents both chambers."""
+    """Return a command limited to the valve's range [-]; a walk has an additional command that vents both chambers."""
     name = type(controller).__name__
     # A comparison that was meant to be a command is a bool, which Python takes for a whole number.
     is_number = isinstance(command, int | float | np.floating) and not isinstance(command, bool)

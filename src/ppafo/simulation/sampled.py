@@ -1,4 +1,4 @@
-"""Compiled run that is stepped from one controller sample to the next, with the command of the caller."""
+"""Compiled run that advances by one controller sample at a time, with commands from the caller."""
 
 import math
 from typing import Any, final

@@ -129,7 +129,7 @@ class FreeMotion:
 class PrescribedMotion:
     """The angle of the vane [rad] is a given function of time; a locked vane has a constant profile.
 
-    ``kind`` is the kind of motion as in a file, ``locked`` or ``prescribed``.
+    ``kind`` is the motion as named in a file, ``locked`` or ``prescribed``.
     """
 
     profile: ProfileChoice
@@ -163,7 +163,7 @@ class PrescribedMotion:
 
 
 class Motion(Protocol):
-    """Motion of the ankle: a vane alone, or a walking leg with the device, defined in a package above."""
+    """Motion of the ankle: a vane alone, or a walking leg with the device."""
 
     @property
     def motion_kind(self) -> "MotionKind[Scenario]":
@@ -349,7 +349,7 @@ class Origin:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Scenario:
-    """A device in one experiment.
+    """Scenario: a device in one experiment, in SI units.
 
     The reference is a torque [N m] or, according to ``controlled`` (``model.controlled``), an angle [rad] or a pressure
     [Pa]. ``beyond_reach`` is the reason for a reference that is beyond the device's reach on purpose, else "". Without
@@ -393,7 +393,7 @@ class Scenario:
 
     @property
     def law(self) -> "ControllerKind | None":
-        """Controller with the additions of the motion; None for a Python object."""
+        """Catalogue entry of the controller, extended for the motion; None for a Python object."""
         return None if self.controller.is_outside else self.motion.motion_kind.law(self)
 
     @property

@@ -1,4 +1,4 @@
-"""Layout of a scenario file, built from the declarations, so that each value is declared in one place only.
+"""Schema of a scenario file, built from the declarations of its values.
 
 The layout defines the allowed keys. Numbers are checked when they are read (``reading``), with file, key and unit.
 """
@@ -52,7 +52,7 @@ def quantity_fields(quantities: tuple[Quantity, ...], words: tuple[str, ...] = (
 
 
 def kind_field(kind: str, summary: str) -> dict[str, Any]:
-    """Return the field ``kind`` that distinguishes one kind of table from another."""
+    """Return the field ``kind`` (discriminator) of a table whose layout depends on it."""
     return {"kind": (Literal[kind], Field(description=summary))}
 
 
@@ -62,12 +62,12 @@ def model_name(name: str) -> str:
 
 
 def named_or_all(name: str, kinds: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return only the named kind, or all kinds if there is none of this name."""
+    """Return only the entry called ``name``, or all entries if there is none of this name."""
     return {name: kinds[name]} if name in kinds else kinds
 
 
 def profile_table(prescribed: Quantity, purpose: str, kind: str = "", further: dict[str, Any] | None = None) -> Any:
-    """Return the model of a profile's section, for one kind or for all loaded kinds, with ``further`` fields.
+    """Return the model of a profile's section, for one profile or for all loaded profiles, with ``further`` fields.
 
     ``purpose`` is the last part of the model names.
     """
@@ -85,7 +85,7 @@ def profile_table(prescribed: Quantity, purpose: str, kind: str = "", further: d
 
 
 def motion_kinds() -> dict[str, MotionKind[Any]]:
-    """Return the kinds of motion of a vane alone: all kinds of this package, and loaded ones of other packages."""
+    """Return the motions of a vane alone: all of this package, and loaded ones of other packages."""
     others = {name: kind for name, kind in MOTIONS.loaded().items() if kind.section is not None}
     return {name: MOTIONS[name] for name in VANE_MOTIONS} | others
 
@@ -129,7 +129,7 @@ def controller_table(kinds: Mapping[str, ControllerKind], suffix: str) -> Any:
 
 
 def file_model(name: str, own: dict[str, Any], sections: Container[str] = declaration.SECTIONS) -> type[BaseModel]:
-    """Return the model of a scenario file: sections that every scenario has, and sections of its kind of motion.
+    """Return the model of a scenario file: sections that every scenario has, and sections of its motion.
 
     Optional sections are included if they are in ``sections``.
     """
@@ -172,7 +172,7 @@ def file_model(name: str, own: dict[str, Any], sections: Container[str] = declar
 
 
 def scenario_file(document: Mapping[str, Any] | None = None) -> type[BaseModel]:
-    """Return the model of a scenario file with the sections and kinds of a document; for None, with all loaded kinds.
+    """Return the model of a scenario file with the sections and components of a document; for None, with all loaded.
 
     A file that names no controller is compared with all controllers of this package.
     """

@@ -60,7 +60,7 @@ class RunMetrics(NamedTuple):
 
 
 class DeferredResult:
-    """Recording, metrics and end of a run, computed on first use, because many runs never need them."""
+    """Recording, metrics and end of a run, computed on first use."""
 
     __slots__ = ("_measured",)
 

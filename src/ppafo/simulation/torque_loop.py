@@ -22,7 +22,7 @@ from ppafo.simulation.nominal import AREA_PATHS, SONIC_PATHS, VALVE, flow_of_are
 
 
 class FlowNumbers(NamedTuple):
-    """Gas properties, and the two numbers of the valve's orifice in its form."""
+    """Gas properties, and the valve's area with discharge coefficient, or sonic conductance with critical ratio."""
 
     molar_mass: Annotated[float, Number("kg/mol", "")]
     heat_capacity_ratio: Annotated[float, Number("", "")]
@@ -38,7 +38,7 @@ class _SpoolParts(NamedTuple):
 
 
 class _LoopParts(NamedTuple):
-    """Functions for the torque loop; each takes the rows that it needs.
+    """Functions that compute the torque loop; each takes the parameter rows that it needs.
 
     ``chambers_at`` gives the chambers at an angle [rad]; ``places`` the lowest and highest joint angle [rad];
     ``valve_flow`` R T times the conductance of the valve [m^3/s]; ``time_of_valve`` the delay of the valve [s] for a
@@ -63,7 +63,7 @@ class _JointParts(NamedTuple):
 
 
 class JointGainParts(NamedTuple):
-    """Functions for a number from torque loop and joint: both of a device, with a rule of ``control.angle_loop``."""
+    """Functions behind a gain of an angle controller: torque loop, joint, and rule of ``control.angle_loop``."""
 
     torque_loop_of: Callable[..., TorqueLoop]
     joint_of: Callable[..., Joint]
@@ -210,7 +210,7 @@ _PER_PRESSURE: dict[str, tuple[Callable[[MeanChambers], float], Callable[[MeanCh
 
 
 class _LoopFunctions(NamedTuple):
-    """Loop of the controlled quantity, its reach, and the torque loop, as functions of rows.
+    """Functions that compute the loop of the controlled quantity, its reach, and the torque loop.
 
     ``rows`` are the row types and ``sources`` the paths that fill them. ``joint`` is the function for the joint, None
     unless the controller controls an angle.

@@ -26,7 +26,7 @@ from ppafo.simulation.scenario import Scenario, vane_motion
 
 
 def measured_vane(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
-    """Return recording and metrics of a vane; T_ex of equation (1) is constant, or moves the vane along its path."""
+    """Return recording and metrics of a vane; T_ex of equation (1) is constant, or moves the vane along its profile."""
     path, plant = vane_motion(scenario).profile, run.plant
 
     def external_torque(torque: Floats) -> Floats:

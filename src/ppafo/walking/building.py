@@ -222,7 +222,7 @@ def _control(
 
 
 def _fault(reading: DocumentReader, part: str) -> FaultSettings:
-    """Return the fault of a sensor or of a part of the plant; its kind is empty if the part is sound."""
+    """Return the fault of a sensor or plant component; ``kind`` is empty for a sound component."""
     kind = kind_at(reading.document, f"faults.{part}")
     return FaultSettings(kind, reading.section(f"faults.{part}", fault_numbers(part, kind)))
 

@@ -79,7 +79,7 @@ FAULTY = tuple(_FAULTY)
 
 @dataclass(frozen=True, slots=True)
 class _SensorFault:
-    """Kind of sensor fault: summary and parameters; faults of the plant use the same class."""
+    """Declaration of a fault of a sensor or plant component: summary and parameters."""
 
     summary: str
     quantities: tuple[Quantity, ...]
@@ -117,12 +117,12 @@ FAULTS |= PLANT_FAULTS
 
 
 def fault_numbers(part: str, kind: str) -> tuple[Quantity, ...]:
-    """Return the parameters of a fault of a sensor or of a part of the plant; empty without a fault kind."""
+    """Return the parameters of a fault of a sensor or plant component; empty without a fault."""
     return FAULTS[part][kind].quantities if kind else ()
 
 
 def sections(controller: str, timing: str, gas: str) -> dict[str, tuple[Quantity, ...]]:
-    """Return the declarations of the numbers of a walk with these kinds, by section; empty for an unknown kind."""
+    """Return the declarations of a walk's numbers by section, for named controller and phase estimator."""
     laws = walking_controllers()
     return {
         "wearer": (*WEARER, PERSON),
@@ -156,7 +156,7 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
 
 
 def _check_motion(kind: object, place: str) -> None:
-    """Raise ScenarioError for an unknown motion, or a motion without a leg; the message starts with ``place``."""
+    """Raise ScenarioError for an unknown motion, or a motion that is no walk; the message starts with ``place``."""
     if kind in VANE_MOTIONS:
         raise ScenarioError(
             f"{place}: a walk file needs the motion '{WALK}'; 'ppafo simulate' runs a scenario without one, and "
@@ -182,7 +182,7 @@ def _texts(_document: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
-    """Return the declaration of every number that a document with its kinds may contain, by path."""
+    """Return the declaration of every number that a document with its controller and estimator may contain, by path."""
     find_kinds(document, "the file of a walk")
     controller, gas = kind_at(document, "controller"), kind_at(document, "gas_model")
     declared = by_path(sections(controller, timing_of(document), gas) | {BOTTLE: BOTTLE_NUMBERS})
@@ -209,7 +209,7 @@ def walk_file(document: Mapping[str, Any]) -> type[BaseModel]:
 
 @functools.lru_cache(maxsize=8)
 def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
-    """Return the Pydantic model of a walk file; ``motions`` are the available kinds of motion."""
+    """Return the Pydantic model of a walk file; ``motions`` are the names of the available motions."""
     sensors = quantity_fields(WALK_SENSORS)
     sensors["seed"] = (Annotated[int, Field(ge=0, le=LARGEST_SEED)], Field(1, description=SEED.summary))
     run = {"duration": optional(number_type(DURATION), DURATION.summary)} | quantity_fields((STEP,))
@@ -256,7 +256,7 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
 
 
 def _optional_numbers(quantities: Iterable[Quantity]) -> dict[str, Any]:
-    """Return optional number fields for these quantities."""
+    """Return optional Pydantic number fields for declared quantities."""
     return {quantity.name: optional(number_type(quantity), quantity.summary) for quantity in quantities}
 
 

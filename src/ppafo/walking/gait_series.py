@@ -49,11 +49,11 @@ DEFAULT_SPEED = 1.3
 _GRID = np.linspace(0.0, 1.0, 1001)
 
 ROLL_ANGLES = tuple(math.radians(degrees) for degrees in range(2, 16))
-"""Tilts [rad] tried as the tilt at which the lever of the ground force has risen by half."""
+"""Candidate foot tilts [rad] in the heel-rocker fit at which the lever has reached half of its increase."""
 
 
 LONGER_THAN_A_FOOT = 1.0e3
-"""Lever [m] used without a measurement; the actual bound is the heel lever."""
+"""Placeholder for an unmeasured lever of the ground force [m]; the heel lever of the wearer then limits it."""
 
 
 SERIES = {

@@ -1,4 +1,4 @@
-"""Motion kind of a walk along a prescribed gait: shank and loaded foot follow the gait, whatever the device does."""
+"""Motion type of a walk along a prescribed gait: shank and loaded foot follow the gait, whatever the device does."""
 
 import shlex
 from dataclasses import dataclass
@@ -53,4 +53,4 @@ class WalkKind:
 
 
 WALK_KIND = WalkKind(WALK)
-"""Motion kind of a scenario that walks along a prescribed gait."""
+"""Motion type of walk scenarios."""

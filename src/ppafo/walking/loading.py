@@ -130,6 +130,6 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
 
 
 def _without_bottle(scenario: Scenario) -> tuple[Any, ...]:
-    """Return all parts of a walk that do not depend on its bottle; the duration is left out too."""
+    """Return all attributes of a walk scenario that do not depend on its bottle, without the duration."""
     hardware = scenario.device, scenario.supply_lines, scenario.gas_model, scenario.sensors, scenario.controller
     return *hardware, scenario.run.step, replace(walk_of(scenario), bottle=None)

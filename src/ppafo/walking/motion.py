@@ -39,7 +39,7 @@ class WalkMotion:
 
     ``person`` and the numbers of ``wearer``, ``forces`` and ``faults`` may be arrays (runs,).
 
-    - ``motion_kind``: functions of this kind of motion
+    - ``motion_kind``: functions of this type of motion
     - ``gait``: prescribed gait
     - ``wearer``: leg of the wearer
     - ``timing``: name of the gait phase estimator

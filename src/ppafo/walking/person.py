@@ -26,7 +26,7 @@ from ppafo.walking.wearer import Wearer, scaled
 
 
 class Person(NamedTuple):
-    """Person of the population, or many of them: then every number is an array (people,).
+    """Person of the population, or many people, with arrays (people,) as numbers.
 
     - ``mass``, ``stature``: relative to the wearer [-]
     - ``stride_time``: time from one heel strike to the next [s]
@@ -88,7 +88,7 @@ def person_of(gait: Gait, person: Person | Floats | float) -> Person:
 
 
 def crowd_of(scenario: Scenario, people: Person) -> Scenario:
-    """Return a walk of many wearers whose numbers are arrays (people,); each wearer has independent sensor noise."""
+    """Return one scenario for many wearers, with arrays (people,) as numbers; sensor noise is independent."""
     # A seed of everybody: one noise for all would make their outcomes alike.
     seed: Any = (scenario.sensors.seed + np.arange(np.size(people.mass), dtype=np.float64)) % LARGEST_SEED
     sensors = replace(scenario.sensors, seed=seed)

@@ -61,7 +61,7 @@ REMEDY = "the step may be too long, or a value unrealistic: try a smaller run.st
 
 
 def led_leg(run: Run) -> Walk:
-    """Return the leg of a planned walk."""
+    """Return leg and gait parameters of a planned walk; the run must be a walk."""
     assert run.walk is not None, "a walk has a leg"
     return run.walk
 
@@ -131,7 +131,7 @@ def recording_of_walk(
 def _task_sequence_channels(
     configuration: Scenario, run: Run, path: AnklePath, time: Floats, record: Mapping[str, Any]
 ) -> dict[str, tuple[Any, str]]:
-    """Return the additional channels of a task sequence, and toe heights above ground that may rise, as stairs do.
+    """Return the additional channels of a task sequence, and toe heights above ground that may be stairs or a slope.
 
     The healthy toe height is the gait's, scaled with the stride relative to the recorded one.
     """
@@ -225,7 +225,7 @@ class WalkResult:
 
     @property
     def help_text(self) -> str:
-        """Number of strides with help, and a remark if these are fewer than half."""
+        """Number of assisted strides as text, with a remark if fewer than half were assisted."""
         enough = "" if self.is_helped else ": fewer than half"
         return f"help in {int(self.helped.sum())} of {self.helped.size} strides{enough}"
 

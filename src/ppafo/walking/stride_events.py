@@ -28,7 +28,7 @@ EVENT_ROW, FRACTION_ROW = "clock.event", "clock.fraction"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _EventErrors:
-    """Timing errors of one kind of event [s], positive for a late detection; one for each matched event.
+    """Timing errors of a stride event [s], one for each matched detection; positive for a late detection.
 
     ``missed`` is the number of true events without a detection, ``false`` the number of detections without a true
     event.
@@ -45,7 +45,7 @@ class _EventErrors:
 
 
 def clock_row(record: Mapping[str, Floats], ending: str) -> Floats | None:
-    """Return the row of a phase-predicting controller by the end of its path, or None for another controller."""
+    """Return the phase-clock row whose path ends with ``ending``; None for a controller without a phase clock."""
     return next((row for name, row in record.items() if name.startswith(_STATE) and name.endswith(ending)), None)
 
 
@@ -80,7 +80,7 @@ def _rises(is_so: NDArray[np.bool_]) -> Samples:
 
 
 def event_errors(true: Samples, known: Samples, interval: float, stride_time: float) -> _EventErrors:
-    """Return the timing errors of one kind of event; ``interval`` [s] is the sample interval, stride time in [s].
+    """Return the timing errors of a stride event; sample interval and stride time in [s].
 
     Each true event is matched with the nearest known event within a quarter of a stride.
     """
@@ -95,5 +95,5 @@ def event_errors(true: Samples, known: Samples, interval: float, stride_time: fl
 
 
 def within(events: Mapping[str, Samples], part: slice) -> dict[str, Samples]:
-    """Return the events within a range of samples, by name."""
+    """Return the events within a slice of the samples, by name."""
     return {name: times[(times >= part.start) & (times < part.stop)] for name, times in events.items()}

@@ -134,7 +134,7 @@ def walk_metrics(
 
 
 def settled(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the chosen strides without the first strides of the walk."""
+    """Return the chosen strides (strides,), without the first strides of the walk, in which the controller adapts."""
     return chosen & (np.arange(chosen.size) >= SETTLING)
 
 

@@ -48,7 +48,7 @@ KINDS: dict[str, tuple[str, tuple[Quantity, ...]]] = {
     "scuff": ("one stride in which the toes touch the ground in mid-swing", (CONTACT,)),
     "stumble": ("one stride of another time, shorter or longer in its middle", (TIME, LENGTH)),
 }
-"""Kinds of segment: description and values."""
+"""Segment types by name: description and values."""
 
 _STANDING = ("stand", "rest", "stop")
 _NEED_WALKING = ("stop", "scuff", "stumble")
@@ -134,7 +134,7 @@ def _contradictions(segments: Iterable[TaskSegment]) -> Iterator[tuple[int, str]
 
 @functools.cache
 def _segment_table(kind: str) -> type[BaseModel]:
-    """Return the model of a segment of a kind."""
+    """Return the Pydantic model of a segment of type ``kind``."""
     summary, quantities = KINDS[kind]
     required = tuple(quantity for quantity in quantities if quantity not in _OPTIONAL)
     not_required = {
@@ -147,7 +147,7 @@ def _segment_table(kind: str) -> type[BaseModel]:
 
 @functools.cache
 def _task_sequence_table(segment: Any, name: str) -> type[BaseModel]:
-    """Return the model of a file with segments of a type."""
+    """Return the Pydantic model of a task-sequence file with segments of the model ``segment``."""
     fields: dict[str, Any] = {
         "schema_version": (SchemaVersion, ...),
         "name": (str, Field(pattern=NAME, max_length=100)),

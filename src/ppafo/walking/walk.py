@@ -34,7 +34,7 @@ from ppafo.walking.result import WalkResult, result_of_walk
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
 
 Progress = Callable[[float, float], None]
-"""Callback with the work done and all of the work."""
+"""Progress callback, called with completed and total work."""
 
 _MINUTE = 60.0
 """A minute [s]."""

@@ -157,7 +157,7 @@ def feedforward_update(
 
 
 def feedforward_restart(state: _PidFeedforwardState, requested: float, continues: float) -> _PidFeedforwardState:
-    """State, reset where a new task starts (``continues`` 0): PID at its start, reference rate 0; else unchanged."""
+    """Return the state, reset where a new task starts (``continues`` 0): initial PID state and reference rate 0."""
     return state._replace(feedback=pid_restart(state.feedback, requested, continues))
 
 
@@ -223,7 +223,7 @@ def linearising_update(
 def linearising_restart(
     state: FeedbackLinearisationState, requested: float, continues: float
 ) -> FeedbackLinearisationState:
-    """State; where a new task starts (``continues`` 0), the requested torque [N m] becomes the previous reference."""
+    """Return the state; at a new task (``continues`` 0) the requested torque [N m] becomes the previous reference."""
     return state._replace(reference=state.reference if continues > 0.5 else requested)
 
 

@@ -45,7 +45,7 @@ class _OrderedParameters(NamedTuple):
 
 
 class Help(NamedTuple):
-    """Assistance level, in the same field as in the safety state of a walking controller."""
+    """Assistance level [-]: same field as in the safety state of a walking controller."""
 
     level: float
 

@@ -122,13 +122,13 @@ class TorqueRequest(NamedTuple):
 
 
 class _Assessment(NamedTuple):
-    """_Assessment of one sample by a walking controller, before the law computes the command."""
+    """Evaluation of a sample by a walking controller, before the law computes the command."""
 
     phase: PhaseState
     clock: Any
-    """State of the timing, by its kind."""
+    """State of the gait phase estimator; its class depends on the estimator."""
     time: GaitTime
-    """The gait phase as a time."""
+    """Gait phase as time since the heel strike."""
     safety: SafetyState
     request: TorqueRequest
     continues: float
@@ -182,7 +182,7 @@ def timed_phase(
     *,
     parts: TimingParts,
 ) -> tuple[PhaseState, Any, GaitTime]:
-    """Phase, clock and gait time after a sample taken every ``period`` [s], by the functions of a timing."""
+    """Return phase, clock and gait time after a sample of ``period`` [s], from the gait phase estimator."""
     passed = parts.gait_time(parameters.timing, clock, phase).since_strike + period
     heel, toe = measurement.heel_force, measurement.toe_force
     after = phases.timed_phase_state(parameters.phases, phase, heel, toe, passed, period)

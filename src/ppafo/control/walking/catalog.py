@@ -139,7 +139,7 @@ def load_walking_controller(name: str) -> None:
 
 
 def reads_gait(kind: ControllerKind) -> bool:
-    """Return whether the law of a controller takes a ``GaitMeasurement`` and has its own gait phases."""
+    """Tell whether a controller detects gait phases, so that its law takes a ``GaitMeasurement``."""
     return kind.update.__annotations__.get("measurement") in (GaitMeasurement, GaitMeasurement.__name__)
 
 

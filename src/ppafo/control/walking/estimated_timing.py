@@ -119,7 +119,7 @@ def misfit(stride: LearntStride, window: Window, rules: EstimatedRules, shift: i
 
 
 def finer_shift(stride: LearntStride, window: Window, rules: EstimatedRules, shift: int) -> float:
-    """Fractional part of the shift [knots] in addition to ``shift``, by one Gauss-Newton step of at most one knot."""
+    """Correction of a whole-knot shift [knots], by one Gauss-Newton step of at most one knot."""
     # The cost of a shift is one more residual; 1e-12 avoids a division by 0 for a flat stride without trust.
     gradient, curvature = -rules.clock_trust * shift, 1.0e-12 + rules.clock_trust
     for back in range(WINDOW):

@@ -67,7 +67,7 @@ class _EventOnOffState(NamedTuple):
 
 
 USUAL_CLOCK = ClockParts(AT_THRESHOLDS, _EventOnOffState)
-"""Parts of the law unless another timing is chosen."""
+"""State class and timing functions of the law with the default gait phase estimator."""
 
 
 def update(

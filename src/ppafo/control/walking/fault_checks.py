@@ -126,7 +126,7 @@ class LastReadings(NamedTuple):
 
 
 class LandingCheck(NamedTuple):
-    """Check of the landing against delayed forces.
+    """State of the landing check, which detects delayed force readings.
 
     ``lowest`` is the lowest ankle angle of this swing, or since the strike [rad]; ``highest`` is the highest angle
     after that, which decays with time [rad]. ``in_doubt`` is the angle at a doubtful strike [rad], 0 for a timely one;
@@ -160,7 +160,7 @@ IN_TIME = 0.06
 check is undecided. A dropped foot without push-off also turns down in the air, but more slowly."""
 
 GONE = 0.1
-"""Residual force after a loss of the signal, as a fraction of ``largest_drop``."""
+"""Largest force that counts as a lost signal, as a fraction of ``largest_drop`` [-]."""
 
 QUICK_PERIOD = 0.005
 """Sample period [s] above which a force may vanish within one sample: toes leave the ground in about 0.1 s."""

@@ -44,7 +44,7 @@ class LawState(NamedTuple):
 
 
 class _WalkingParts(NamedTuple):
-    """Parts of a walking torque law: functions of the timing, class of the state, and functions of the law.
+    """Functions that make up a walking torque law: gait phase estimation and law, with the class of the state.
 
     ``update`` returns command [-] and next state. ``restart(state, requested, continues)`` returns the state at a
     requested torque [N m]; ``continues`` is 0 where another task starts.
@@ -57,7 +57,7 @@ class _WalkingParts(NamedTuple):
 
 
 class _InitialStateParts(NamedTuple):
-    """Initial state of a law."""
+    """Initial state of a law, to which ``restart_anew`` resets it."""
 
     start: Any
 

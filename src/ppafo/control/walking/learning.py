@@ -150,7 +150,7 @@ class _EventDampedLearningState(NamedTuple):
 
 
 USUAL_CLOCK = ClockParts(AT_THRESHOLDS, _EventDampedLearningState)
-"""Parts of the law unless another timing is chosen."""
+"""State class and timing functions of the law with the default gait phase estimator."""
 
 
 def update(

@@ -102,14 +102,14 @@ def volumes(nominal: NominalDevice, angle: float) -> tuple[float, float]:
 def believed_volumes(nominal: NominalDevice, angle: float, pressure_1: float, pressure_2: float) -> tuple[float, float]:
     """Nominal volumes of both chambers [m^3] at a measured angle [rad]; for a vane independent of the pressures [Pa].
 
-    A program with an actuator of another kind calls the chamber function of that kind instead.
+    A program with another actuator calls the chamber function of that actuator instead.
     """
     return volumes(nominal, angle)
 
 
 def mean_volumes(nominal: NominalDevice, pressure_1: float, pressure_2: float) -> tuple[float, float]:
-    """Derivative of gas content with respect to pressure [m^3] in mid-range, for both chambers at two readings [Pa].
+    """Return dC/dp [m^3] of both chambers at mid-range for pressure readings [Pa], with gas content C = p V [J].
 
-    For a vane the derivative is the volume. For another kind, as in ``believed_volumes``, it includes the compliance.
+    For a vane the derivative is the volume. For another actuator (see ``believed_volumes``) it includes the compliance.
     """
     return volumes(nominal, 0.5 * (nominal.nominal_angle_min + nominal.nominal_angle_max))

@@ -90,7 +90,7 @@ class Observer(NamedTuple):
 
 
 class Supplying(NamedTuple):
-    """Connection of a chamber in a sample.
+    """Connection of a chamber to supply and atmosphere during a sample.
 
     ``source`` and ``vent`` [-] are the mean openings to the supply and to the atmosphere. ``was_fed`` is 1 if the
     supply was connected before the sample. ``pressure`` is of the supply and ``set_pressure`` of its regulator [Pa].
@@ -341,7 +341,7 @@ def next_observer(
 
 
 def is_behind_lines(nominal: NominalDevice) -> bool:
-    """Return whether both lines have a volume and their regulators a droop; other lines cannot be predicted."""
+    """Tell whether the observer models supply lines: both have a volume, and their regulators a droop."""
     lines = nominal.nominal_lines
     return min(lines.volume_1, lines.volume_2, lines.droop_1, lines.droop_2) > 0.0
 

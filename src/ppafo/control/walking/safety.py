@@ -350,7 +350,7 @@ def feed_time(since: float, opening: float, period: float) -> float:
 
 
 def permits(state: SafetyState, phase: float) -> bool:
-    """Return whether the device may act in a phase.
+    """Tell whether the device may act in a gait phase.
 
     A push requires that the heel was loaded in this stance and the load has moved to the toes. Lifting requires that
     the ankle has turned and the foot left the ground with the toes last; the foot of a sitting wearer is unloaded in

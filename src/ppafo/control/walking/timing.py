@@ -1,4 +1,4 @@
-"""Timing of the stride: interface of a method that estimates the gait phase, and the usual one by thresholds."""
+"""Gait phase estimation: interface of an estimator, and the default estimator with force thresholds."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -56,14 +56,14 @@ def threshold_time(rules: EmptyRow, clock: EmptyRow, phase: PhaseState) -> GaitT
 
 
 class TimingParts(NamedTuple):
-    """Functions of a timing, as in ``TimingKind``."""
+    """Functions of a gait phase estimator, as in ``TimingKind``."""
 
     follow: Callable[[Any, PhaseRules, Any, PhaseState, PhaseState, GaitMeasurement, float], Any]
     gait_time: Callable[[Any, Any, PhaseState], GaitTime]
 
 
 class ClockParts(NamedTuple):
-    """Parts of a walking law that depend on its timing: functions, and class of the law's state with its clock."""
+    """Functions and state class of a walking law that depend on its gait phase estimator."""
 
     timing: TimingParts
     state: Callable[..., Any]

@@ -1,4 +1,4 @@
-"""Methods of estimating the gait phase by name, and walking controllers with another method than their own."""
+"""Gait phase estimators by name, and walking controllers with an exchanged estimator."""
 
 import functools
 from dataclasses import replace

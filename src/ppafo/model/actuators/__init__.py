@@ -1,1 +1,1 @@
-"""Kinds of actuators: chamber volumes and torque as functions of angle and pressure."""
+"""Actuator types: chamber volumes and torque as functions of angle and pressure."""

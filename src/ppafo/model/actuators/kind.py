@@ -1,4 +1,4 @@
-"""Declaration of a kind of actuator: volumes, pressures and torque as functions of the angle, as the plant uses them.
+"""Declaration of an actuator type: chamber volumes, pressures and torque as functions of the angle.
 
 Each chamber has a co-energy Phi(angle, gauge pressure) with the volume V = dPhi/dp and the torque tau = dPhi/dangle, so
 that d tau/dp = dV/dangle: the work p dV of the gas is the work on the shaft. A kind is this relation as functions of
@@ -34,7 +34,7 @@ class Chambers(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ActuatorModel:
-    """Compiled side of a kind; its functions take a plant, an angle [rad], and absolute pressures [Pa] or masses [kg].
+    """Functions of an actuator type, of a plant, an angle [rad], and absolute pressures [Pa] or gas masses [kg].
 
     ``shape`` is the NamedTuple of floats stored as ``plant.shape``, None for the vane, which needs none;
     ``prepare(settings, range)`` makes it from the declared settings. ``table`` is the NamedTuple of a data file named
@@ -93,14 +93,14 @@ class ActuatorKind:
 
 
 class ShapedPlant(Protocol):
-    """Plant with an actuator other than a vane: ``PlantParameters`` with the geometry of the kind.
+    """Plant with an actuator other than a vane: ``PlantParameters`` with the geometry of the actuator.
 
     ``displacement_per_radian`` of chamber 1 is the mean over the range, and ``torque_constant`` is the same number:
     errors are scaled by both, and control laws designed for a vane use them.
     """
 
     shape: Any
-    """Numbers of the kind."""
+    """Geometry of the actuator."""
     gas_product: float
     """R T / M [J/kg]."""
     supply_pressure: float
@@ -116,7 +116,7 @@ class ShapedPlant(Protocol):
 
 
 class _UnpressurisedPlant(NamedTuple):
-    """Plant parameters that the ``chambers`` function of a kind reads; pressures are relative to the atmosphere."""
+    """Plant parameters that the ``chambers`` function of an actuator reads; pressures relative to the atmosphere."""
 
     shape: Any
     atmospheric_pressure: float

@@ -18,7 +18,7 @@ def chambers(plant: PlantParameters, angle: float, pressure_1: float, pressure_2
 
 
 def prepare(_settings: Any, _stops: Range) -> None:
-    """None, because the numbers of a vane are fields of the plant."""
+    """Return None: the geometry of a vane is contained in the plant parameters."""
 
 
 MODEL = ActuatorModel(None, prepare, chambers, chamber_pressures, joint_torque, gives=False, has_torque_constant=True)

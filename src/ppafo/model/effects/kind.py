@@ -1,4 +1,4 @@
-"""Physical effect as one value, from which every part of the package derives its share.
+"""Declaration of a physical effect: settings, parameters, laws, state and texts in a single value.
 
 Files, overrides, columns of studies, fits, exported libraries, the page, linear models, the reference solver and walks
 use an effect by this value alone; none of them names an effect.

@@ -19,7 +19,7 @@ class LaminarLeak(NamedTuple):
 def leak_with_gap(
     conductance: float, pressure_1: float, pressure_2: float, curve: FlowCurve, laminar_leak: LaminarLeak
 ) -> float:
-    """Conductance [kg/(s Pa)] of an orifice that passes the flow of leak and gap together, ``c (P_1^2 - P_2^2)`` more.
+    """Equivalent conductance [kg/(s Pa)] of the leak orifice with a parallel gap, whose flow is ``c (P_1^2 - P_2^2)``.
 
     The flow of an orifice is ``C P_up psi(r)``, so that the gap adds ``c (P_up + P_dn) (1 - r) / psi(r)`` to ``C``.
     Near equal pressures both 1 - r and psi are linear and go to zero; their quotient is the one at the end of the

@@ -1,4 +1,4 @@
-"""Declaration of a valve: meaning of its command, and its two forms for an engine.
+"""Declaration of a valve: settings, and its functions for the time stepping and for the reference solver.
 
 A command is from -1 to 1, as in equation (8); one further value, ``VENT``, stands for free motion.
 """
@@ -27,7 +27,7 @@ class JoiningPath:
 
 @dataclass(frozen=True, slots=True)
 class ValveModel:
-    """Compiled side of a valve.
+    """Functions of a valve for the time stepping and for the reference solver.
 
     ``parameters`` and ``state`` are NamedTuple classes of floats. ``prepare(settings)`` makes the parameters from the
     declared settings; ``initial()`` makes the state, and is the class itself if its fields have defaults.

@@ -28,7 +28,7 @@ NO_SLEW_LIMIT = 1.0e12
 SAME_INSTANT = 1.0e-11
 TINY = 1.0e-300
 ARRIVAL = 30.0
-"""Time, in slower time constants of a spool, after which the spool has settled to rounding."""
+"""Settling time to rounding accuracy of a spool, in units of its slower time constant [-]."""
 
 
 class IdealProportional(NamedTuple):

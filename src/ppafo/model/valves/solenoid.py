@@ -40,7 +40,7 @@ class TimedSolenoid(NamedTuple):
 
 
 class Coil(NamedTuple):
-    """Coil of an on/off valve: present flow (0 or 1), commanded flow, time of the command and of the response [s].
+    """Coil of an on/off valve: present and commanded position (0 or 1), times of command and response [s].
 
     The initial coil was switched off long ago: it accepts the first command at once, whatever the interval.
     """

@@ -28,7 +28,7 @@ class ValueChange:
 
 
 def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[ValueChange]:
-    """Return the differences of a set from its parent: kinds and choices first, then values in the set's order.
+    """Return the differences of a set from its parent: names such as the valve first, then values in the set's order.
 
     Numbers are compared in SI: the same value in another unit is no change. Sources and notes are not compared.
     """

@@ -1,4 +1,4 @@
-"""Finding of an audit with the compared numbers, and the read access of the checks to a parameter set."""
+"""Audit finding with its compared numbers, and parameter set as the checks read it."""
 
 import contextlib
 import math

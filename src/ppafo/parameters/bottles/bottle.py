@@ -1,4 +1,4 @@
-"""Gas bottles by name: of a bottle file, or of the catalogue of parts.
+"""Gas bottles by name, from bottle files or the catalogue of parts.
 
 The catalogue of parts states only the gas of a bottle and its mass. All other values are scaled from the paper's bottle
 at the same filling density: volume in proportion to the gas, heat capacity of the wall to the mass, surfaces to the 2/3
@@ -117,7 +117,7 @@ class Bottle:
 
 
 def is_of_catalogue(name_or_path: str | Path) -> bool:
-    """Return True if a name is a part of a catalogue file, ``CATALOGUE.toml/PART``."""
+    """Tell whether a name has the form ``CATALOGUE.toml/PART`` of a part in a catalogue file."""
     return Path(name_or_path).parent.suffix == ".toml"
 
 
@@ -168,7 +168,8 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     changes = override_set(read_overrides(overrides), forms=FILLS)
     for path, override in changes.items():
         if path not in PATHS:
-            raise ParameterError(f"override '{override}': a bottle has no value '{path}'{nearest_name(path, PATHS)}")
+            of_file = "; its name or file determines the gas" if "gas" in path.split(".") else nearest_name(path, PATHS)
+            raise ParameterError(f"override '{override}': a bottle has no value '{path}'{of_file}")
         with refused_as(ParameterError, f"override '{override}'", UnitError):
             value, unit = split_quantity(override.text)
         # A new form of the filling replaces the old one: two forms would contradict each other.

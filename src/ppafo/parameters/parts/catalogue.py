@@ -46,7 +46,7 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
     "processors": (MASS, POWER),
     "batteries": (MASS, ENERGY),
 }
-"""Figures by group; a valve has in addition the figures of its kind."""
+"""Data-sheet figures by group of parts; a valve has in addition the figures of its valve type."""
 
 NEEDED: dict[str, tuple[str, ...]] = {
     "valves": ("mass",),

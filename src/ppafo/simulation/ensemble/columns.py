@@ -50,7 +50,7 @@ class ScenarioColumns:
 
 
 def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[str] = ()) -> ScenarioColumns:
-    """Return the validated columns, with the selected valve as ``valve``.
+    """Return the validated columns; paths of the selected valve start with ``valve``.
 
     Raises ScenarioError for errors that concern all runs. Paths in ``gauge`` hold gauge pressures relative to the
     atmosphere of each run.
@@ -105,7 +105,7 @@ def absolute(base: Scenario, columns: Mapping[str, Floats], gauge: Collection[st
 
 
 def _why_not(base: Scenario, typed: str, path: str, declared: Mapping[str, Quantity]) -> str:
-    """Return the reason why a path of an ensemble names no number that can vary."""
+    """Return the reason why the number at a path cannot vary in an ensemble."""
     if path in _TEXTS:
         return f"'{typed}' is a text and cannot vary; run an ensemble for each value"
     if base.controller.is_outside and path.startswith("controller."):

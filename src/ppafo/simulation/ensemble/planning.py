@@ -29,7 +29,7 @@ _SHAPE = ("angle_min", "angle_max", "dead_volume_1", "dead_volume_2")
 
 @dataclass(slots=True)
 class _ValidRuns:
-    """Runs not refused so far: ``members``, their indices in the ensemble, with their columns and clocks.
+    """Runs that passed the checks so far: indices in the ensemble (``members``), columns, clocks.
 
     ``reasons`` maps the index of each refused run to a line that says why. ``clock`` is None for the scenario's own
     clock; it is set before the first use of ``scenario``.
@@ -143,7 +143,7 @@ def plan_ensemble(columns: ScenarioColumns, change: Callable[[Run], Run] | None 
 
 
 def _groups_of_one_program(scenario: Scenario, runs: int) -> list[Members]:
-    """Indices of the runs, grouped by program: the same effects, and zeros in the same settings."""
+    """Run indices, grouped by compiled program: equal effects, and zeros in the same settings."""
     of_motion = scenario.motion.motion_kind.switches(scenario)
     settings: tuple[Any, ...] = (*scenario.device.valve.settings.values(), *of_motion)
     varied_settings = [setting > 0.0 for setting in settings if isinstance(setting, np.ndarray)]
@@ -195,7 +195,7 @@ def _inconsistent_line(scenario: Scenario, path: str, relation: str, other: str,
 
 
 def _misshapen(scenario: Scenario) -> tuple[Problem, ...]:
-    """Problems of an actuator whose numbers are each in range but inconsistent."""
+    """Problems of an actuator whose numbers are inconsistent although each is in range."""
     actuator = scenario.device.actuator
     if ACTUATORS[actuator.kind].problem is None and actuator.table is None:
         return ()

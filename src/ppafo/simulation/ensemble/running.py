@@ -117,7 +117,7 @@ class _MeteredBatch:
     band_stride: int
 
     def readings(self, states: Floats, runs: slice, record: Floats | None) -> Readings:
-        """Readings of some runs from their final states and, if recorded, their traces."""
+        """Meter readings of runs, from their final states and recorded traces."""
         program = self.batch.program
         groups = program.state_rows()
         traces = {} if record is None else {name: record[:, row] for row, name in enumerate(program.traced)}
@@ -131,14 +131,14 @@ class _MeteredBatch:
 
 
 def lacking(scenario: Scenario, kind: MetricKind) -> str:
-    """Reason why no run of a scenario can have a metric; "" if runs have it."""
+    """Reason why a metric does not apply to a scenario; "" if it applies."""
     if scenario.device.actuator.has_one_chamber and not OF_SECOND_CHAMBER.isdisjoint(kind.channels):
         return f"'{scenario.device.name}' has one chamber"
     return scenario.motion.motion_kind.lacks(scenario, kind)
 
 
 def offered(scenario: Scenario) -> dict[str, MetricKind]:
-    """Metrics that runs of a scenario have, for messages: a vane alone has no metrics of walks, and vice versa."""
+    """Metrics that apply to a scenario, for messages: walk metrics for a walk only, vane metrics for a vane alone."""
     missing: frozenset[str] = frozenset() if scenario.gas_model is not None else WITH_ENERGY_BALANCE
     return {
         name: kind

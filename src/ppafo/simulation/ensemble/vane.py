@@ -1,4 +1,4 @@
-"""Ensembles of a vane alone: clocks of runs, contradictory numbers, and metrics that do not apply."""
+"""Checks for ensembles of a vane alone: clocks, contradictory numbers, metrics that do not apply."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -21,7 +21,7 @@ from ppafo.units.shown import shown_text
 
 
 def contradictory_numbers(scenario: Scenario) -> tuple[Problem, ...]:
-    """Problems of a vane: vane or reference beyond a limit, delay too long."""
+    """Problems of a scenario of a vane alone: initial angle or profile beyond a limit, delay too long."""
     delay, step, device = scenario.sensors.delay, scenario.run.step, scenario.device
     motion, followed = vane_motion(scenario), CONTROLLED[scenario.controlled]
     profile = ProfileChoice("constant", {"level": motion.angle}) if motion.profile is None else motion.profile
@@ -60,7 +60,7 @@ def _is_beyond(limits: Limits, profile: ProfileChoice) -> NDArray[np.bool_]:
 
 
 def _beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, section: str) -> Problem:
-    """Problem of a section's profile that leaves its limits."""
+    """Problem of a profile that exceeds its limits; ``section`` is the profile's section of the file."""
     outside = _is_beyond(limits, profile)
     # The bounds hold for all time; a run that may leave them is checked at its own times.
     problems: dict[int, str] = {}
@@ -76,7 +76,7 @@ def _beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, section:
 
 
 def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[RunTimes, tuple[Problem, ...]]:
-    """Return the clock for columns of times [s] by path, and the problems of contradictory times.
+    """Return the run times for columns of times [s] by path, and the problems of contradictory times.
 
     Times are read as in a file, once for each combination, of which an ensemble has few.
     """
@@ -96,7 +96,7 @@ def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[RunTimes, tuple[Pro
 
 
 def lacks(scenario: Scenario, kind: MetricKind) -> str:
-    """Return the reason why no run of a vane can have a metric; "" if runs have it."""
+    """Return the reason why a metric does not apply to a vane alone; "" if it applies."""
     if WALK in kind.needs:
         return "it needs a walk"
     leg = vane_motion(scenario).leg

@@ -1,4 +1,4 @@
-"""Scenario of a replay: a device on the clock of a recording, without a controller, and motions of its vane."""
+"""Replay scenario: device at the sample times of a recording, without a controller, and motions of its vane."""
 
 from dataclasses import replace
 
@@ -56,7 +56,7 @@ def locked_vane(angle: float) -> PrescribedMotion:
 
 
 def with_fixed_volume(device: Device, volume: float) -> tuple[Device, dict[str, float]]:
-    """Return the device with a fixed volume [m^3] in place of chamber 1, and the initial values of its replay [SI].
+    """Return the device with a fixed volume [m^3] instead of chamber 1, and initial values for a replay [SI].
 
     There is no leak, for any actuator. The initial values, by channel, are the vane at the lower stop and chamber 2 at
     atmospheric pressure; the pressure in the volume is given by the caller.

@@ -18,7 +18,7 @@ REST_WINDOW = 0.05
 _FEWEST_ON_LINE = 8
 """Fewest samples for a significant slope; with fewer samples the first or the last one is used."""
 _SEEN_SLOPE = 4.0
-"""Standard errors from which a slope is significant: white noise at rest exceeds them once in 16,000 times."""
+"""Smallest ratio of a significant slope to its standard error: white noise exceeds it once in 16,000 times."""
 _ROUNDING = 1.0e-9
 """Slope, as a fraction of the largest value, below which it is rounding of the least squares."""
 _DEVIATION_OF_MEDIAN = 1.4826
@@ -85,7 +85,7 @@ def value_at_rest(time: Floats, values: Floats, at_end: bool = False) -> float:
 
 
 def _is_seen(columns: Floats, values: Floats) -> bool:
-    """Return whether the coefficient of the first column is significant relative to the sample noise.
+    """Tell whether the least-squares coefficient of the first column is significant relative to the sample noise.
 
     The noise is estimated by the median of second differences, which neither a slope nor a step changes.
     """

@@ -246,7 +246,7 @@ def _poor_sensors(case: Case) -> TrackingCause | None:
 
 
 def _law_without_torque_loop(case: Case) -> TrackingCause | None:
-    """Cause: a law for an angle opens the valve by the angle alone, and is slow wherever the gas swings the joint."""
+    """Cause: an angle controller without inner torque loop, slow because the gas spring swings the joint."""
     law = case.law
     if case.scenario.controlled != ANGLE or law is None or law.only_switches:
         return None

@@ -1,4 +1,4 @@
-"""Tracking rule for runs with metrics only: the rule for recordings, as far as meters provide its numbers."""
+"""Tracking rule for runs without a recording, from metrics only."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -154,6 +154,6 @@ def _settled_task(scenario: Scenario, numbers: Mapping[str, Floats], least: floa
 
 
 def _settled(**numbers: Any) -> SettledPart:
-    """Settled part whose numbers are arrays (runs,)."""
+    """Numbers of the settled part, as arrays (runs,)."""
     none: dict[str, Any] = dict.fromkeys(("duration", "missing", "swing", "turns", "moved", "peak"), 0.0)
     return SettledPart(**{"samples": slice(None), "rests": False, **none, **numbers})

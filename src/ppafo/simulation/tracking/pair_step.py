@@ -1,4 +1,4 @@
-"""Step of a pair of on/off valves: the change during its dead time, known before a run."""
+"""Smallest change of the controlled quantity by a pair of on/off valves: the change during their dead time."""
 
 import logging
 from collections.abc import Iterable
@@ -45,9 +45,9 @@ def pair_step(scenario: Scenario, law: ControllerKind) -> tuple[float, float]:
 
 
 def unlimited_switching(result: "RecordedResult") -> str:
-    """Remark on valves that switch quickly in a task, with no number in their set that limits the rate; "" for others.
+    """Remark on valves that switch faster than known valves because their data limit no rate; "" for others.
 
-    Quickly means above the switching frequency that the paper reports of its solenoid valves.
+    The limit is the switching frequency that the paper reports of its solenoid valves.
     """
     scenario = result.scenario
     if not (scenario.follows_reference and only_switches(scenario, scenario.law)) or REVERSALS not in result.metrics:

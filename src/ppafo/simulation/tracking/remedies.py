@@ -171,7 +171,7 @@ def torque_asked(scenario: Scenario, law: ControllerKind | None, error: float) -
 def stiffer_laws(
     scenario: Scenario, holding: float, settled: SettledPart, others: Mapping[str, float] | None = None
 ) -> list[Remedy]:
-    """Remedies with larger angle stiffness against an opposing torque [N m], without and with adapted damping.
+    """Remedies with larger angle stiffness against a load ``holding`` [N m], without and with adapted damping.
 
     ``others`` are numbers that change as well. For a valve with a dead band, the two stiffest remedies are also tried
     with a torque gain that opens the valve beyond the band.

@@ -107,9 +107,9 @@ class SettledPart(NamedTuple):
 
 
 def most_reversals(scenario: Scenario, law: ControllerKind | None, duration: float, stride_time: float = 0.0) -> float:
-    """Command reversals in ``duration`` [s] above which a loop oscillates; inf for a controller that may switch.
+    """Largest number of command reversals in ``duration`` [s] of a loop that does not oscillate.
 
-    ``stride_time`` [s] is the stride time of a walk, 0 for a task.
+    Infinite for a controller that may switch. ``stride_time`` [s] is the stride time of a walk, 0 for a task.
     """
     # A law that requests openings between shut and open should not reverse, where the valve has these openings.
     if law is None or is_pair(scenario) or not scenario.motion.motion_kind.asks_gradually(law):
@@ -243,7 +243,7 @@ def smallest_change(scenario: Scenario) -> float:
 
 
 def excess_of_walk(settled: SettledPart, turning: Floats | float, limit: float) -> Floats | float:
-    """Largest number of a walk divided by its limit: up to 1 the walk follows.
+    """Worst ratio of a walk's tracking numbers to their limits [-]: up to 1 the walk follows its reference.
 
     ``turning`` is the number of command reversals divided by its limit; ``limit`` [N m] is the controller's torque
     limit, 0 for none. The numbers of ``settled`` may be arrays (runs,).
@@ -262,7 +262,7 @@ def failure_of_walk(settled: SettledPart, turning: float, limit: float) -> Failu
 
 
 class _TaskExcess(NamedTuple):
-    """Numbers of a task, each divided by its limit.
+    """Tracking numbers of a task, each divided by its limit [-].
 
     ``off`` is the remaining error, ``swings`` the oscillation of the value, ``peak`` the overshoot, and ``still`` the
     error of a value that does not move.
@@ -275,7 +275,7 @@ class _TaskExcess(NamedTuple):
 
 
 def largest_error(settled: SettledPart, is_switched: bool) -> Floats:
-    """Largest RMS error with which a task follows, in the unit of ``settled``, whose numbers may be arrays (runs,)."""
+    """Largest RMS error with which a task still follows its reference [unit of ``settled``]; arrays (runs,) allowed."""
     if is_switched:
         return LARGEST_SHARE_SWITCHED * np.asarray(settled.wanted)
     rests, wanted, wave = np.asarray(settled.rests), np.asarray(settled.wanted), np.asarray(settled.wave)
@@ -301,7 +301,7 @@ def largest_deviation(settled: SettledPart) -> Floats:
 
 
 def excess_of_task(settled: SettledPart, is_switched: bool) -> _TaskExcess:
-    """Numbers of a task divided by their limits, apart from command reversals: the task follows if none is above 1.
+    """Tracking numbers of a task divided by their limits, except command reversals: it follows if none exceeds 1.
 
     ``is_switched`` is true for a valve without gradual openings. The numbers of ``settled`` may be arrays
     (runs,).

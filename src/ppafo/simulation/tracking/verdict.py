@@ -218,7 +218,7 @@ def time_text(since: float) -> str:
 
 
 def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None:
-    """Run with its kind of failure, if any; None if the run is not judged.
+    """Run with its tracking failure, if any, and rates of command reversals; None if the run is not judged.
 
     The further numbers are the command reversals divided by the limit [-], the reversals per second, and the stride
     time [s], 0 for a task.

@@ -46,7 +46,7 @@ _LARGEST_DRAW = 0.05
 """Fraction of the gas in the bottle that may be drawn between two data exchanges, while the supply is constant."""
 
 _LEAST_FLOW = 1.0e-12
-"""Smallest flow [kg/s] assumed for the regulator, to avoid a division by zero."""
+"""Smallest assumed regulator flow [kg/s], which avoids a division by zero."""
 _RESTING = 5.0
 """Interval between two states of a bottle during a rest [s]."""
 _ABOVE_FREEZING = 0.02

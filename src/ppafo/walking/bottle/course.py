@@ -31,7 +31,7 @@ UNITS = {
 
 
 class SupplyEnding(NamedTuple):
-    """End of a walk on a bottle: kind, explanation as a sentence, and time [s]."""
+    """End of a walk caused by its gas bottle: reason code, explanation as a sentence, and time [s]."""
 
     kind: EndKind
     message: str

@@ -203,7 +203,7 @@ def _numbers(reading: DocumentReader, section: Mapping[str, Any], bottle: Bottle
 
 
 def is_of_bottle(molar_mass: float, bottle: Bottle) -> bool:
-    """Return True if a gas of some molar mass [kg/mol] is the gas of a bottle."""
+    """Tell whether a molar mass [kg/mol] agrees with the gas of a bottle."""
     ratio = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass) / bottle.fluid.table.gas_constant
     return abs(ratio - 1.0) <= _SAME_GAS
 

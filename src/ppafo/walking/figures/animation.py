@@ -46,7 +46,7 @@ _TICK = 0.35
 """Distance between the marks on the ground [m]."""
 _VALVE = {0: ("closed", "#ffffff"), 1: ("plantarflexion", "#8fbfe0"), -1: ("dorsiflexion", "#f0b48a")}
 _VENTED = ("vented", "#e4e4e4")
-"""Name and colour of each state of the valve, by the sign of its command, and of a vent command."""
+"""Name and colour of each valve state: by sign of the command, and for a vent command."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

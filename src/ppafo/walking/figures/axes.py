@@ -1,4 +1,4 @@
-"""Shared elements of figures over the time of a walk: kinds of numbers, line styles."""
+"""Shared elements of figures over the time of a walk: axis quantities, line styles."""
 
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark

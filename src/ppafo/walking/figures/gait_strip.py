@@ -38,7 +38,7 @@ _PERCENT = 100.0 * PHASES
 _FRAMES, _FEW_FRAMES = 8, 5
 """Number of legs over the stride, and in a narrower figure."""
 _LETTER, _LINE = 0.082, 0.14
-"""Width of a letter, and height of a line, of a name in a block at full width [inches]."""
+"""Width of a letter and height of a text line in a block at full width [inches]."""
 
 
 @dataclass(frozen=True, slots=True)

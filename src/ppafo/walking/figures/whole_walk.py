@@ -36,7 +36,7 @@ _APART = 0.2
 _ROW = 0.16
 """Distance between the two rows of labels, as a fraction of the panel height."""
 _TURNS = 0.6
-"""Fraction of the walk after which a label is placed to the left of its line, to stay inside the panel."""
+"""Time, as a fraction of the walk, after which a label is placed to the left of its line."""
 _ROOM = 1.4
 """Height of the gas panel relative to its curve, to make room for the labels."""
 
