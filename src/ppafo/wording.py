@@ -56,9 +56,9 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
         near = [max(alike, key=lambda name: len(commonprefix([name, word])))]  # noqa: RUF071 - of names, no paths
     else:
         # A word at the beginning of a name, else anywhere in it, as ``rms`` is in ``rms_error``.
-        words = [(re.split(r"[^0-9A-Za-z]+", name), name) for name in known]
-        near = [name for found, name in words if found[0] == word] or [
-            name for found, name in words if word in found[1:]
+        words = [(re.split(r"[^0-9a-z]+", name.lower()), name) for name in known]
+        near = [name for found, name in words if found[0] == word.lower()] or [
+            name for found, name in words if word.lower() in found[1:]
         ]
     return f", did you mean '{near[0]}'?" if near else ""
 

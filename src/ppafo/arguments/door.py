@@ -20,7 +20,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 _EMPTY = inspect.Parameter.empty
 _ANSWERED_BY = {("sweep", "statistic"): "estimate", ("sweep", "metric"): "estimate"}
-"""Functions that take an argument of the command line, where another function has the command's name."""
+"""Function that has an argument missing in the Python function of the same name, by command and argument."""
 
 
 class _Parameter(NamedTuple):

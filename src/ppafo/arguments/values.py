@@ -261,7 +261,7 @@ def _either(kinds: list[AcceptedValues], allows_none: bool) -> AcceptedValues:
 
 
 def _at_hand(what: str, value: Any) -> str:
-    """Return a hint at the attribute of a value, such as a result, that the parameter accepts; empty if none."""
+    """Return a hint to pass an attribute of the value, such as ``result.recording``; empty if none is accepted."""
     names = [name for name in ("recording", "scenario") if f"a {name.capitalize()}" in what and hasattr(value, name)]
     return f"; its '.{names[0]}' is one" if names else ""
 

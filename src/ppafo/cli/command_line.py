@@ -30,15 +30,15 @@ if TYPE_CHECKING:
     from ppafo.documents.toml_text import TomlKind
 
 PROGRESS = "progress"
-"""The parameter of a verb that reports how far it is; no word of the line fills it."""
+"""Parameter of a command function that receives the progress display; not settable on the command line."""
 PLUGINS = "plugins"
-"""The parameter of Python calls for modules of the person; every command has ``--plugin`` in its place."""
+"""Parameter of Python calls for user modules; on the command line it is the option ``--plugin``."""
 OUT = "out"
-"""The parameter of a verb that writes its folder or file itself; every other command has ``--out DIR``."""
+"""Parameter of command functions that write their own output; all other commands have ``--out DIR``."""
 
 
 _Verb = Callable[..., Any]
-"""A function whose signature is the arguments of a command, and whose result is what the command says."""
+"""Command function: its signature defines the arguments, its return value the output."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +95,7 @@ _PLAIN: Mapping[type, Word] = {
 """Parser of each type without a ``Word``."""
 
 _PARAMETER = re.compile(r"(\w+): (.*)")
-"""First line of a parameter in the docstring of a verb."""
+"""First line of a parameter in the docstring of a command function."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,7 +285,7 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
 
 
 _NAMING = ("overrides", "tasks", "metric", "metrics", "also", "such_that", "form")
-"""Parameters whose words may name an object of a module, which the person thereby names."""
+"""Parameters whose texts may contain ``module:OBJECT``, which allows the module to be imported."""
 
 
 def _texts(values: Iterable[Any]) -> Iterator[str]:
@@ -304,7 +304,7 @@ _NEGATIVE_NUMBER = re.compile(r"-\d+|-\d*\.\d+")
 
 
 class UsageError(PpafoError):
-    """Words after ``ppafo`` that form no known command."""
+    """Error for invalid command-line arguments."""
 
 
 @final

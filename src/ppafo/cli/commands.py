@@ -134,7 +134,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         "doctor": Command("ppafo.cli.doctor:doctor"),
     },
 }
-"""Headings of the help, by what somebody has come for, and under each the commands, guests' too."""
+"""Headings of the help by purpose, each with its commands, including commands of other packages."""
 
 
 def _installed(entry: Command | CommandGroup) -> Command | CommandGroup | None:
@@ -150,7 +150,7 @@ HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
     heading: {name: entry for name, listed in group.items() if (entry := _installed(listed)) is not None}
     for heading, group in _ALL_HEADINGS.items()
 }
-"""The headings with the commands that are installed."""
+"""Headings of the help with the installed commands."""
 
 COMMANDS: dict[str, Command | CommandGroup] = {
     name: entry for group in HEADINGS.values() for name, entry in group.items()
@@ -158,7 +158,7 @@ COMMANDS: dict[str, Command | CommandGroup] = {
 """The commands of this package by name."""
 
 OTHERS: Kinds[FunctionType] = Kinds("ppafo.commands", "command", FunctionType, {})
-"""The commands of other packages: functions, found when a word names none of ours."""
+"""Commands of other packages, searched only for a name that is unknown here."""
 
 
 def check_words(words: list[str]) -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 _SAME_PERIOD = 1.0e-9
-"""Difference of two sample periods, as a fraction of one, that rounding makes."""
+"""Relative difference of two sample periods [-] that counts as rounding."""
 
 
 def hil(

@@ -93,7 +93,7 @@ EXIT_BAD_INPUT = 2
 _LONGEST_MESSAGE = 1000
 
 OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
-"""The usual 700 make Python look for garbage hundreds of times while it imports, which is a tenth of a start."""
+"""Garbage collection threshold at start; Python's default of 700 costs a tenth of the start-up time."""
 
 
 def build_parser(words: Sequence[str]) -> CommandParser:

@@ -15,7 +15,7 @@ from ppafo.wording import nearest_name, one_line
 
 _SUFFIX = ".toml"
 _SCHEMAS = {"set": "parameters"}
-"""Kinds that ``ppafo doctor --schema`` has under another name."""
+"""File types that have another name in ``ppafo doctor --schema``."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 _NAME_LINE = re.compile(r"""^name *= *(["'])(.*?)\1""", re.MULTILINE)
 _PARENT_LINE = re.compile(r"^parent *=.*\n", re.MULTILINE)

@@ -31,7 +31,7 @@ from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.wording import nearest_name
 
 PROCEDURES = "static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak"
-"""Kinds of procedures in the recommended order."""
+"""Identification procedures in the recommended order."""
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
 _Start = Annotated[Text | None, Field(description="first time to use, such as '2 s'")]
 _End = Annotated[Text | None, Field(description="last time to use, such as '8 s'")]

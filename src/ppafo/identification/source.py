@@ -17,7 +17,7 @@ from ppafo.storage.files import read_bytes
 _NO_SENSORS = ("command", "direction", "repetition")
 """Channels that no sensor measures, which have no limit."""
 _KINDS: tuple[RecordingKind, ...] = ("synthetic", "simulated", "measured")
-"""Kinds of recordings, from the one that decides the kind of a result to the one that decides last."""
+"""Origins of recordings, in decreasing priority for the origin of a result."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,7 @@ def window(recording: Recording, start: float | None, end: float | None) -> Reco
 
 
 def kind_of(kinds: Iterable[RecordingKind]) -> RecordingKind:
-    """Return the kind of a result: synthetic if any recording is, else simulated if any is, else measured."""
+    """Return the origin of a result: synthetic if any recording is, else simulated if any is, else measured."""
     return min(kinds, key=_KINDS.index, default="measured")
 
 

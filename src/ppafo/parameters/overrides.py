@@ -245,7 +245,12 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
             allowed = [one_path(known, path.split(".")[1]) for known in allowed]
         # Nothing is spelt alike: values of the same section stand for what there is.
         near = [name for name in allowed if name.startswith(f"{override.typed.partition('.')[0]}.")] or allowed
-        hint = nearest_name(override.typed, allowed) or f"; for example {', '.join(near[:6])}"
+        # A gas is given by the name of its species, whatever the value was called.
+        is_species = "gas" in override.typed.split(".") and override.text in SPECIES
+        hint = (
+            f", did you mean '{SPECIES_PATH}={override.text}'?" if is_species else nearest_name(override.typed, allowed)
+        )
+        hint = hint or f"; for example {', '.join(near[:6])}"
         worked = _in_conductance(override)
         raise ParameterError(
             f"override '{override}': {parameter_set.file} has no value '{override.typed}'{hint}{worked}"

@@ -267,7 +267,7 @@ class Finding(Generic[T_co]):
 
 @in_units(_units_of)
 def text_of(finding: Finding[Any]) -> str:
-    """Return the report as text: the first sentences, then every section that is not a detail of the page."""
+    """Return the report as text: opening sentences and sections, without the sections meant for the page only."""
     blocks = ["\n".join(finding.said)]
     for section in finding.parts:
         if section.is_detail:

@@ -248,7 +248,7 @@ def draw_panels(
 
 
 def _in_one_column(panels: Sequence[Panel], across: int) -> list[Panel]:
-    """Return panels of ``across`` columns in the order for one: a lower one over the same axis follows its owner."""
+    """Return the panels of a grid in the order of a single column; each residual panel follows its curve panel."""
     owners = [
         number - across if number >= across and panel.shares_x and panel.tall < panels[number - across].tall else number
         for number, panel in enumerate(panels)

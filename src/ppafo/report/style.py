@@ -125,7 +125,7 @@ _width: ContextVar[float | None] = ContextVar("_width", default=None)
 
 @contextmanager
 def drawn_at(width: float | str | None) -> Iterator[None]:
-    """Draw figures within a ``with`` block at a width: a text with its unit, or a number [m]; None for their own.
+    """Draw figures within a ``with`` block at a width: a text with unit, or a number [m]; None for their default.
 
     Raises ArgumentError for any other width.
     """
@@ -143,7 +143,7 @@ def print_scale() -> float:
 
 
 def printed_width(own: float) -> float:
-    """Return the width of a figure [inches]: the one asked for, else its own."""
+    """Return the width of a figure [inches]: the width of ``drawn_at``, else ``own``."""
     return _width.get() or own
 
 
@@ -178,7 +178,7 @@ def render_figure(figure: "Figure", file_formats: Iterable[str]) -> dict[str, by
 
 
 def lay_out(figure: "Figure") -> None:
-    """Place the panels once and for all: drawing is quicker, and another size of the figure keeps the proportions."""
+    """Compute the layout of a figure once, then fix it: resizing keeps the proportions."""
     layout = figure.get_layout_engine()
     if layout is not None:
         # Twice: the ticks follow the length of their axis, and their labels take room.

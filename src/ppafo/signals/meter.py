@@ -118,7 +118,7 @@ def is_away(reference: float, last: float, tolerance: float) -> bool:
 
 
 def advance_course(course: ReferenceSummary, sample: Sample) -> ReferenceSummary:
-    """Summary of a monotone reference after one more sample: first away from its last value, then at rest."""
+    """Return the summary of a monotone reference, with the start of the final hold updated by a new sample."""
     # Sample by sample, because a run is not kept; the last value and the largest are known from the profile before.
     away = is_away(sample.reference, course.last, course.tolerance)
     return ReferenceSummary(

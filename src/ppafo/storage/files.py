@@ -219,7 +219,7 @@ def _swap(new: Path, target: Path) -> None:
 
 
 def _exchange(one: Path, other: Path) -> bool:
-    """Exchange two folders in one step and return whether this succeeded; supported by Linux on most file systems."""
+    """Exchange two folders atomically and return whether this succeeded; supported by Linux on most file systems."""
     import ctypes
 
     try:

@@ -89,7 +89,7 @@ def recording_of_frame(
 def read_parquet(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
     """Recording in a Parquet file whose columns are ``name [unit]``, or have their unit among their metadata.
 
-    Raises DataError, with the file, for one that is not usable.
+    Raises DataError, naming the file, if it cannot be used.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq

@@ -1,4 +1,4 @@
-"""Reading of a recording, whatever it is in: a file of one of the known formats, a result folder, or a data frame."""
+"""Reading of recordings from files of all supported formats, result folders and data frames."""
 
 from dataclasses import replace
 from pathlib import Path

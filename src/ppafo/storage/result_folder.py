@@ -1,4 +1,4 @@
-"""Result folders: the recording as NetCDF and CSV, and ``run.json`` with everything that led to it."""
+"""Result folders: the recording as NetCDF and CSV, and ``run.json`` with all inputs of the run."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

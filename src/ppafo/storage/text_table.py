@@ -42,7 +42,7 @@ def number_in(cell: str, line: int, label: str, gaps: Sequence[str] = ()) -> flo
 
 
 def told_apart(names: Sequence[str], descriptions: Sequence[str] = ()) -> list[str]:
-    """Return unique names: duplicated names are replaced by their descriptions, or numbered ``NAME#2``.
+    """Return unique column names: duplicates are replaced by their descriptions, or numbered ``NAME#2``.
 
     Descriptions are used only if all columns of a name have one and none equals another name.
     """

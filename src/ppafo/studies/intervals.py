@@ -76,7 +76,7 @@ def effective_sample_size(values: Floats) -> float:
 
 
 def is_carried(effective: float, draws: int) -> bool:
-    """Tell whether the effective number of draws is large enough for a reliable confidence interval of the mean.
+    """Return whether the effective number of draws is large enough for a reliable confidence interval of the mean.
 
     For few draws, half of their number suffices: if all values are equal, the interval has no width and is reliable.
     """

@@ -162,7 +162,7 @@ def failures_of(rows: Rows) -> int:
 
 
 def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ...]:
-    """Return metrics, with those of the tracking verdict that the scenario has."""
+    """Return the metric names, extended by the metrics that decide whether the scenario follows its reference."""
     offered = (name for name in needed_metrics(scenario) if (kind := metric_kind(name)) and not lacking(scenario, kind))
     return tuple(dict.fromkeys((*metrics, *offered)))
 
@@ -216,7 +216,7 @@ def oscillating(rows: Mapping[str, Floats], scenario: Scenario) -> NDArray[np.bo
 
 
 def settled(rows: Rows, metric: str) -> Floats:
-    """Return a metric for evaluation: a final error of a settled part that swings becomes its RMS error, if larger."""
+    """Return a metric for evaluation; for sustained oscillation, a final error becomes the RMS error, if larger."""
     if metric not in ONE_INSTANT or "settled_turns" not in rows:
         return rows[metric]
     swings = (rows["settled_turns"] >= SUSTAINED) & (rows["settled_error"] > rows[metric])

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ppafo.control.catalog import switching_remedy
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at, larger, smaller
@@ -153,13 +154,14 @@ def _contradictions(scenario: Scenario) -> Iterator[_Contradiction]:
     # An object in charge has no settings that could contradict.
     if scenario.controller.is_outside:
         return
-    settings, valve = scenario.controller.settings, scenario.device.valve.kind
+    settings, valve, kind = scenario.controller.settings, scenario.device.valve.kind, scenario.controller.kind
+    switching = "" if WALKING_CONTROLLERS.is_own(kind) else switching_remedy(kind)
     fitting = " or ".join(sorted(kind.name for kind in WALKING_CONTROLLERS.values() if kind.only_switches))
     yield _Contradiction(
         "controller.kind",
         valve != "proportional" and not law_of(scenario).only_switches,
         lambda _run: (
-            f"opens its valve gradually, which in a walk only a proportional valve does, not a {valve} one: "
+            f"opens its valve gradually{switching}, which in a walk only a proportional valve does, not a {valve} one: "
             f"take device.valve 'proportional', or controller.kind {fitting}"
         ),
     )

@@ -92,3 +92,13 @@ def test_a_run_prints_its_remedy_in_both_forms_at_the_end_of_its_numbers(
     assert '[device]\nset = "ppafo2011"\nvalve = "proportional"\noverrides = ["supply.pressure=' in said
     assert main(shlex.split(command)[1:]) == 0
     assert "the torque follows its reference" in capsys.readouterr().out
+
+
+def test_tables_that_bring_a_reference_within_reach_do_not_say_that_it_is_beyond_on_purpose() -> None:
+    task = load_scenario("torque-task-proportional")
+    assert task.beyond_reach
+    for change in ("supply.pressure=80 psi_g", "reference.level=4 N m"):
+        tables = tomllib.loads(usage_text(reloaded(task, [change])).partition("\n\n")[2])
+        assert "level" in tables["reference"]
+        assert "beyond_reach" not in tables["reference"]
+    assert "[reference]" not in usage_text(reloaded(task, ["controller.rate=500 Hz"]))

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.catalog import CONTROLLERS, switching_remedy
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS, law_that_walks, walking_controllers
 from ppafo.errors import ScenarioError
 from ppafo.model.declaration import Quantity
@@ -54,6 +54,17 @@ def test_the_law_of_the_paper_switches_solenoid_valves_and_a_pid_does_not() -> N
         ScenarioError, match="gradually, which in a walk only a proportional valve does, not a solenoid one"
     ):
         load_walk("solenoid", ["controller.kind=pid"])
+
+
+def test_an_on_off_law_that_does_not_declare_it_is_told_the_declaration(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(CONTROLLERS, "bang", replace(CONTROLLERS["on_off"], name="bang", only_switches=False))
+    with pytest.raises(
+        ScenarioError, match=r"gradually \(only_switches=True in its ControllerKind, if it commands only"
+    ):
+        load_walk("solenoid", ["controller.kind=bang"])
+    monkeypatch.setitem(CONTROLLERS, "bang", replace(CONTROLLERS["on_off"], name="bang"))
+    assert load_walk("solenoid", ["controller.kind=bang"]).controller.kind == "bang"
+    assert not switching_remedy("pid")
 
 
 def test_a_law_whose_setting_has_a_name_of_walking_is_refused_by_that_name(monkeypatch: pytest.MonkeyPatch) -> None:

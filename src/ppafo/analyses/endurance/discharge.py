@@ -39,7 +39,7 @@ _NEXT_TO_NOTHING = 0.01
 
 @dataclass(frozen=True, slots=True)
 class DischargeEnd:
-    """End of a discharge: kind, explanation, remaining mass [kg], and usable part of it at room temperature [kg]."""
+    """End of a discharge: reason, explanation, remaining mass [kg], and usable part of it at room temperature [kg]."""
 
     kind: str
     message: str

@@ -11,7 +11,11 @@ from ppafo.analyses.endurance.gas_demand import GasDemand, demand_of_recording
 from ppafo.analyses.endurance.walk_gas import WALK_FILE, WalkGas, demand_of_walk, read_walk_gas, walk_gas
 from ppafo.arguments import checked
 from ppafo.errors import DataError, ParameterError
+from ppafo.loading import reloaded, usage_text
+from ppafo.model.gas import SPECIES
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
+from ppafo.parameters.declaration import SPECIES_PATH
+from ppafo.parameters.overrides import read_overrides
 from ppafo.report.kind import Kind
 from ppafo.report.stored_figure import stated_units
 from ppafo.signals import Recording
@@ -24,7 +28,7 @@ from ppafo.walking.bottle.supply import is_of_bottle
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import bottle_life
-from ppafo.wording import argument_text
+from ppafo.wording import argument_text, override_text
 
 BETWEEN_RESTS = 600.0
 """Default walking time between two rests [s]."""
@@ -66,6 +70,15 @@ def endurance_of_gas_use(
     ``stride_time`` is the time of a stride in a recording [s]; by default the whole recording is what repeats. A walk
     has its own: ParameterError, which calls the walk ``name``.
     """
+    for override in read_overrides(overrides):
+        # The bottle's gas is in its file, and the device's in the scenario of the run: neither is a value of a bottle.
+        if "gas" in override.typed.split("."):
+            species = override.text if override.text in SPECIES else "NAME"
+            again = override_text([f"{SPECIES_PATH}={species}"])
+            raise ParameterError(
+                f"override '{override}': a bottle has no value '{override.typed}'; its file names the gas, and the "
+                f"scenario of the run the device's: repeat the run of {name} with {again}, then give its folder"
+            )
     gas = walk_gas(use) if isinstance(use, WalkResult) else None
     if isinstance(use, str | Path) and (Path(use) / WALK_FILE).is_file():
         gas = read_walk_gas(Path(use))
@@ -127,8 +140,17 @@ def endurance_of_walk_gas(
         raise DataError(
             f"{gas.name}: the folder does not state the scenario of the walk; repeat the walk with 'ppafo walk'"
         )
-    has_bottle = bottle is not None or walk_of(gas.scenario).bottle is not None
-    walking = on_bottle(gas.scenario, bottle if has_bottle else PAPER_BOTTLE, overrides)
+    if bottle is None and walk_of(gas.scenario).bottle is None:
+        bottle = PAPER_BOTTLE
+    full, device = None if bottle is None else load_bottle(bottle), gas.scenario.device
+    if full is not None and not is_of_bottle(device.gas.molar_mass, full):
+        fed, again = device.gas.species, reloaded(gas.scenario, [f"{SPECIES_PATH}={full.fluid.name}"])
+        command = usage_text(again).partition("\n")[0]
+        raise DataError(
+            f"walk '{gas.name}': its device is fed with {fed}, and bottle '{full.name}' holds {full.fluid.name}: "
+            f"repeat the walk by '{command} --out FOLDER' and give FOLDER, or take a bottle of {fed}"
+        )
+    walking = on_bottle(gas.scenario, bottle, overrides)
     supply = walk_of(walking).bottle
     assert supply is not None, "a walk on a bottle"
     check_schedule(schedule)

@@ -76,7 +76,7 @@ class Identification:
 
     @property
     def kind(self) -> RecordingKind:
-        """Common kind of all recordings."""
+        """Common origin of all recordings: measured, simulated or synthetic."""
         kinds = [result.kind for result in self.results]
         return kind_of([*kinds, *(() if self.trajectory is None else (kind_of_fit(self.trajectory.fit),))])
 
@@ -296,7 +296,7 @@ def _figures(identification: Identification) -> list[Section]:
 
 
 def kind_of_fit(fit: TrajectoryFit) -> RecordingKind:
-    """Return the common kind of all recordings of a fit."""
+    """Return the common origin of all recordings of a fit: measured, simulated or synthetic."""
     return kind_of([recording.kind for recording in fit.measurements])
 
 

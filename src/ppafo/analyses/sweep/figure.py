@@ -40,7 +40,7 @@ _MEDIAN = 0.5
 _OPACITIES = (0.18, 0.32, 0.45)
 """Opacities of the bands of one channel, from the outermost to the innermost."""
 _GRIDDED = ("grid", "list")
-"""Kinds of ``[[vary]]`` that are crossed with each other."""
+"""Types of ``[[vary]]`` entries that form a full grid with each other."""
 _NAMED = 3
 """Number of varied values in a title."""
 _CAPTION = (

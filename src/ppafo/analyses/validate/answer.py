@@ -21,7 +21,7 @@ from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2
 from ppafo.wording import count_of
 
 KIND_WORDS = {"measured": "measured", "synthetic": "synthetic measurement", "simulated": "simulated, not measured"}
-"""Names of the kinds of recordings in the report: output of a model must not pass for a measurement."""
+"""Words of the report for the origin of a recording, so that model output does not pass for a measurement."""
 MILLISECONDS = 1.0e3
 """Milliseconds per second."""
 _LOOKS = {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}

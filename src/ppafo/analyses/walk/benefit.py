@@ -5,15 +5,21 @@ import contextlib
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import PpafoError
 from ppafo.loading import reloaded
+from ppafo.parameters.reach import torque_reach
 from ppafo.report.kind import Kind
+from ppafo.simulation.numbers import declared_numbers
+from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import remedy
+from ppafo.walking.gait_series import gait_timing
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.safety_events import event_lines
+from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import WalkComparison, walk
 
 _WORK, _SHARE = Kind("", "J", "energy", ".3g"), Kind("", "1", "fraction", ".2g")
 _ANGLE, _HEIGHT = Kind("", "rad", "angle", ".3g"), Kind("", "m", "length", ".2g")
+_TORQUE = Kind("", "N m", "torque", ".3g")
 _LAWS = (
     ("controller.kind=event_proportional",),
     ("controller.kind=event_proportional", "device.valve=proportional"),
@@ -23,6 +29,10 @@ _PRESSURES = (1.2, 1.4, 1.7, 2.0, 3.0, 5.0)
 """Factors on the gauge pressures of supply that are tried for toes that would drag."""
 _HIGHEST_PRESSURE = 1.0e6
 """Highest gauge pressure [Pa] that is tried: ten bar, the rating of most small pneumatic parts."""
+_STIFFER = (2.0, 4.0)
+"""Factors on the stiffness with which a controller lifts the foot that are tried where its request is too small."""
+_NEARLY = 0.95
+"""Ratio of a torque to its limit from which the limit counts as reached [-]."""
 _MINUTES = 0.15
 """Minutes of a walk with a remedy: a few strides after the transient."""
 
@@ -64,26 +74,32 @@ def benefit_sentence(comparison: WalkComparison) -> str:
 
 def _remedied(worn: WalkResult, drags: bool) -> str:
     """Return the cause of missing help and the first remedy with work in push-off and toes above the ground."""
-    scenario, supply = worn.scenario, worn.scenario.device.supply
+    scenario = worn.scenario
     if walk_of(scenario).bottle is not None or not worn.is_helped:
         return ""
+    raised = _raised_pressures(scenario)
+    asked, given = _lifting_torques(worn) if drags else (0.0, 0.0)
     if scenario.controller.kind == "off":
         cause, candidates = "its controller is off", list(_LAWS)
         advice = "another controller alone does not mend it"
+    elif asked < _NEARLY * given and "hold_stiffness" in scenario.controller.settings:
+        cause = (
+            f"the ankle is not lifted enough, as the controller requests {_TORQUE.text(asked)} at the lowest toes, "
+            f"where the actuator gives {_TORQUE.text(given)}"
+        )
+        stiffer = _stiffer_holds(worn, asked, given)
+        # A stiffer hold alone, before the one with more pressure: the valve may fill the chamber too slowly.
+        numbers = [*stiffer, *({**hold, **levels} for hold in stiffer[-2:] for levels in raised[:3])]
+        candidates = [remedy(scenario, each).overrides for each in numbers]
+        largest = remedy(scenario, stiffer[-1]).overrides[-1].replace("=", " = ", 1)
+        advice = (
+            f"larger settings up to `{largest}`, alone and with more supply pressure, do not mend it in further walks"
+        )
     else:
         cause = "the ankle is not lifted enough" if drags else "the torque comes against the motion"
-        advice = "more supply pressure alone does not mend it: take an actuator with more torque"
-        paths = {"supply.pressure": supply.pressure}
-        if supply.dorsiflexion_pressure != supply.pressure:
-            paths["supply.dorsiflexion_pressure"] = supply.dorsiflexion_pressure
-        candidates = [
-            remedy(
-                scenario,
-                {path: STANDARD_ATMOSPHERE + factor * (level - STANDARD_ATMOSPHERE) for path, level in paths.items()},
-            ).overrides
-            for factor in _PRESSURES
-            if factor * (supply.pressure - STANDARD_ATMOSPHERE) <= _HIGHEST_PRESSURE
-        ]
+        other = "an actuator with more torque" if drags else "another timing of push-off"
+        advice = f"more supply pressure alone does not mend it; {other} may, which was not tried"
+        candidates = [remedy(scenario, levels).overrides for levels in raised]
     for overrides in candidates:
         with contextlib.suppress(PpafoError):
             again = walk(reloaded(scenario, overrides), minutes=_MINUTES)
@@ -95,3 +111,42 @@ def _remedied(worn: WalkResult, drags: bool) -> str:
                     "as a further walk shows"
                 )
     return f"; {cause}, and {advice}"
+
+
+def _raised_pressures(scenario: Scenario) -> list[dict[str, float]]:
+    """Return the supply pressures [Pa] by path that are tried, least first, up to what small parts withstand."""
+    supply = scenario.device.supply
+    paths = {"supply.pressure": supply.pressure}
+    if supply.dorsiflexion_pressure != supply.pressure:
+        paths["supply.dorsiflexion_pressure"] = supply.dorsiflexion_pressure
+    return [
+        {path: STANDARD_ATMOSPHERE + factor * (level - STANDARD_ATMOSPHERE) for path, level in paths.items()}
+        for factor in _PRESSURES
+        if factor * (supply.pressure - STANDARD_ATMOSPHERE) <= _HIGHEST_PRESSURE
+    ]
+
+
+def _lifting_torques(worn: WalkResult) -> tuple[float, float]:
+    """Return the torques [N m] in dorsiflexion at the lowest toes in mid-swing: of the request, and the most given.
+
+    Both are 0 without a request. What limits is the request where it is the smaller one, and else the actuator.
+    """
+    if "reference" not in worn.averages:
+        return 0.0, 0.0
+    timing = gait_timing(walk_of(worn.scenario).gait)
+    first, last = PHASES.searchsorted([timing.clearance_from, timing.clearance_to])
+    lowest = first + int(worn.averages["toe_height"].mean[first:last].argmin())
+    request, angle = (float(worn.averages[name].mean[lowest]) for name in ("reference", "angle"))
+    return -request, -torque_reach(worn.scenario.device, angle)[0]
+
+
+def _stiffer_holds(worn: WalkResult, asked: float, given: float) -> list[dict[str, float]]:
+    """Return settings of the controller by path that request more torque where the toes are lowest, least first.
+
+    A limit that cuts the request is raised to the torque that the actuator gives.
+    """
+    settings, path = worn.scenario.controller.settings, "controller.hold_stiffness"
+    is_cut = asked >= _NEARLY * float(settings["largest_torque"])
+    raised = {"controller.largest_torque": given} if is_cut else {}
+    stiffness = max(float(settings["hold_stiffness"]), declared_numbers(worn.scenario)[path].default or 0.0)
+    return [*([raised] if raised else []), *({**raised, path: factor * stiffness} for factor in _STIFFER)]

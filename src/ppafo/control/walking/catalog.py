@@ -123,7 +123,9 @@ def walking_controllers() -> dict[str, ControllerKind]:
         and not shared_settings(law)
         and not reads_gait(law)
     }
-    return dict(WALKING_CONTROLLERS) | {name: law_that_walks(law) for name, law in laws.items()}
+    # Of the user's modules, either catalogue takes every law when it meets an unknown name.
+    own = {name: law for name, law in WALKING_CONTROLLERS.items() if ":" not in name or reads_gait(law)}
+    return own | {name: law_that_walks(law) for name, law in laws.items()}
 
 
 def load_walking_controller(name: str) -> None:

@@ -51,7 +51,7 @@ def numbers_of(problem: TrajectoryProblem) -> tuple[FitNumber, ...]:
 
 
 def _refuse_twice(kind: str, names: list[str]) -> None:
-    """Raise IdentificationError for a duplicated name; ``kind`` is the kind of the named things."""
+    """Raise IdentificationError for a duplicated name; ``kind`` is the noun for the message."""
     twice = first_twice(names)
     if twice is not None:
         raise IdentificationError(f"{kind} '{twice}' is named twice")

@@ -168,7 +168,8 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     changes = override_set(read_overrides(overrides), forms=FILLS)
     for path, override in changes.items():
         if path not in PATHS:
-            raise ParameterError(f"override '{override}': a bottle has no value '{path}'{nearest_name(path, PATHS)}")
+            of_file = "; its name or file determines the gas" if "gas" in path.split(".") else nearest_name(path, PATHS)
+            raise ParameterError(f"override '{override}': a bottle has no value '{path}'{of_file}")
         with refused_as(ParameterError, f"override '{override}'", UnitError):
             value, unit = split_quantity(override.text)
         # A new form of the filling replaces the old one: two forms would contradict each other.

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ppafo.control.catalog import switching_remedy
 from ppafo.metrics.metric import followed
 from ppafo.metrics.switching import SHUT
 from ppafo.model.controlled import ANGLE, TORQUE, error_functions
@@ -117,7 +118,9 @@ def oscillation(case: Case) -> TrackingCause | None:
         if ratio <= _FINE and not case.oscillates:
             return None
         controlled = scenario.controlled if TORQUE in law.controls else TORQUE
-        opens = "" if law.only_switches else f"`{law.name}` asks for openings that on/off valves do not have: "
+        declare = switching_remedy(scenario.controller.kind)
+        asks = f"`{law.name}` asks for openings that on/off valves do not have{declare}: "
+        opens = "" if law.only_switches else asks
         text = (
             f"{opens}its valves change it by {change_text(controlled, step)} in their dead time of "
             f"{1.0e3 * dead_time:.3g} ms, {ratio:.2g} times what is wanted"

@@ -187,6 +187,35 @@ def test_a_run_on_another_gas_than_the_bottle_holds_is_refused(tmp_path: Path) -
     assert ppafo.bottle(tmp_path / "task", bottle="air-48ci-3000psi").found.discharge.walking_time > 0.0
 
 
+def test_a_walk_on_another_gas_than_the_bottle_holds_is_told_the_command_that_feeds_it_so() -> None:
+    walked = ppafo.walk("proportional", minutes=0.1, overrides=["controller.vent_time=0.1 s"])
+    with pytest.raises(
+        DataError, match="its device is fed with CO2, and bottle 'air-48ci-3000psi' holds air"
+    ) as caught:
+        endurance(walked, bottle="air-48ci-3000psi")
+    told = "'ppafo walk proportional --set 'controller.vent_time=0.1 s' --set gas.species=air --out FOLDER'"
+    assert told in str(caught.value)
+    again = ppafo.walk("proportional", minutes=0.1, overrides=["gas.species=air"])
+    lasting_on_air = endurance(again, bottle="air-48ci-3000psi", longest=20.0).found
+    assert isinstance(lasting_on_air, Endurance)
+    assert lasting_on_air.discharge.walking_time > 0.0
+
+
+@pytest.mark.parametrize("typed", ["gas.species", "gas", "gas.value", "bottle.gas"])
+def test_a_gas_set_at_a_bottle_is_told_to_repeat_the_run(typed: str) -> None:
+    with pytest.raises(ParameterError, match=f"a bottle has no value '{typed}'; its file names the gas") as caught:
+        endurance(staircase(1e-3, 1.0, 0.2), overrides=[f"{typed}=air"])
+    assert "repeat the run of walk with overrides=['gas.species=air']" in str(caught.value)
+    with pytest.raises(ParameterError, match=f"a bottle has no value '{typed}'; its name or file determines the gas"):
+        endurance(gas_per_stride="0.4 g", overrides=[f"{typed}=air"])
+
+
+@pytest.mark.parametrize("typed", ["gas", "gas.value"])
+def test_a_gas_under_another_name_is_told_its_species(typed: str) -> None:
+    with pytest.raises(ParameterError, match=r"did you mean 'gas\.species=air'"):
+        ppafo.load_walk("proportional", [f"{typed}=air"])
+
+
 def test_a_bottle_with_changed_values_says_so_and_one_without_does_not() -> None:
     changes = ["bottle.volume=500 cm^3", "bottle.gas_mass=300 g"]
     shipped, changed = (

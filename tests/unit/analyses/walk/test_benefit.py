@@ -38,6 +38,29 @@ def test_the_remedy_of_a_walk_that_does_not_lift_the_toes_lifts_them(name: str, 
     assert again.startswith("the device helps, against the same walk without it")
 
 
+@pytest.mark.parametrize(
+    ("overrides", "asked", "setting"),
+    [
+        (("controller.hold_stiffness=0 N m/rad",), r"1\.\d+", r"hold_stiffness = [\d.]+ N m/rad"),
+        (("controller.largest_torque=1.5 N m",), r"1\.5", r"largest_torque = 5 N m"),
+    ],
+)
+def test_toes_that_drag_below_the_reach_of_the_actuator_are_mended_at_the_controller(
+    overrides: tuple[str, ...], asked: str, setting: str
+) -> None:
+    said = sentence("proportional", *overrides)
+    cause = rf"as the controller requests {asked} N m at the lowest toes, where the actuator gives 5 N m"
+    assert re.search(rf"; the ankle is not lifted enough, {cause}: with `controller\.{setting}`, toes", said), said
+
+
+def test_a_remedy_that_no_walk_tried_is_said_to_be_untried(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ppafo.analyses.walk.benefit._PRESSURES", (1.01,))
+    said = sentence("proportional", "supply.pressure=15 psi_g")
+    assert said.endswith(
+        "more supply pressure alone does not mend it; an actuator with more torque may, which was not tried"
+    )
+
+
 def test_strides_without_help_are_the_reason_and_the_first_fault_is_named() -> None:
     stuck = ("faults.heel.kind=stuck", "faults.heel.time=3 s", "faults.heel.reading=0 N")
     said = sentence("proportional", *stuck, minutes=0.2)

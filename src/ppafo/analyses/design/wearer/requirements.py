@@ -23,7 +23,7 @@ from ppafo.walking.wearer import STATURES, WEARER
 from ppafo.wording import argument_text
 
 WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regulators"}
-"""Walk, with its controller, for each kind of valve."""
+"""Walk configuration and its controller, by valve type."""
 BODY_MASS_INDEX = 22.0
 """Body mass divided by the square of the stature [kg/m^2], for a wearer of unknown stature."""
 TOES = 0.01

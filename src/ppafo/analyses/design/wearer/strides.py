@@ -28,7 +28,7 @@ _EARLY_LIFT = ("controller.swing_peak_time=0.73", "controller.swing_rise_time=0.
 _OF_ACTUATOR = ("torque_constant", "displacement_per_radian")
 """Catalogue figures of an actuator that a walk adopts."""
 _PROPORTIONAL = "proportional"
-"""Kind of valve for a torque controller; solenoid valves only limit the torque."""
+"""Valve type that a torque controller needs; solenoid valves only limit the torque."""
 SHUT_OFF_PARTS = {quantity.name: quantity.default or 0.0 for quantity in SHUT_OFF} | {"area": 1.0e-5}
 """Numbers of the shut-off valve of every device [SI]: the usual ones, and an area that does not throttle the supply."""
 

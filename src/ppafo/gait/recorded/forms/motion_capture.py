@@ -104,7 +104,7 @@ def _joined(table: MotionTable, columns: Mapping[str, Floats], units: Mapping[st
 
 
 def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBlock:
-    """Return the block whose kind is on line ``start``; raises DataError for an invalid header."""
+    """Return the block whose title is on line ``start``; raises DataError for an invalid header."""
     head = lines[start + 1 : start + 5]
     delimiter = delimiter_of(head[2]) if len(head) == 4 else ","
     axes = cells_of(head[2], delimiter) if len(head) == 4 else []
