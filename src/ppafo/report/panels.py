@@ -330,7 +330,10 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float], title_size: flo
             legend = axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", handlelength=2.2)
             for entry in legend.get_texts():
                 letters = _ENTRY_LETTERS * (size[0] - 1.3 * _AXIS_ROOM - _ENTRY)
-                entry.set_text("\n".join(textwrap.wrap(entry.get_text(), max(_FEWEST_LETTERS // 2, round(letters)))))
+                # Mathematics is shorter in print than in its source, and a break in it would print the source.
+                if "$" not in entry.get_text():
+                    lines = textwrap.wrap(entry.get_text(), max(_FEWEST_LETTERS // 2, round(letters)))
+                    entry.set_text("\n".join(lines))
     axes.set_title(title, pad=print_scale() * pad, fontsize=font_size(title_size))
     # Last, so that it can undo what Matplotlib chose.
     if panel.then is not None:

@@ -121,3 +121,15 @@ def test_a_panel_alone_in_its_row_takes_the_whole_row_and_all_titles_have_one_si
     assert below.get_position().width > 1.9 * left.get_position().width
     assert left.get_xlabel() == right.get_xlabel() == below.get_xlabel() == "Time"
     assert len({axes._left_title.get_fontsize() for axes in (left, right, below)}) == 1  # type: ignore[attr-defined]
+
+
+def test_mathematics_in_a_legend_stays_whole_where_words_are_wrapped() -> None:
+    entries = [
+        "$-\\beta\\omega/I - T_c/I + \\beta\\omega/I - T_c/I$",
+        "a name of many words that is wrapped in its panel",
+    ]
+    marks = [Mark("line", TIMES, TIMES, label=entry) for entry in entries]
+    figure = draw_panels([Panel(Kind("Time"), Kind("Level"), marks, legend="inside")], across=3)
+    shown = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert shown[0] == entries[0]
+    assert "\n" in shown[1]
