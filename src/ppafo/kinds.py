@@ -15,7 +15,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ppafo.errors import KindError
-from ppafo.plugins import OBJECT, is_working_folder, named_modules, object_of, without_working_folder
+from ppafo.plugins import OBJECT, is_working_folder, object_of, without_working_folder
 from ppafo.wording import one_line
 
 if TYPE_CHECKING:
@@ -121,10 +121,6 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         # All are loaded, so that a message can name what there is.
         if not points:
             self.load_all()
-            for module, objects in named_modules():
-                found = {f"{module}:{key}": item for key, item in objects.items() if isinstance(item, self._kind_type)}
-                own = {id(kind) for kind in self._kinds.values()}
-                self._kinds |= {word: kind for word, kind in found.items() if id(kind) not in own}
             return None
         return self._load(points[0])
 

@@ -10,15 +10,15 @@ import os
 import re
 import site
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from ppafo.errors import KindError
-from ppafo.wording import nearest_name, one_line
+from ppafo.wording import one_line
 
 Plugins = Iterable[str | Path]
 """Files (``laws.py``) or modules (``my_laws.hysteresis``) of the user."""
@@ -137,22 +137,10 @@ def object_of(word: str) -> Any:
             f"--plugin {_remedy(module)} (in Python plugins=['{_remedy(module)}'])"
         )
     loaded = sys.modules[module] if plugin is None else _imported(module, plugin.folder)
-    # Not asked by getattr, which may call a function of the module, unless that is the user's.
-    if name not in vars(loaded) and (plugin is None or not hasattr(loaded, name)):
-        raise AttributeError(f"module '{module}' has no attribute '{name}'{nearest_name(name, vars(loaded))}")
+    if plugin is None and name not in vars(loaded):
+        # Not asked by getattr, which may call a function of the module.
+        raise AttributeError(f"module '{module}' has no attribute '{name}'")
     return getattr(loaded, name)
-
-
-def named_modules() -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the modules that the user named, with their objects; a file with two names once, broken ones not."""
-    files = set()
-    for plugin in named_plugins():
-        file = Path(plugin.folder, *plugin.module.split(".")).resolve()
-        if file not in files:
-            files.add(file)
-            # A broken module is refused where one of its objects is asked for.
-            with suppress(Exception):
-                yield plugin.module, dict(vars(_imported(plugin.module, plugin.folder)))
 
 
 def _remedy(module: str) -> str:

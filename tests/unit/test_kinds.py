@@ -12,12 +12,11 @@ import ppafo
 from ppafo import plugins
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.errors import KindError, PpafoError, ScenarioError
+from ppafo.errors import KindError, ScenarioError
 from ppafo.kinds import Kinds
 from ppafo.metrics import METRICS
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.schema import json_schema
-from ppafo.walking import load_walk
 
 LAW = """
 from dataclasses import replace
@@ -112,24 +111,6 @@ def test_what_is_no_law_of_that_name_is_refused(install: Install, text: str, pro
     install("odd_laws", text, controllers="odd")
     with pytest.raises(KindError, match=problem):
         CONTROLLERS["odd"]
-
-
-@pytest.mark.parametrize("name", ["beside", "KIND", "kind", "anything"])
-def test_a_name_without_its_module_is_told_the_objects_of_the_plugin(
-    install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    (tmp_path / "broken.py").write_text("raise RuntimeError")
-    (tmp_path / "beside.py").write_text(LAW.format(name="on_off", call="anything"))
-    monkeypatch.setattr(plugins, "_named", {})
-    monkeypatch.setenv(plugins.VARIABLE, "")
-    both = [tmp_path / "broken.py", tmp_path / "beside.py"]
-    hint = "" if name == "anything" else ", did you mean 'beside:KIND'\\?"
-    for load, task in ((ppafo.load_scenario, "torque-task-proportional"), (load_walk, "proportional")):
-        with pytest.raises(ScenarioError, match=rf"kind = '{name}' is not known{hint}; allowed: .*, beside:KIND"):
-            load(task, [f"controller.kind={name}"], plugins=both)
-        with pytest.raises(PpafoError, match="has no attribute 'kind', did you mean 'KIND'"):
-            load(task, ["controller.kind=beside:kind"])
-    assert load_walk("proportional", ["controller.kind=beside:KIND"]).controller.peak_torque > 0.0
 
 
 def test_a_law_is_named_by_module_and_object_from_the_working_folder(

@@ -41,4 +41,5 @@ KIND = ControllerKind(
     parameters=HysteresisParameters,
     initial=HysteresisState(0.0),
     update=update,
+    only_switches=True,
 )
