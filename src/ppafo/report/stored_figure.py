@@ -52,17 +52,13 @@ def read_result(folder: str | Path) -> StoredResult:
     metrics = Metrics()
     for name, stated in _under(file, stored.document, "metrics").items():
         try:
-            metrics[name] = _stored_metric(stated)
+            # JSON has no nan, which a metric without a value has.
+            value = math.nan if stated["value"] is None else float(stated["value"])
+            metrics[name] = Metric(value, str(stated["unit"]), str(stated["summary"]))
         except (KeyError, TypeError, ValueError) as error:
             raise _other_form(file, f"metrics.{name}", stated, "a value with unit and summary") from error
     atmosphere = _stated_atmosphere(file, stored.document, "scenario", "device")
     return replace(stored, metrics=metrics, atmosphere=atmosphere, drawn_by=draw_stored_result)
-
-
-def _stored_metric(stated: Mapping[str, Any]) -> Metric:
-    # JSON has no nan, which a metric without a value has.
-    value = math.nan if stated["value"] is None else float(stated["value"])
-    return Metric(value, str(stated["unit"]), str(stated["summary"]))
 
 
 def draw_stored_result(stored: StoredResult, width: float | str | None = None) -> "Figure":

@@ -152,7 +152,7 @@ def _recorded(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str
 def _of_package(name: str, request: ExperimentRequest) -> Scenario:
     """Return a scenario of the package with the requested device."""
     content = load_scenario(name).origin.content
-    # As overrides, so that the scenario tells which of its own values replace those of another set.
+    # As overrides, so that the scenario reports its values that replace values of another set.
     chosen = {"valve": load_parameter_set(request.parameter_set).default_valve, **_device_table(request)}
     of_device = (f"device.{key}={name}" for key, name in chosen.items() if name != content["device"][key])
     return scenario_from_dict(content, [*of_device, *request.overrides])

@@ -266,6 +266,16 @@ class Recording:
         converted: Floats = channel.values if (zero, one) == (0.0, 1.0) else zero + scale * channel.values
         return converted
 
+    def values_of(self, channel: str | tuple[str, str], atmosphere: float = STANDARD_ATMOSPHERE) -> Floats:
+        """Return a channel's values, in SI (``"torque"``) or in a given unit (``("pressure_1", "psi_g")``).
+
+        ``"time"`` are the times of the samples [s]. Gauge pressures are relative to ``atmosphere`` [Pa absolute].
+        Raises DataError for an unknown channel, and UnitError for a unit that does not fit the channel.
+        """
+        if channel == TIME:
+            return self.time
+        return self[channel] if isinstance(channel, str) else self.in_unit(*channel, atmosphere)
+
     def _ipython_key_completions_(self) -> list[str]:
         """Return the channel names, which a notebook offers as completions between brackets."""
         return list(self.names)

@@ -46,12 +46,7 @@ def channel_values(self: RecordedResult, channel: str | tuple[str, str]) -> Floa
     ``result["time"]`` are the times of the samples [s]. Raises DataError for an unknown channel, and UnitError for a
     unit that does not fit the channel.
     """
-    if channel == "time":
-        return self.recording.time
-    if isinstance(channel, str):
-        return self.recording[channel]
-    name, unit = channel
-    return self.recording.in_unit(name, unit, self.scenario.device.supply.atmospheric_pressure)
+    return self.recording.values_of(channel, self.scenario.device.supply.atmospheric_pressure)
 
 
 def channel_names(self: RecordedResult) -> list[str]:

@@ -57,11 +57,7 @@ class StoredResult:
 
     def __getitem__(self, channel: str | tuple[str, str]) -> Floats:
         """Return a channel's values, in SI or in a given unit; ``time`` are the times of the samples [s]."""
-        if channel == "time":
-            return self.recording.time
-        if isinstance(channel, str):
-            return self.recording[channel]
-        return self.recording.in_unit(*channel, self.atmosphere)
+        return self.recording.values_of(channel, self.atmosphere)
 
     def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
         """Return the channels as columns indexed by time [s]: ``Recording.to_dataframe``."""

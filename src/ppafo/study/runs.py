@@ -182,12 +182,9 @@ def excess(
     return tracking_excess(with_numbers(scenario, varied), rows, most_reversals(scenario), least)
 
 
-def follows(
-    rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
-) -> Floats:
-    """Return for each run (runs,) 1 if it follows its reference, 0 if not, nan if unknown."""
-    share = excess(rows, scenario, columns, gauge).largest
-    return np.where(np.isfinite(share), np.where(share > 1.0, 0.0, 1.0), share)
+def is_to_follow(scenario: Scenario, columns: Mapping[str, Floats]) -> bool:
+    """Return whether runs are expected to follow their reference: unless the scenario declares it beyond reach."""
+    return not scenario.beyond_reach or changes_reach(columns)
 
 
 def tracking_violation(
@@ -197,17 +194,9 @@ def tracking_violation(
 
     A reference that its scenario declares to be beyond reach cannot be followed, and counts as followed.
     """
-    if scenario.beyond_reach and not changes_reach(columns):
+    if not is_to_follow(scenario, columns):
         return np.zeros(next(iter(rows.values())).size)
     return np.fmax(excess(rows, scenario, columns, gauge).largest - 1.0, 0.0)
-
-
-def oscillates(
-    rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
-) -> Floats:
-    """Return for each run (runs,) 1 if its loop oscillates, 0 if not, nan if unknown."""
-    share = excess(rows, scenario, columns, gauge).oscillation
-    return np.where(np.isfinite(share), np.where(share > 1.0, 1.0, 0.0), share)
 
 
 def oscillating(rows: Mapping[str, Floats], scenario: Scenario) -> NDArray[np.bool_]:

@@ -31,7 +31,7 @@ from ppafo.studies.study import Study
 from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, samples_of, varied_columns
 from ppafo.study.folder import StudyFolder
 from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, read_manifest
-from ppafo.study.runs import follows, oscillates, unvaried, with_companions
+from ppafo.study.runs import excess, unvaried, with_companions
 from ppafo.wording import argument_text, one_line
 
 if TYPE_CHECKING:
@@ -222,17 +222,16 @@ def _columns_of_endings(
     """Return the columns of status, time and reason of failure, oscillation, and tracking of the reference."""
     configuration = study.configurations[part.configuration]
     varied = varied_columns(study, configuration, dict(values))
+    judged = excess(result.metrics, configuration.scenario, varied, study.gauge)
     return {
         "status": TableColumn(encode_texts(result.status, STATUSES), _PLAIN, "how the run ended"),
         "failure_time": TableColumn(result.failure_time, "s", "time at which the run diverged"),
         "reason": TableColumn(texts_of_some(result.reasons, result.status.size), _PLAIN, "why the run has no metrics"),
         OSCILLATES: TableColumn(
-            oscillates(result.metrics, configuration.scenario, varied, study.gauge),
-            _PLAIN,
-            "1 where the loop oscillates, empty where that is not known",
+            judged.oscillates, _PLAIN, "1 where the loop oscillates, empty where that is not known"
         ),
         FOLLOWS: TableColumn(
-            follows(result.metrics, configuration.scenario, varied, study.gauge),
+            judged.follows,
             _PLAIN,
             "1 where the run follows its reference, 0 where not, empty where that is not known",
         ),

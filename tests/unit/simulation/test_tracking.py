@@ -19,7 +19,7 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.simulation.tracking.rule import SettledPart, failure_of_task, settled_task
-from ppafo.study.runs import follows, with_companions
+from ppafo.study.runs import excess, with_companions
 
 TASK = "torque-task-proportional"
 
@@ -138,7 +138,7 @@ def test_a_run_that_ends_on_its_ramp_is_not_judged_by_its_lag() -> None:
     # Nor where what lies beyond reach is asked for after the end only.
     base = load_scenario(TASK, ["run.duration=0.3 s"])
     columns = {"supply.pressure": np.array([3.0e5, 4.0e5])}
-    assert (follows(run_ensemble(base, columns, with_companions([], base)).metrics, base, columns) == 1.0).all()
+    assert (excess(run_ensemble(base, columns, with_companions([], base)).metrics, base, columns).follows == 1.0).all()
 
 
 SMALL_SINE = [
@@ -193,7 +193,7 @@ def test_metered_runs_are_judged_as_their_recordings_are(scenario: str, column: 
     columns = {column: np.array(values)}
     metered = run_ensemble(base, columns, with_companions([], base)).metrics
     alone = [simulate(with_numbers(base, {column: value})).tracking is None for value in values]
-    assert (follows(metered, base, columns) == 1.0).tolist() == alone
+    assert (excess(metered, base, columns).follows == 1.0).tolist() == alone
 
 
 RAMP = [
@@ -391,7 +391,7 @@ def test_noise_that_turns_the_command_on_the_way_is_no_oscillation_once_the_loop
     metered = run_ensemble(scenario, columns, with_companions([], scenario)).metrics
     assert metered["settled_reversals"][0] == pytest.approx(settled.reversals, rel=1e-6)
     assert metered["settled_span"][0] == pytest.approx(settled.span, rel=1e-6)
-    assert (follows(metered, scenario, columns)[0] == 1.0) == (result.tracking is None)
+    assert (excess(metered, scenario, columns).follows[0] == 1.0) == (result.tracking is None)
 
 
 def test_a_law_on_the_angle_alone_that_load_and_friction_hold_is_told_the_law_that_follows() -> None:

@@ -11,7 +11,7 @@ from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats
 from ppafo.study.blocks import runs_at_once
-from ppafo.study.runs import FAILED, Rows, RunCounter, Runs, oscillates, scenario_runs, settled, with_companions
+from ppafo.study.runs import FAILED, Rows, RunCounter, Runs, excess, scenario_runs, settled, with_companions
 from tests.model_runs import model_runs
 
 SHORT = ("run.duration=0.2 s",)
@@ -40,7 +40,7 @@ def test_a_run_of_a_study_oscillates_where_it_does_alone() -> None:
     rows = scenario_runs(scenario, with_companions(["rms_error"], scenario), RunCounter(3, None)).run(columns)
     alone = [simulate(task, [*changes, f"sensors.delay={delay:g} s"]).tracking for delay in columns["sensors.delay"]]
     assert [None if verdict is None else verdict.kind for verdict in alone] == [None, "oscillates", "oscillates"]
-    assert oscillates(rows, scenario, columns).tolist() == [0.0, 1.0, 1.0]
+    assert excess(rows, scenario, columns).oscillates.tolist() == [0.0, 1.0, 1.0]
 
 
 def test_a_run_that_is_refused_is_a_failure_with_its_reason() -> None:

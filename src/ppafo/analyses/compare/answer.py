@@ -306,7 +306,7 @@ def _change_panels(comparison: ComparisonResult) -> list[Panel]:
 
 
 def _colours(task: TaskComparison) -> dict[str, str]:
-    """Return the colour of each configuration: of its valve, where that tells all apart, else one of a list."""
+    """Return a colour for each configuration: its valve's colour if these differ, else the palette's in order."""
     of_valves = [look_of_valve(case.scenario.device.valve.kind).colour for case in task.cases]
     chosen = (
         of_valves

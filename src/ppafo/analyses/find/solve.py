@@ -17,7 +17,7 @@ from ppafo.studies.draws import seeds_of_noise
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, given_in, varied_path
-from ppafo.study.runs import RunCounter, Runs, oscillates, scenario_runs, settled, tracking_violation, with_companions
+from ppafo.study.runs import RunCounter, Runs, excess, is_to_follow, scenario_runs, settled, with_companions
 from ppafo.units import split_quantity
 from ppafo.wording import one_line
 
@@ -143,8 +143,9 @@ class FindResult:
         # One instant of a value that swings may meet the condition by chance.
         judged = settled(rows, metric)
         # A loop whose command turns all the time meets no condition that anybody would build on.
-        turns = oscillates(rows, base, columns) > 0.0
-        fails = tracking_violation(rows, base, columns) > 0.0
+        verdicts = excess(rows, base, columns)
+        turns = verdicts.oscillates == 1.0
+        fails = (verdicts.follows == 0.0) & is_to_follow(base, columns)
         by_stream = (
             each.reshape(streams, values.size)
             for each in (rows[metric], np.where(turns, np.nan, judged), judged > rows[metric], turns, fails)

@@ -4,6 +4,7 @@ import io
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import methodcaller
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -342,13 +343,8 @@ def _open_loop_panels(model: LinearModel, scales: Mapping[str, Any]) -> list[Pan
                 dot = {"linestyle": "", "marker": marker, "markersize": 5}
                 marks.append(Mark("line", np.array([at]), place, (), f"{name} at {at:.3g} Hz", colour, dot))
         every = {**scales, "yscale": "log" if critical > 0.0 else "linear"}
-        panels.append(Panel(_FREQUENCY, kind, marks, legend="inside", then=partial(_set_scales, every), shares_x=True))
+        panels.append(Panel(_FREQUENCY, kind, marks, legend="inside", then=methodcaller("set", **every), shares_x=True))
     return panels
-
-
-def _set_scales(scales: Mapping[str, Any], axes: "Axes") -> None:
-    """Set the scales of both axes."""
-    axes.set(**scales)
 
 
 def steps_panels(model: LinearModel) -> list[Panel]:

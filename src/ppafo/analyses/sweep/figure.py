@@ -68,7 +68,7 @@ def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence
     is_mapped = 2 in (len(grid), len(varied))
     if is_mapped:
         metrics = _differing(results, metrics) or metrics[:1]
-        # Where some runs follow their reference and others do not, the map tells which.
+        # A map of the verdict, if some runs follow their reference and others do not.
         if "not_following" in results.summary:
             verdicts = np.concatenate(list(results.thin(FOLLOWS, MAXIMUM_DRAWN).values()))
             metrics += [FOLLOWS] if {0.0, 1.0} <= set(verdicts.tolist()) else []

@@ -154,6 +154,6 @@ class StudyResults:
 def metric_kind(results: StudyResults, metric: str) -> Kind:
     """Return label, unit and format of a metric from the stored unit, also for a metric that no longer exists."""
     if metric == FOLLOWS:
-        # A column of every study, and none of the metrics that it asked for.
+        # A column of every study, not a requested metric.
         return Kind("Follows its reference; 1: yes, 0: no")
     return of_stored_metric(metric, results.document["metrics"][metric]["unit"])

@@ -63,6 +63,16 @@ class TrackingExcess(NamedTuple):
     largest: Floats
     oscillation: Floats
 
+    @property
+    def follows(self) -> Floats:
+        """1 for each run (runs,) that follows its reference, 0 for the others, nan if unknown."""
+        return np.where(np.isnan(self.largest), np.nan, self.largest <= 1.0)
+
+    @property
+    def oscillates(self) -> Floats:
+        """1 for each run (runs,) whose loop oscillates, 0 for the others, nan if unknown."""
+        return np.where(np.isnan(self.oscillation), np.nan, self.oscillation > 1.0)
+
 
 def tracking_excess(
     scenario: Scenario, metrics: Mapping[str, Floats], most_reversals: float, least: float

@@ -185,7 +185,7 @@ def following_text(result: "RecordedResult") -> str:
     begin, rms = f"the {controlled.words} follows its reference: ", ("RMS error", settled.error)
     if not scenario.follows_reference:
         return begin + judged_text(*rms, LARGEST_SHARE_OF_WAVE * settled.wanted)
-    # The limit of valves without gradual openings is several times wider, and the swing tells what it hides.
+    # The limit of on/off valves is several times wider, so the swing is reported beside the error.
     why = ", as its valves are only open or shut" if case.only_switches else ""
     limit = float(largest_deviation(settled)) if settled.way > 0.0 and not case.only_switches else None
     deviation = ("swing", settled.span) if settled.rests else ("largest error", settled.worst)
