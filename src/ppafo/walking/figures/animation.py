@@ -12,6 +12,7 @@ from ppafo.report.display_units import axis_unit, display_value, display_values
 from ppafo.report.style import BLACK, GREY, house_style
 from ppafo.walking.figures.legs import (
     CHAMBERS,
+    DRAGGING,
     DRAGS,
     GHOST,
     LegPostures,
@@ -168,7 +169,7 @@ def _stage(comparison: WalkComparison, turns: np.ndarray) -> "tuple[Figure, list
     figure.text(
         0.012,
         0.985,
-        f"{configuration.name}, half speed, simulated; dark red: toes more than 1 cm below ground",
+        f"{configuration.name}, half speed, simulated; dark red: {DRAGGING}",
         ha="left",
         va="top",
         fontsize=9,

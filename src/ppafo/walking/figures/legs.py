@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 
 GHOST = "#5a5a5a"
 """Colour of the healthy foot: dark enough to be visible in front of a coloured foot."""
-DRAGS = "#a4001d"
+DRAGS, DRAGGING = "#a4001d", "toes below ground in mid-swing"
+"""Colour of a foot whose toes would drag, and its words in the pictures."""
 
 CHAMBERS = (("pressure_1", "plantarflexion", CHAMBER_1), ("pressure_2", "dorsiflexion", CHAMBER_2))
 """Channel, name and line style of each chamber."""
@@ -148,7 +149,7 @@ def frames_figure(comparison: WalkComparison) -> "Figure":
         rows = figure.subplots(2, 1, sharex=True)
         _draw_frames(rows[0], comparison.without_device, "without the device", WITHOUT, count)
         _draw_frames(rows[1], comparison.with_device, "with the device", WITH, count)
-        remark = "outline: healthy foot; cross: toes below ground in mid-swing"
+        remark = f"outline: healthy foot; cross: {DRAGGING}"
         worn = comparison.with_device
         write_head(figure, f"{worn.scenario.name}: one stride", remark, worn.recording.kind)
         return figure
