@@ -151,11 +151,11 @@ def _near_zero_and_beyond(unit: str, draw: random.Random) -> list[float]:
     return [usual, *near, *(usual + draw.uniform(-2.0, 2.0) * 10.0 ** draw.uniform(-6.0, 5.0) for _ in range(40))]
 
 
-def test_a_value_that_nobody_wrote_has_four_digits_and_a_written_one_six() -> None:
+def test_a_value_has_the_digits_that_were_written_and_four_where_it_was_computed() -> None:
     work = """({ shownNumber }) => {
-        const setting = { unit: "m", shown: "mm", value: 1.869923 };
+        const setting = { unit: "m", shown: "mm" };
         const content = { zeros: {}, units: { m: [{ unit: "mm", scale: "0.001", offset: "0", isGauge: false }] } };
-        const shown = (origin, value) => shownNumber(content, { ...setting, origin }, value, 101325);
-        return [shown("default", 1.869923), shown("default", 1.75125), shown("published", 1.869923)];
+        const shown = value => shownNumber(content, setting, value, 101325);
+        return [shown(1.8699230769230768), shown(1.869923), shown(1.75125)];
     }"""
-    assert told("settings", work) == ["1870", "1751.25", "1869.92"]
+    assert told("settings", work) == ["1870", "1869.923", "1751.25"]
