@@ -139,7 +139,7 @@ class Function:
 
     name: str
     source: str
-    """Name in the composed module, where one function serves all types."""
+    """Name of the function in the composed module."""
     parameters: tuple[Parameter, ...]
     returns: Type | None
     """Type of the return value; None if the function returns nothing."""
