@@ -37,12 +37,12 @@ _LIMITS = {
     "stride.stance_share": ("", 0.2, 0.95),
     "stride.stance_share_deviation": ("", 0.0, 0.5),
 }
-"""Unit, lowest and highest value of every quantity; wide limits that exclude only typing errors."""
+"""Unit, lowest and highest value of the numbers in a gait file; wide limits that exclude only typing errors."""
 
 
 @functools.cache
 def gait_file() -> type[BaseModel]:
-    """Return the model of a gait file."""
+    """Return the Pydantic model of a gait file."""
     text = Annotated[str, Field(pattern=QUANTITY)]
     number = Annotated[float, Field(allow_inf_nan=False)]
     series = Annotated[list[number], Field(min_length=1, max_length=_MAXIMUM_HARMONICS)]

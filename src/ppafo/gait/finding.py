@@ -38,7 +38,7 @@ _PLAIN = (
     "stance_share_deviation",
     "strides",
 )
-"""Fields of a gait that are plain data already."""
+"""Fields of a ``Gait`` that are written to JSON unchanged."""
 _STRIDE_KEYS = ("start", "toe_off", "end", "stance_share")
 
 _NOISE = 1e-9
@@ -48,13 +48,13 @@ _CAPTION = "The curves over the stride: mean, standard deviation between strides
 
 @dataclass(frozen=True, slots=True)
 class GaitFound:
-    """A gait and, if it was imported, the result of the import."""
+    """Gait of a report, with the result of the import if the gait was imported."""
 
     gait: Gait
     imported: ImportedGait | None = None
 
     def json_document(self) -> dict[str, Any]:
-        """Return numbers and curves, and the strides of an import, as plain data in SI units."""
+        """Return numbers, curves and, after an import, strides as plain data in SI units."""
         gait, imported = self.gait, self.imported
         document: dict[str, Any] = {
             **{name: getattr(gait, name) for name in _PLAIN},

@@ -39,7 +39,7 @@ class Outputs:
 
     @property
     def traces(self) -> tuple[str, ...]:
-        """Every channel needed over time, each once."""
+        """Channels needed over time, for trajectories or bands, without duplicates."""
         return tuple(dict.fromkeys((*self.trajectories, *self.bands)))
 
 
@@ -116,7 +116,7 @@ class Axis:
 
 @dataclass(frozen=True, slots=True)
 class RandomValue:
-    """Path, and distribution of its values [SI]."""
+    """Varied path with the distribution of its values [SI]."""
 
     path: str
     distribution: Distribution
@@ -124,7 +124,7 @@ class RandomValue:
 
 @dataclass(frozen=True, slots=True)
 class SamplingPlan:
-    """Method, number of draws and seed; one draw, without a method, for a study without distributions."""
+    """Sampling plan: method, number of draws and seed; one draw without a method if there are no distributions."""
 
     method: SamplingMethod | None
     runs: int
@@ -137,7 +137,7 @@ NO_SAMPLE = "'sample' is missing: distributions need [sample] with method and ru
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Study:
-    """Configurations, each run at every grid point with every draw.
+    """Study: configurations, each of them run at every grid point with every draw.
 
     ``axes`` are grids and lists, ``drawn`` the paths with distributions, ``sample`` the sampling plan. ``same`` maps a
     path to the path whose values it shares. ``scores`` is the lower Cholesky factor of the correlation of the normal
@@ -186,11 +186,11 @@ class Study:
         return len(self.configurations) * self.runs_of_configuration
 
     def shown_for(self, scenario: Scenario) -> dict[str, str]:
-        """Return the display unit for each SI unit, for runs of a scenario: as given, else of the device."""
+        """Return the display unit by SI unit for a scenario: the units given in the study, else the device's units."""
         return {**scenario.device.shown, **chosen_units(f"0 {unit}" for unit in self.given.values())}
 
     def same_in(self, configuration: str) -> dict[str, str]:
-        """Return, for a configuration, the paths that share the values of another path, mapped to the latter."""
+        """Map each path that shares the values of another path to this other path, for one configuration."""
         return {path: other for path, other in self.same.items() if self.varies(path, configuration)}
 
     def varies(self, path: str, configuration: str) -> bool:
@@ -199,7 +199,7 @@ class Study:
 
 
 def with_followers(columns: Mapping[str, Any], same: Mapping[str, str]) -> dict[str, Any]:
-    """Return the columns, with an additional column for each path that follows one of them."""
+    """Return the columns, with a copy for each path that shares the values of another path."""
     return {**columns, **{path: columns[other] for path, other in same.items() if other in columns}}
 
 
@@ -240,7 +240,7 @@ def choose_configurations(
 
 
 def configurations_with(configurations: Sequence[Configuration], overrides: Iterable[str]) -> tuple[Configuration, ...]:
-    """Return configurations with overrides of all, or addressed to one as ``NAME:PATH=VALUE``.
+    """Apply overrides to all configurations, or to a single configuration if addressed as ``NAME:PATH=VALUE``.
 
     Raises StudyError for an address that no configuration has, and for an override that a configuration refuses.
     """
@@ -272,7 +272,7 @@ def configurations_with(configurations: Sequence[Configuration], overrides: Iter
 
 
 def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
-    """Return a scenario with overrides; StudyError if the scenario was changed in Python, which would be lost.
+    """Apply overrides to a scenario; StudyError if the scenario was changed in Python, which reloading would undo.
 
     A Python object that controls the scenario is kept.
     """

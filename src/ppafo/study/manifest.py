@@ -1,4 +1,4 @@
-"""``study.json``: definition of the computed study, checked when its folder is used again, and index for readers."""
+"""Manifest of study results (``study.json``): definition of the study, its runs and chunks, units of its columns."""
 
 import hashlib
 import json
@@ -38,7 +38,7 @@ _COMPARED = ("ppafo", "study", "scenarios", "varied", "drawn", "programs")
 
 
 def manifest(study: Study) -> dict[str, Any]:
-    """Return the manifest: study, base scenarios in SI units, runs, columns with units; without time and computer."""
+    """Return the manifest: study, base scenarios in SI units, runs, units of columns; without time and computer."""
     scenarios: dict[str, Any] = {}
     programs: dict[str, str] = {}
     for configuration in study.configurations:
@@ -177,7 +177,7 @@ class _StoredScenario(_Part):
 
 
 class _Stored(_Part):
-    """Guaranteed fields of the manifest; ``check_same_study`` compares it with the requested study."""
+    """Manifest as read from a folder: required fields, checked for consistency."""
 
     study: _StoredStudy
     scenarios: dict[str, _StoredScenario]
@@ -223,7 +223,7 @@ def check_same_study(folder: StudyFolder, stored: Mapping[str, Any], requested: 
 
 
 def _plain(document: Any) -> Any:
-    """Return a document as it is after writing and reading as JSON: lists for tuples."""
+    """Return a document after a round trip through JSON: tuples become lists."""
     return json.loads(json.dumps(document))
 
 

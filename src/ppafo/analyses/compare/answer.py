@@ -291,7 +291,7 @@ _MARKS = "osD^vP"
 _MAXIMUM_DOTS = 1500
 _BINS = 40
 _TICKS_OF_CHANGE = 4
-"""Largest number of intervals between ticks: labels such as -98.85 do not touch."""
+"""Largest number of tick intervals on the axis of the change, so that labels such as -98.85 do not touch."""
 _SHOWN_PERCENTILES = (0.5, 99.5)
 """Percentiles between which changes are plotted; a few distant ones would squeeze all others into one bar."""
 

@@ -26,7 +26,7 @@ from ppafo.study.runs import Rows, RunCounter, failures_of, scenario_runs, unvar
 from ppafo.wording import argument_text, first_twice, nearest_name, said_of_configuration
 
 AS_WRITTEN = "as written"
-"""Name of the task of configurations that run as written."""
+"""Task name of scenarios that run as written, without overrides of a task."""
 DEFAULT_DRAWS = 4096
 """Default number of draws of the uncertain values."""
 _SAME = 1.0e-9
@@ -175,7 +175,7 @@ def compared(
 
 
 def _check_different_values(study: Study, scenarios: Scenarios) -> None:
-    """Raise StudyError if the study draws one value for scenarios that have different ones."""
+    """Raise StudyError for a path that the study draws once for scenarios whose declared values differ."""
     for path in study.paths:
         # Orifices of different valves are meant to differ: what the study draws replaces the value of each.
         if path.startswith("valve.") or path == NOISE:

@@ -32,7 +32,7 @@ _WARMTH = Kind("Temperature of the bottle", "K", "temperature", ".1f")
 
 @dataclass(frozen=True, slots=True)
 class Endurance:
-    """Request for the duration of a bottle, and its result.
+    """Duration of a bottle for one gas demand: inputs and result.
 
     - ``bottle``: the bottle
     - ``draw``: gas demand

@@ -21,9 +21,9 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WALK_FORMAT
 
 WALK_FILE = "walk.json"
-"""File in the result folder of a walk that describes the walk."""
+"""Name of the file in a result folder that describes a walk."""
 _LEAST_GAS = -1.0e-12
-"""Lower limit of the gas use [kg], slightly negative because of rounding."""
+"""Lower limit of the gas use of a walk [kg], slightly negative because of rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ def walk_gas(result: WalkResult) -> WalkGas:
 
 
 def demand_of_walk(walk: WalkGas) -> GasDemand:
-    """Return the gas demand of a walk that continues; a stride is one of the leg with the device."""
+    """Return the gas demand of a walk that continues, per stride of the leg with the device or per task sequence."""
     if walk.gas_per_stride <= 0.0:
         raise DataError(
             f"walk '{walk.name}': takes no gas from the supply, so no bottle would become empty; give "

@@ -114,7 +114,7 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
 
 
 def _not_followed(outcome: FindResult) -> int:
-    """Return the number of values that meet the condition with a reference that is not followed."""
+    """Return the number of values that meet the condition although the run does not follow its reference."""
     return int(np.count_nonzero(~outcome.tried["follows"] & outcome.condition.is_kept(outcome.tried["judged"])))
 
 

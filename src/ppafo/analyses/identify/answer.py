@@ -30,13 +30,13 @@ from ppafo.units.shown import counted_from, in_units
 from ppafo.wording import count_of
 
 _FAR = 2.0
-"""Number of standard deviations above which a tolerance counts as contradicted."""
+"""Number of standard deviations above which a tolerance counts as contradicted by the recordings."""
 _SHOWN = 0.05
-"""Smallest share of a variance that is shown."""
+"""Smallest share of a variance that the report shows [-]."""
 _FAR_FROM_SET = 5.0
 """Ratio to the previous value above which a wrong unit is suspected: 6.89 is psi read as kPa, 8.85 N m as lbf in."""
 _ROW_HEAD = ("",) * 4
-"""Column heads of the rows of ``estimate_row``, which need none."""
+"""Empty column heads for the rows of ``estimate_row``."""
 _KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
 _CHANNELS = {
     "angle": (Kind("Vane angle", "rad", "angle"), ACTUAL),

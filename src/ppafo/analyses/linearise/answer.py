@@ -121,7 +121,7 @@ _LOWEST_SHARE = 0.1
 _HIGHEST_FREQUENCY = 100.0
 """Highest frequency of the plot [Hz]."""
 _LOOP_POINTS = slice(None, None, -20)
-"""Points of the open loop that are plotted, its last one included."""
+"""Points of the open loop that are plotted: every twentieth, counted back from the last."""
 _DRAWN_STEPS = (-5, -1)
 """Indices of the steps plotted over time: the middle of the three decades, and the largest step."""
 _REAL = 1.0e-6

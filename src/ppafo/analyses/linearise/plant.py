@@ -59,7 +59,7 @@ class _PlantValues(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LinearisedPlant:
-    """Plant of a run without controller and sensors.
+    """Plant of a run without controller and sensors, as a function of states and inputs.
 
     ``direction``: direction of a free vane, 0 if friction or a stop holds it; None if the ankle is prescribed, so that
         angle and angular velocity are inputs

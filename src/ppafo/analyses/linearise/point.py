@@ -173,7 +173,7 @@ def _steady(
     quantity: ControlledQuantity,
     level: float | None,
 ) -> dict[str, float] | None:
-    """Return a steady state with a level of a quantity [SI], or with the present command; None if none is found."""
+    """Return a steady state at a level of a quantity [SI], or at the present command; None if the search fails."""
     # Where the search begins: at the end of the run, then about the pressures that have the level.
     starts = [dict(values)]
     lowest = run.plant.atmospheric_pressure

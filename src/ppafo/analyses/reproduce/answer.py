@@ -103,8 +103,8 @@ def _paper_rows(reproduction: Reproduction) -> list[tuple[str, str, str, str]]:
 def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
     """Return the paper's claims as a finding.
 
-    It has not passed if a value is outside its window although no value was overridden. Figure 3 needs the simulated
-    test bench.
+    The finding has not passed if a value is outside its window although no value was overridden. Figure 3 needs the
+    simulated test bench.
     """
     sentences, missed, rows = [NOTHING_CONFIRMED], reproduction.missed, reproduction.readings_of_u
     if reproduction.overrides:

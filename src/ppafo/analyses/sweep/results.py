@@ -30,7 +30,7 @@ Columns = dict[str, np.ndarray[Any, Any]]
 
 @dataclass(frozen=True, slots=True, repr=False)
 class StudyResults:
-    """Results of a study.
+    """Results of a study in a folder, from which rows are read on demand.
 
     ``folder``: folder of the results
     ``document``, ``summary``: content of ``study.json`` and of ``summary.json``

@@ -35,7 +35,7 @@ DEFAULT_WIDTH = "1 %"
 PROBABILITY_WIDTH = "0.02"
 """Default width of the interval of a probability [-]."""
 FIRST_DRAWS = 256
-"""Number of draws before the first look."""
+"""Number of draws before the first interim estimate."""
 MOST_DRAWS = 2**20
 """Default maximum number of draws."""
 
@@ -120,7 +120,7 @@ def draw_until(
     seed: int,
     also: Sequence[str] = (),
 ) -> Finding[StatisticEstimate]:
-    """Draw from one stream until the stopping rule is met or its last look is reached.
+    """Draw from one stream until the stopping rule is met or its maximum number of draws is reached.
 
     A narrow interval from few draws is not sufficient. For a mean, drawing continues until an event of one run in 3,300
     would have been drawn, and until rarer events within 100 standard deviations of the mean cannot change the interval

@@ -35,7 +35,7 @@ _Metric = Annotated[Text, Field(description="name of a metric, such as 'rms_erro
 
 
 class SearchRange(StrictTable):
-    """Searched parameter: path, bounds with units, and linear or logarithmic spacing."""
+    """Section of a tuning file for a searched parameter: path, bounds with units, linear or logarithmic spacing."""
 
     path: Annotated[Text, Field(description="as for --set, such as 'controller.proportional_gain'")]
     minimum: _Value
@@ -44,7 +44,7 @@ class SearchRange(StrictTable):
 
 
 class GoalSection(StrictTable):
-    """Term of the objective, which is minimised: weight times metric divided by scale.
+    """Section of a tuning file for a term of the minimised objective: weight times metric divided by scale.
 
     A metric with a negative weight is maximised.
     """
@@ -57,7 +57,7 @@ class GoalSection(StrictTable):
 
 
 class Constraint(StrictTable):
-    """Upper or lower limit of a metric."""
+    """Section of a tuning file for a constraint: upper or lower limit of a metric."""
 
     metric: _Metric
     at_most: Annotated[Text | None, Field(description="largest value with its unit")] = None
@@ -65,7 +65,7 @@ class Constraint(StrictTable):
 
 
 class Robust(StrictTable):
-    """Robust tuning: all candidates run over the same draws from a study and are judged by their unfavourable end."""
+    """Section of a tuning file for robustness: candidates run over the same draws; the unfavourable end counts."""
 
     study: Annotated[Text, Field(description="name of a study, or a path relative to this file")]
     measure: Annotated[
@@ -78,7 +78,7 @@ class Robust(StrictTable):
 
 
 class SearchEffort(StrictTable):
-    """Effort of the search.
+    """Section of a tuning file for the effort of the search.
 
     ``starts``: number of independent starts
     ``generations``: maximum number of generations of each start
@@ -93,7 +93,7 @@ class SearchEffort(StrictTable):
 
 
 class TuningFile(StrictTable):
-    """Layout of a tuning file."""
+    """Tuning file: scenario, searched parameters, objective, constraints, robustness and effort."""
 
     schema_version: SchemaVersion
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
@@ -378,7 +378,7 @@ def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) ->
 
 
 def _spread(parsed: TuningFile, folder: Path, searched: Sequence[str], scenario: Scenario) -> Spread | None:
-    """Return the draws over which candidates are judged: of a study, of the noise, of both; None for neither."""
+    """Return the draws over which candidates are evaluated: of a study, of sensor noise, or of both; None without."""
     robust = parsed.robust
     if robust is None:
         noise = Uncertainty(()).with_noise_of([scenario])

@@ -26,14 +26,14 @@ MILLISECONDS = 1.0e3
 """Milliseconds per second."""
 _LOOKS = {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
 _NEAR_LIMIT = 0.25
-"""Ratio of the largest residual to the RMS limit above which the panel shows the limit; else it would be flat."""
+"""Least ratio of the largest residual to the RMS limit at which the panel shows the limit; else it would be flat."""
 _SHORT = 3.0
 """Duration [s] below which the time axis is in milliseconds."""
 
 _HEAD = ("channel", "RMS error", "in noise", "variation", "of range", "limit", "bias", "largest", "at", "verdict")
 """Column heads of the table of errors, in the order of ``channel_cells``."""
 _UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
-"""Characters replaced in file names."""
+"""Pattern of characters that are replaced in file names."""
 _WRITTEN_AS_ZERO = 5.0e-4
 """Absolute value below which a number is written as 0."""
 

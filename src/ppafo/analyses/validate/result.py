@@ -16,7 +16,7 @@ from ppafo.version import __version__
 from ppafo.wording import argument_text
 
 _EXPLAINS = 0.5
-"""Ratio of the residual with the nearest cause to the residual without any, up to which this cause is named."""
+"""Largest ratio of the residual with the nearest cause to the residual without a cause at which a cause is named."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ def verdict(validation: Validation) -> str:
 
 
 def _why(causes: Diagnosis, without: float, passes: bool) -> str:
-    """Return the cause of a residual, or the nearest one; empty if only noise is left.
+    """Return the cause of a residual in words, or the nearest cause; empty if only noise is left.
 
     ``without`` is the largest error divided by noise [-] without any cause. A nearest cause is named if it at least
     halves this error, or if it concerns wrong samples, which are detectable whatever else is wrong.

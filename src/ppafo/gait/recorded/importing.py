@@ -152,7 +152,7 @@ def _finish(
     remarks: Sequence[str],
     wrong: list[PpafoError],
 ) -> ImportedGait:
-    """Return the gait of the mean curves; raises DataError if any is implausible, with all problems in ``wrong``."""
+    """Return the import result of the mean curves; raises DataError, with all problems, if a curve is implausible."""
     taken, walk, settings, signs_from = strides.taken, footfalls.walk, source.settings, source.signs_from
     share, time = (float(np.mean([getattr(each, name) for each in taken])) for name in ("stance_share", "time"))
     means = {name: curve.mean for name, curve in curves.items()}
@@ -242,7 +242,7 @@ def _gait(
     curves: Mapping[str, Any],
     events: str,
 ) -> Gait:
-    """Return the gait with its series and its description of the source."""
+    """Build the gait from settings, source files, strides and the fitted curves."""
     origin: Origin = "measured" if all(table.kind == "measured" for table in tables) else "synthetic"
     names = ", ".join(Path(table.file).name for table in tables)
     return Gait(

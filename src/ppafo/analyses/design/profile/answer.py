@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9", BLACK, GREY)
-"""Colours of the valves, in their order."""
+"""Colours of the curves of the valves, in the order of the valves."""
 _RING = {"linestyle": "", "marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4}
-"""Ring around the suggested device."""
+"""Marker style of the ring around the suggested device."""
 PRESSURE = Kind("Supply pressure", "Pa_a", "pressure", ".3g")
 _TORQUE = Kind("Torque", "N m", "torque", ".3g")
 _GAS = Kind("Gas per repetition", "kg", "gas mass", ".3g")
@@ -144,7 +144,7 @@ class Sizing:
 
     @property
     def doubtful(self) -> tuple[tuple[Part, str], ...]:
-        """Quoted or assumed figures of the parts on which the result rests."""
+        """Quoted or assumed figures of parts on which the sizing rests, as pairs of part and figure name."""
         parts = [sized.valve for sized in self.valves] + [
             sized.bottle for sized in self.valves if sized.bottle is not None
         ]

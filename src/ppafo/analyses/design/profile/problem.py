@@ -28,7 +28,7 @@ _TORQUE = "N m"
 _ROUNDING = 1.0e-9
 """Fraction of the range of a profile below which a difference counts as rounding."""
 _MOMENT = 1.0e-5
-"""Time [s] for the step from the end of a repetition to the start of the next, if their torques differ."""
+"""Duration [s] of the torque step between two repetitions if the end differs from the start."""
 
 
 class ProfileSection(StrictTable):
@@ -45,7 +45,7 @@ class ProfileSection(StrictTable):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RequiredTorque:
-    """Period of a torque profile.
+    """Torque profile of one repetition: samples as given, and the table of knots that a run follows.
 
     ``time``, ``torque``: samples as given, times [s] from 0 and torques [N m]
     ``kind``: origin of the samples: ``measured``, ``simulated``, ``synthetic`` or ``typed``
@@ -79,7 +79,7 @@ class RequiredTorque:
         return np.asarray(np.interp(np.mod(time, self.period), times, values))
 
     def overrides(self) -> tuple[str, ...]:
-        """Return the overrides with which a scenario follows the table."""
+        """Return the scenario overrides that make the table the reference."""
         kind = ("reference.kind=tabulated", f"reference.level=0 {_TORQUE}", f"reference.period={self.period!r} s")
         times = enumerate(self.knot_times[1:].tolist(), 2)
         values = enumerate(self.knot_values.tolist(), 1)
@@ -175,7 +175,7 @@ class UseTable(StrictTable):
 
 
 class LimitsTable(StrictTable):
-    """Section of a sizing file: largest RMS error."""
+    """Section of a sizing file: limit of the RMS torque error."""
 
     rms_error: Annotated[Text, Field(description="largest RMS torque error: '0.5 N m', or '5 %' of the largest torque")]
 
@@ -197,7 +197,7 @@ class PressureTable(StrictTable):
 
 
 class SizingFile(StrictTable):
-    """Layout of a sizing file: design of a device that follows a torque profile."""
+    """Sizing file: design of a device that follows a torque profile."""
 
     schema_version: SchemaVersion
     name: Annotated[str, Field(pattern=NAME, max_length=100)]

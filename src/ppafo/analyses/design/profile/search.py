@@ -47,7 +47,7 @@ _SEED = 1
 _AT_ONCE = 16_384
 """Number of runs of a batch: enough to occupy all threads with little memory."""
 GRID = 17
-"""Number of pressures of a grid."""
+"""Number of supply pressures that are tried in each round of the search."""
 FINENESS = 0.1 * PASCALS_PER_PSI
 """Tolerance [Pa] of the lowest pressure."""
 WIDER = (2.0, 4.0, 16.0)
@@ -63,7 +63,7 @@ OPENINGS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05)
 
 
 Trial = NDArray[np.void]
-"""Trials as a structured array of ``TRIAL``."""
+"""Structured array of trials, with the fields of ``TRIAL``."""
 TRIAL = np.dtype([("pressure", np.float64), ("error", np.float64), ("gas", np.float64), ("gains", np.intp)])
 """Row of a trial: supply pressure [Pa absolute], RMS error [N m], gas per repetition [kg], index of the gain set.
 
@@ -91,7 +91,7 @@ class Trials:
         self._threads = threads
 
     def run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> Trial:
-        """Return trials of a valve at pressures [Pa absolute].
+        """Run trials of a valve at supply pressures [Pa absolute].
 
         Each trial has an index of a gain set in ``gains`` and a factor on the valve opening in ``opening`` [-].
         """
@@ -121,8 +121,8 @@ class Trials:
     def best(self, valve: Part, pressure: Floats, opening: float = 1.0) -> Trial:
         """Return for each pressure the trial with the best set of gains.
 
-        Among sets that keep the error limit it is the one with the least gas; otherwise the one with the smallest
-        error.
+        The best set uses the least gas of all sets that keep the error limit; if no set keeps the limit, it has the
+        smallest error.
         """
         sets = self.gain_sets.shape[0]
         pressures, gains = np.repeat(pressure, sets), np.tile(np.arange(sets), pressure.size)
@@ -196,7 +196,7 @@ def first_of(members: NDArray[np.bool_]) -> int | None:
 
 
 def limit_of(trials: Trials, valve: Part, tried: Trial) -> Limit:
-    """Return the quantity that keeps a valve from a lower pressure, or from working at all.
+    """Return the quantity that limits a valve at lower pressures, or at every pressure if no pressure is feasible.
 
     There is no limit if the lowest requested pressure works ('pressure'). The limit is the torque if the lowest
     feasible pressure is near ``ceiling_pressure``. Otherwise larger openings are tried halfway between these two

@@ -23,7 +23,7 @@ from ppafo.walking.wearer import STATURES, WEARER
 from ppafo.wording import argument_text
 
 WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regulators"}
-"""Walk configuration and its controller, by valve type."""
+"""Name of the walk configuration, with its controller, by kind of valve."""
 BODY_MASS_INDEX = 22.0
 """Body mass divided by the square of the stature [kg/m^2], for a wearer of unknown stature."""
 TOES = 0.01
@@ -227,7 +227,7 @@ class Alternative:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WearerSizing:
-    """Requirements, every device tried, and the sized device.
+    """Result of a sizing for a wearer: requirements, tried devices, and the sized device.
 
     ``healthy_toes``: toe clearance of the healthy gait [m]
     ``device``: lightest device that meets the requirements; None if there is none
@@ -250,7 +250,7 @@ class WearerSizing:
 
     @property
     def doubtful(self) -> list[tuple[Part, str]]:
-        """Quoted or assumed figures of these parts."""
+        """Quoted or assumed figures of the parts of the device, as pairs of part and figure name."""
         return [(part, name) for part in self.parts for name in part.doubtful]
 
     def json_document(self) -> dict[str, Any]:

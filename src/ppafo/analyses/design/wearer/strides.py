@@ -1,7 +1,7 @@
-"""A few strides with a valve and an actuator at a constant supply: torque, toe clearance and gas flow.
+"""Short walks with a valve and an actuator at constant supply: torque, toe clearance and gas flow.
 
-A torque controller receives the lowest requested torque that provides the required one. It lifts the foot earlier and
-harder if the toes would not clear the ground.
+A torque controller is given the lowest request with which the device provides the required torque. If the toes would
+not clear the ground, the foot is lifted earlier and with more torque.
 """
 
 from ppafo.analyses.design.wearer.requirements import WALKS, DesignRequirements, WalkedDevice
@@ -40,7 +40,7 @@ def of_wearer(requirements: DesignRequirements) -> tuple[str, ...]:
 
 
 def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -> list[WalkedDevice]:
-    """Return strides of a pair of parts that meet the required torque and toe clearance, else the nearest ones.
+    """Return strides of a pair of parts that meet the required torque and toe clearance, else the nearest strides.
 
     Nearest are the strides with the most torque, and the strides with the highest toes and enough torque: one or two
     results, none if no walk provides help.
