@@ -160,7 +160,7 @@ def json_schema() -> dict[str, Any]:
 
 
 NORMATIVE = "falisse2019-subject1"
-"""Default gait."""
+"""Name of the default gait."""
 
 _FILE = TomlKind(
     "gait",
@@ -204,7 +204,7 @@ def parse_gait(content: bytes, file: str) -> Gait:
 
 
 WRITTEN_UNITS: dict[str, str] = {"rad": "deg"}
-"""Units of angles in a gait file; every other curve is written in its SI unit."""
+"""Units of curves in a gait file by SI unit: degrees for angles; every other curve is in its SI unit."""
 
 _DIGITS = 12
 """Significant digits of a written coefficient; conversion from radians to degrees adds noise beyond these."""

@@ -82,7 +82,7 @@ class GaitCurve:
         return len(self.cosines)
 
     def value(self, phase: float) -> float:
-        """Return the value at a phase [strides]."""
+        """Return the value of the curve at a phase [strides]."""
         return float(self.values_at(phase))
 
     def derivative(self, stride_time: float) -> "GaitCurve":
@@ -99,7 +99,7 @@ class GaitCurve:
         )
 
     def values_at(self, phases: "ArrayLike") -> Floats:
-        """Return the values at an array of phases [strides]."""
+        """Return the values of the curve at an array of phases [strides]."""
         first_sine, first_cosine = sine_and_cosine(np.asarray(phases, dtype=np.float64))
         sine, cosine = first_sine, first_cosine
         # The mean in the shape of the phases, a number or an array.
@@ -158,7 +158,7 @@ class Gait:
 
     @property
     def curves(self) -> dict[str, GaitCurve]:
-        """Available curves by name, in the order of ``CURVES``."""
+        """Curves that the gait contains, by name, in the order of ``CURVES``."""
         return {name: curve for name in CURVES if (curve := getattr(self, name)) is not None}
 
     def curve(self, name: str) -> GaitCurve:

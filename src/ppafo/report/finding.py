@@ -34,7 +34,7 @@ MARK = "*"
 """Mark before a highlighted row of a table."""
 REPORT = "report.html"
 FORMATS = ("png", "svg")
-"""File formats of a figure in a folder."""
+"""File formats in which a figure is saved in a folder."""
 _UNIT_IN_BRACKETS = re.compile(r"\([^(]*\)$")
 _ORIGINS = {
     "simulated": "Every run is of the model; nothing on this page was measured.",
@@ -126,7 +126,7 @@ class Section:
 
     @property
     def has_head(self) -> bool:
-        """True if any column has a title."""
+        """True if any column of the table has a title."""
         return any(column.title for column in self.columns)
 
     @property

@@ -26,7 +26,7 @@ ORANGE = "#E69F00"
 PURPLE = "#A33F77"
 """Colours that are distinguishable with any kind of colour vision (Okabe and Ito, 2008)."""
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, BLACK, GREY)
-"""Order of the colours of several lines of the same kind."""
+"""Colours of several lines of the same kind, in order."""
 DASHES = MappingProxyType(
     {
         VERMILION: (0, (6, 1.5, 1.2, 1.5)),
@@ -38,7 +38,7 @@ DASHES = MappingProxyType(
 )
 """Dashes by colour, for lines of several colours, some of which are equal in greyscale; other colours are solid."""
 MARKERS = MappingProxyType({VERMILION: "s", GREEN: "^", ORANGE: "D", PURPLE: "v", BLACK: "P", GREY: "X"})
-"""Marker by colour; the default is a circle."""
+"""Marker of a data series by its colour; the default is a circle."""
 
 
 class DrawingStyle(NamedTuple):

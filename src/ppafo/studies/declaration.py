@@ -14,11 +14,11 @@ from ppafo.documents.problems import LABEL, NAME
 MAXIMUM_RUNS = 2**32
 """Largest number of draws: the period of a 32-bit Sobol sequence; no other method needs a lower limit."""
 MAXIMUM_RUNS_OF_CHUNK = 1_000_000
-"""Largest number of rows kept in memory until written to disk: about 100 MB for ten columns."""
+"""Largest number of runs of a chunk, whose rows stay in memory until written: about 100 MB for ten columns."""
 LARGEST_SEED = 2**32 - 1
 """Largest random seed (32 bits), exactly representable in a column of floats."""
 DEFAULT_SEED = 1
-"""Default seed of the draws."""
+"""Default random seed of the draws of a study."""
 MAXIMUM_GRID_VALUES = 1_000_000
 """Largest number of values of a grid axis; all of them are computed before the first run."""
 DEFAULT_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -60,7 +60,7 @@ class Listed(StrictTable):
 
 
 class Uniform(StrictTable):
-    """Uniform distribution between two bounds."""
+    """Uniform distribution of a varied path between two bounds."""
 
     path: _Path
     kind: Literal["uniform"]
@@ -80,7 +80,7 @@ class LogUniform(StrictTable):
 
 
 class Normal(StrictTable):
-    """Normal distribution."""
+    """Normal distribution of a varied path, given by mean and standard deviation."""
 
     path: _Path
     kind: Literal["normal"]

@@ -38,7 +38,7 @@ class Uncertainty:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Paths with a distribution."""
+        """Varied paths that have a distribution."""
         return tuple(drawn.path for drawn in self.drawn)
 
     def columns(self, uniform: Floats) -> Columns:

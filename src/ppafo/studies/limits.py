@@ -32,7 +32,7 @@ def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
 
 
 def check_fraction(value: float, name: str, least: float = 0.0) -> None:
-    """Raise StudyError for a number below ``least``, or not below 1."""
+    """Raise StudyError for a fraction below ``least`` or not below 1; ``name`` is its name in the message."""
     if not least <= value < 1.0:
         raise StudyError(f"{name} = {value!r}: must be at least {least:g} and less than 1")
 

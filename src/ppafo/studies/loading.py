@@ -1,4 +1,4 @@
-"""Loading of a study in SI units by name, file or plain data; each mistake gives a one-line error."""
+"""Loading of a study by name, file or plain data into SI units, with a one-line error for each mistake."""
 
 import copy
 from collections.abc import Iterable, Mapping, Sequence
@@ -123,7 +123,7 @@ def _load(
     draws: int | None = None,
     seed: int | None = None,
 ) -> Study:
-    """Return the study of a document, with changes, draws and seed from the command line written into the document."""
+    """Build a study from a document, into which changes, draws and seed from the command line are written."""
     tables = document.get("vary")
     for table in tables if isinstance(tables, list | tuple) else ():
         if isinstance(table, dict) and "same_as" in table:
@@ -157,7 +157,7 @@ class _StudySource:
 
 
 def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], _StudySource]:
-    """Read a study-like file, by name or path, or plain data; returns a modifiable document and its source."""
+    """Read a TOML file of a ``kind``, by name or path, or plain data; returns a modifiable document and its source."""
     if isinstance(named, Mapping):
         kind.check_depth(named, kind.noun)
         return copy.deepcopy(dict(named)), _StudySource(kind.noun, Path(), b"")
@@ -166,7 +166,7 @@ def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[
 
 
 def _build(parsed: declared.StudyFile, document: dict[str, Any], source: _StudySource) -> Study:
-    """Return the study of a file, with everything in SI units; StudyError for a study that cannot be run.
+    """Build the study of a parsed study file in SI units; StudyError for a study that cannot be run.
 
     ``document`` is the file as plain data, which the study keeps.
     """

@@ -53,7 +53,7 @@ NOISE_DRAWS = 512
 
 
 def uniform_numbers(sample: SamplingPlan, dimensions: int, first: int, count: int) -> Floats:
-    """Return numbers in (0, 1), shape (count, dimensions), for the draws from ``first`` on."""
+    """Return uniform random numbers in (0, 1), shape (count, dimensions), for the draws from ``first`` on."""
     if sample.method == "sobol":
         from scipy.stats import qmc
 

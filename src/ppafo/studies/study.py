@@ -23,7 +23,7 @@ from ppafo.wording import first_twice, nearest_name, override_text
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """Outputs of a study.
+    """Outputs of a study that are kept of every run.
 
     ``metrics`` are the names of metrics, ``trajectories`` the channels kept for every run, ``bands`` the channels kept
     as quantile bands; ``every`` is the time between two samples [s], ``quantiles`` are from 0 to 1. ``errors`` is true
@@ -44,7 +44,7 @@ class Outputs:
 
 
 def valid_outputs(outputs: declared.OutputsSection, scenarios: Sequence[Scenario]) -> Outputs:
-    """Return the outputs in SI units; StudyError for a name that does not exist."""
+    """Check the outputs of a study and convert them to SI; StudyError for an unknown metric or channel."""
     metrics = tuple(METRICS) if outputs.metrics == "all" else tuple(outputs.metrics)
     _check_names(
         "metrics", metrics, METRICS, dict.fromkeys(name for scenario in scenarios for name in offered(scenario))
@@ -100,7 +100,7 @@ SamplingMethod = Literal["random", "latin_hypercube", "sobol"]
 
 @dataclass(frozen=True, slots=True)
 class Configuration:
-    """Base scenario with its name in tables and figures."""
+    """Configuration of a study: base scenario, and its name in tables and figures."""
 
     name: str
     scenario: Scenario
@@ -108,7 +108,7 @@ class Configuration:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """Values of a grid or list [SI], in the order of the study file."""
+    """Varied path with the values of its grid or list [SI], in the order of the study file."""
 
     path: str
     values: tuple[float, ...]
@@ -132,7 +132,7 @@ class SamplingPlan:
 
 
 NO_SAMPLE = "'sample' is missing: distributions need [sample] with method and runs"
-"""Message for a study that is to be drawn but has no number of draws."""
+"""Error message for a study with distributions but without a number of draws."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -182,7 +182,7 @@ class Study:
 
     @property
     def runs(self) -> int:
-        """Number of all runs."""
+        """Number of runs of all configurations."""
         return len(self.configurations) * self.runs_of_configuration
 
     def shown_for(self, scenario: Scenario) -> dict[str, str]:
@@ -194,7 +194,7 @@ class Study:
         return {path: other for path, other in self.same.items() if self.varies(path, configuration)}
 
     def varies(self, path: str, configuration: str) -> bool:
-        """Tell whether a path is varied in a configuration."""
+        """Return True if a path is varied in a configuration."""
         return path not in self.only or configuration in self.only[path]
 
 

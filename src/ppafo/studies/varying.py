@@ -198,7 +198,7 @@ def _bounded(made: Callable[[float, float], Distribution], entry: Any, varied: V
 
 
 def _logarithmic(entry: declared.LogUniform | declared.LogNormal, varied: VariedPath) -> Distribution:
-    """Return a log-uniform or log-normal distribution; UnitError if the number may be 0."""
+    """Return a log-uniform or log-normal distribution; UnitError if its lower bound or median is not above 0."""
     # Of the absolute pressure: a gauge pressure may be 0 or below, where there is no logarithm.
     absolute = replace(varied, is_gauge=False)
     distribution: Distribution
@@ -261,7 +261,7 @@ _DISTRIBUTIONS: dict[str, Callable[[Any, VariedPath], Distribution]] = {
     "choice": _choice,
     "whole_numbers": partial(_bounded, WholeNumbersBetween),
 }
-"""Builder of each kind. To add one: a table in ``declaration``, a class in ``distributions``, a line here."""
+"""Builders of distributions by kind; a new kind needs a table in ``declaration`` and a class in ``distributions``."""
 
 
 def _bounds(entry: Any, varied: VariedPath) -> tuple[float, float]:

@@ -82,7 +82,7 @@ def chunk_count(study: Study) -> int:
 
 
 def chunk(study: Study, number: int) -> Chunk:
-    """Return the chunk with a number, counted over all configurations from 0."""
+    """Return a chunk by its number, counted over all configurations from 0."""
     size = chunk_size(study)
     configuration, index = divmod(number, -(-study.runs_of_configuration // size))
     first = index * size
@@ -114,6 +114,6 @@ def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
 
 
 def varied_columns(study: Study, configuration: Configuration, values: dict[str, Floats]) -> dict[str, Floats]:
-    """Return the varied values that apply to the runs of a configuration."""
+    """Return the columns of varied values that apply in a configuration, and of paths that share these values."""
     own = {path: column for path, column in values.items() if study.varies(path, configuration.name)}
     return with_followers(own, study.same_in(configuration.name))

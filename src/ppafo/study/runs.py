@@ -74,7 +74,7 @@ class Runs:
         self._parts: list[Rows] = []
 
     def run(self, columns: Mapping[str, Floats]) -> Rows:
-        """Return the rows of runs with these values [SI] by path, each column (runs,)."""
+        """Run the model with values [SI] by path, each column (runs,), and return the rows of metrics."""
         runs = len(next(iter(columns.values())))
         parts = []
         if not self._counter.done:
@@ -99,7 +99,7 @@ class Runs:
 
     @property
     def table(self) -> Rows:
-        """All rows so far, together with their columns of values."""
+        """Table of all runs so far: columns of varied values and of metrics."""
         return joined(self._parts) if self._parts else {}
 
     def check(self, rows: Rows, maximum_failed: float, subject: str, metrics: Sequence[str] = ()) -> None:
@@ -152,7 +152,7 @@ def unvaried(scenario: Scenario, runs: int) -> dict[str, Floats]:
 
 
 def joined(parts: Sequence[Rows]) -> Rows:
-    """Return the rows of several parts as one table, in order."""
+    """Concatenate tables of rows in order."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 

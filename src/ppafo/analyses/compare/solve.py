@@ -52,11 +52,11 @@ class DrawSettings:
 
     @property
     def count(self) -> int:
-        """Number of draws."""
+        """Number of draws of the uncertain values; ``DEFAULT_DRAWS`` if not requested."""
         return DEFAULT_DRAWS if self.requested is None else self.requested
 
     def check(self) -> None:
-        """Raise StudyError for numbers outside their ranges."""
+        """Raise StudyError for numbers of draws, confidence or failed runs outside their ranges."""
         if not FEWEST_DRAWS <= self.count <= MAXIMUM_DRAWS:
             raise StudyError(f"draws = {self.count!r}: must be at least {FEWEST_DRAWS} and at most {MAXIMUM_DRAWS:,}")
         check_fraction(self.confidence, *CONFIDENCE)
@@ -64,11 +64,11 @@ class DrawSettings:
 
 
 Scenarios = Mapping[tuple[str, str], Scenario]
-"""Scenarios by task and configuration."""
+"""Scenarios by name of the task and name of the configuration."""
 
 
 class _DrawnRuns(NamedTuple):
-    """Runs of a scenario over the draws.
+    """Runs of a scenario over the draws of the uncertain values.
 
     ``rows``: runs; None without draws
     ``renoised``: first runs repeated with other sensor noise; None without noise

@@ -110,7 +110,7 @@ MAXIMUM_INTERVALS = 2000
 SAMPLES = 1001
 """Number of samples of the recording of a discharge."""
 _RELATIVE, _ABSOLUTE = 1e-7, (1e-10, 1e-4, 1e-6, 1e-10, 1e-4, 1e-4)
-"""Tolerances of the solver: relative [-], and absolute for each component of the state, in its SI unit."""
+"""Tolerances of the ODE solver: relative [-], and absolute for each component of the state [SI]."""
 _ABOVE_FREEZING = 0.02
 """Temperature [K] above the cold end of the property table at which a run stops, to stay within the table."""
 
@@ -272,7 +272,7 @@ def _recording(bottle: Bottle, intervals: Sequence[_Interval]) -> Recording:
 
 
 def content_of(bottle: Bottle, mass: float, energy: float) -> BottleContent:
-    """Return the state of the bottle's content for a mass [kg] and an internal energy [J]."""
+    """Return the state of the content of the bottle for a mass [kg] and an internal energy [J]."""
     table = bottle.fluid.table
     return bottle_content(table, mass, bottle.volume, content_temperature(table, mass, bottle.volume, energy))
 

@@ -1,4 +1,4 @@
-"""Duration of a bottle for a gas demand: of given numbers, of a recording, or of a walk."""
+"""Duration of a bottle for a gas demand from given numbers, from a recording, or from a walk."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -38,7 +38,7 @@ LONGEST = 24.0 * 3600.0
 """Default of the longest simulated time [s]: one day."""
 WITHOUT_REST = Schedule(LONGEST, 0.0, LONGEST)
 GasUse = str | Path | Recording | WalkResult
-"""Gas use of a device: a walk or its folder, or a recording, its file or its folder."""
+"""Gas use of a device: a walk or its result folder, or a recording, its file or its folder."""
 
 
 def named_gas_uses(uses: Sequence[GasUse]) -> dict[str, GasUse]:

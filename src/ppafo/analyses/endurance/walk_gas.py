@@ -113,7 +113,7 @@ class _WalkFile:
     content: Mapping[str, Any]
 
     def table(self, name: str) -> Mapping[str, Any]:
-        """Return a table by name, {} if it is missing; raises DataError for any other type of value."""
+        """Return a table of the file by dotted path, {} if it is missing; DataError for any other type of value."""
         node = self.content
         for part in name.split("."):
             node = node.get(part, {})
@@ -122,7 +122,7 @@ class _WalkFile:
         return node
 
     def number(self, name: str, above: float) -> float:
-        """Return a number [SI]; raises DataError if it is missing, or not greater than ``above``."""
+        """Return a number [SI] of the file by dotted path; DataError if it is missing or not above ``above``."""
         node: Any = self.content
         for part in name.split("."):
             node = node.get(part) if isinstance(node, Mapping) else None

@@ -28,12 +28,12 @@ _PARTS = 32
 _STREAMS = 16
 """Number of noise streams for every value if sensors are noisy, the same for all values."""
 ACCURACY = 1.0e-6
-"""Width of the last bracket, as a fraction of the range."""
+"""Width of the last bracket, as a fraction of the range of values [-]."""
 _SEED = 1
-"""Seed of the noise streams."""
+"""Random seed of the noise streams."""
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 FOLLOWS = "follows"
-"""Condition that the run follows its reference, as ``simulate`` judges it."""
+"""Text of the condition that the run follows its reference, by the verdict of ``simulate``."""
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 

@@ -10,7 +10,7 @@ from ppafo.report.finding import Finding, columns_of
 from ppafo.report.kind import Kind
 
 _WIDTH = 110
-"""Line length of the notes of a catalogue, in characters."""
+"""Line length of the printed notes of a catalogue [characters]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -88,7 +88,7 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
 
 
 def _agrees(low: float | None, high: float | None, unit: str) -> str | None:
-    """Return in words the range of values that agrees with a claim."""
+    """Format the range of values that agrees with a claim as text."""
     if low is not None and high is not None:
         return f"{low:g} to {high:g} {unit}".rstrip()
     if low is not None:
@@ -140,7 +140,7 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
 
 
 def _figures(reproduction: Reproduction) -> list[Section]:
-    """Return the figures of the page, each drawn on demand."""
+    """Return the figures of the reproduction page as sections, each drawn on demand."""
     supply = reproduction.step.scenario.device.supply
     levels = SupplyLevels(supply.pressure, supply.atmospheric_pressure)
     stated = {claim.id: claim.paper or 0.0 for claim in reproduction.claims}

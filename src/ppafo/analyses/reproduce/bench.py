@@ -44,7 +44,7 @@ class AssumedValue:
     used_by: tuple[str, ...]
 
     def sentence(self) -> str:
-        """Return value and reason on one line."""
+        """Format the assumed value and its reason as one line."""
         source = f" ({self.source})" if self.source else ""
         return f"{self.path} = {self.value}: {self.reason}{source}"
 

@@ -40,7 +40,7 @@ _SHOWN_AFTER_STOP = 0.8
 _ENLARGED = 40.0
 """Time after the step that is shown enlarged [ms]."""
 _BIN = 3.0
-"""Interval [ms] over which the band of a measurement reaches from the smallest to the largest reading."""
+"""Interval [ms] for the band from the smallest to the largest reading of a measurement."""
 _CURVES = (
     ("Vane angle", "Angle", "deg", ACTUAL.colour, (0.66, 0.36, 0.31, 0.34)),
     ("Pressure difference, $P_1 - P_2$", "Difference", "psi", ACTUAL.colour, (0.69, 0.14, 0.29, 0.34)),

@@ -27,16 +27,16 @@ from ppafo.wording import argument_text, nearest_name
 
 DEVICE = "ppafo2011"
 MINUTES = 0.5
-"""Minutes of a walk; without noise the strides repeat, so that longer walks give the same result."""
+"""Duration of a walk [min]; without noise the strides repeat, so that longer walks give the same result."""
 PAIR, RECYCLING = "solenoid", "solenoid-recycling"
 """Names of the walks with direct event control and with recycling."""
 KEEPS_GAIT = "wearer.keeps_gait=1"
-"""Override for a nondisabled wearer, whose muscles keep the measured ankle angle."""
+"""Override of a walk for a nondisabled wearer, whose muscles keep the measured ankle angle."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Computation:
-    """Computation of a value: SI unit, arguments with their SI units, and function."""
+    """Computation of the value of a claim: SI unit, arguments with their SI units, and function."""
 
     unit: str
     arguments: Mapping[str, str]
@@ -220,7 +220,7 @@ SEED, ALL = PAPER, "all"
 
 @dataclass(frozen=True, slots=True)
 class JudgedClaim:
-    """Claim of a publication with the verdict and our value in its unit; None if nothing is computed."""
+    """Claim of a publication with the verdict and the computed value in its unit, None if it cannot be computed."""
 
     claim: _PublishedClaim
     value: float | None
@@ -240,7 +240,7 @@ class JudgedClaim:
 
     @property
     def note(self) -> str:
-        """Reason of the verdict."""
+        """Reason for the verdict, or reason why the claim cannot be tested."""
         return self.claim.entry.note or self.claim.entry.not_testable
 
     def document(self, study: str) -> dict[str, Any]:

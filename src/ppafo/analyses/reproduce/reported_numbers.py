@@ -49,7 +49,7 @@ class ReportedSet:
         return self._known(path, self.parameter_set.numbers.get(path))
 
     def quotation(self, path: str) -> str:
-        """Return number and unit for use in a sentence, for example ``8.4 g m^2``."""
+        """Return reported number and unit for use in a sentence, for example ``8.4 g m^2``."""
         entry = self.entry(path)
         return f"{entry.value:g} {entry.unit}".rstrip()
 
@@ -70,7 +70,7 @@ class ReportedSet:
         return self._known(path, self.evidence.magnitude(path))
 
     def gas(self) -> Gas:
-        """Return the reported gas."""
+        """Return the gas properties as reported in the paper."""
         return self._known("gas", self.evidence.gas())
 
     def _known(self, path: str, value: T | None) -> T:

@@ -60,7 +60,7 @@ def torque_task_claims(
 
 
 def _claim_over_phases(identifier: str, values: Floats, decimals: int, note: str, rests_on: tuple[str, ...]) -> Claim:
-    """Return a claim on the median of values (runs,), in its unit, with the window of the task as criterion."""
+    """Return a claim on the median of values (runs,), in the unit of the claim, judged by the window of the claim."""
     entry = paper_entries()[identifier]
     assert entry.at_least is not None, f"{identifier} has a window"
     assert entry.at_most is not None, f"{identifier} has a window"
@@ -148,14 +148,14 @@ DEAD_ZONE = (
     "controller.release=0.05 N m",
     "controller.opening=1",
 )
-"""On-off law with a dead zone narrower than the torque resolution of the solenoid pair within one sample."""
+"""Overrides for an on-off law with a dead zone narrower than the torque change of the solenoid pair in one sample."""
 FASTER = ("controller.rate=100 Hz", "valve.switching_interval=10 ms")
 """Overrides for five times the printed switching rate of 20 Hz, which limits the switching interval in the set."""
 _RESTS_ON = ("the torque task as completed here",)
 
 
 def control_claims(solenoid: Result, proportional: Result, pair_errors: Floats) -> list[Claim]:
-    """Return the claims on switching rate, gains, dead zone and improved control, all of them undetermined here.
+    """Return the claims on switching rate, gains, dead zone and improved control, all with the verdict undetermined.
 
     ``pair_errors`` are the RMS errors [N m] of the solenoid pair over the unknown phase of its decisions.
     """

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _NEGLIGIBLE = 0.01
-"""Fraction of the largest index below which a value counts as negligible."""
+"""Fraction of the largest index below which the influence of a value counts as negligible."""
 _INCHES_OF_A_BAR = 0.27
 """Height of the row of a varied value in a panel [inches]."""
 _MAXIMUM_LINES = 5

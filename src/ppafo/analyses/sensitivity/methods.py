@@ -23,7 +23,7 @@ _INNER = 3
 _SMALLEST = 2.0**-53
 """Smallest fraction of a draw; normal scores are finite from this fraction to 1 minus this fraction."""
 _ONE = 0.6827
-"""Confidence level of one standard deviation."""
+"""Confidence level of an interval of plus and minus one standard deviation."""
 _NEAREST = 0.2
 """Fraction of the runs, nearest to an end of a value, to which the parabola is fitted."""
 
@@ -222,7 +222,7 @@ The values are added in random orders: each value gets its increase of the varia
 values of the order are fixed (Song, Nelson and Staum, 2016). Fixed values are drawn from the Gaussian copula.
 """
 METHODS = {method.name: method for method in (SOBOL, SHAPLEY)}
-"""Methods by name. To add a method: its design, its indices, and its entry here."""
+"""Methods of sensitivity analysis by name; a new method needs a design, indices, and an entry here."""
 
 
 def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floats]:

@@ -79,7 +79,7 @@ class MetricSensitivity:
 
     @property
     def indices(self) -> Indices:
-        """Sensitivity indices from all blocks."""
+        """Sensitivity indices of the metric from all blocks."""
         last = self.settling[-1]
         values, bands = (
             {name: np.array(numbers) for name, numbers in by_name.items()} for by_name in (last.indices, last.bands)

@@ -46,7 +46,7 @@ class _Described(BaseModel, strict=True):
 
 
 class _Failure(BaseModel, strict=True):
-    """Failed run, with the reason."""
+    """Failed run of a study in its summary, with the reason of the failure."""
 
     run: _Count
     configuration: str

@@ -29,11 +29,11 @@ MOST_METRICS = 9
 MAXIMUM_DRAWN = 4_000_000
 """Largest number of runs in a figure, spread evenly over all; printed statistics use all runs."""
 _COLUMNS = 2
-"""Number of panels side by side."""
+"""Number of panels side by side in a figure."""
 _PANEL, _COMPARED_PANEL = (2.9, 2.4), (2.7, 2.3)
 """Width and height of a panel [inches], and of a panel in a row that compares configurations."""
 _HISTOGRAM_BINS = 60
-"""Largest number of bins of a histogram."""
+"""Largest number of bins in the histogram of a metric."""
 _MAXIMUM_POINTS = 3000
 """Largest number of runs in a curve or in the points of a panel."""
 _MEDIAN = 0.5
@@ -42,7 +42,7 @@ _OPACITIES = (0.18, 0.32, 0.45)
 _GRIDDED = ("grid", "list")
 """Kinds of ``[[vary]]`` entries that form a full grid with each other."""
 _NAMED = 3
-"""Number of varied values in a title."""
+"""Largest number of varied values named in the title of a figure."""
 _CAPTION = (
     "Distributions of the metrics, their dependence on the varied values, and quantiles over time where requested."
 )

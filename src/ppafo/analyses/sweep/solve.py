@@ -61,7 +61,7 @@ QUANTILE_DEFINITION = (
     "value at place (n - 1) q of the n sorted values, on a line between neighbours (Hyndman and Fan 1996, definition 7)"
 )
 MAXIMUM_IN_MEMORY = 16_000_000
-"""Number of samples of a channel from which bands are computed at once."""
+"""Largest number of samples of a channel in memory when quantile bands are computed."""
 Parts = Callable[[], Iterator[Floats]]
 """Function that yields the finite values of a column, in parts of constant order at every call."""
 

@@ -61,7 +61,7 @@ def task_panels(before: GainResult, after: GainResult) -> list[Panel]:
 
 
 def _traces(channel: str, before: GainResult, after: GainResult) -> list[Mark]:
-    """Return the marks of a channel over time, before and after."""
+    """Return the curves of a channel over time, with the gains before and after tuning."""
     style = {"linewidth": 1.3, "drawstyle": "steps-post" if channel == "command" else "default"}
     marks = []
     for setting, colour, label in ((before, VERMILION, "before"), (after, BLUE, "after")):

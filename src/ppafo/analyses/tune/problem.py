@@ -1,4 +1,4 @@
-"""Tuning problem: layout of its file, and loading from a name, a file or plain data into SI units."""
+"""Tuning problem: layout of a tuning file, and loading from a name, a file or plain data into SI units."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -29,7 +29,7 @@ from ppafo.wording import first_twice
 
 LARGEST_SEED = 2**32 - 1
 MAXIMUM_DRAWS = 4096
-"""Largest number of draws for each candidate."""
+"""Largest number of draws over which each candidate of a tuning runs."""
 _Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
 _Metric = Annotated[Text, Field(description="name of a metric, such as 'rms_error'")]
 
@@ -121,7 +121,7 @@ Gains = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True)
 class SearchedParameter:
-    """Searched parameter of a tuning problem.
+    """Searched parameter of a tuning problem, with its bounds and its value before tuning.
 
     ``path``: dotted path
     ``minimum``, ``maximum``: bounds [SI]
@@ -138,12 +138,12 @@ class SearchedParameter:
     place: VariedPath
 
     def value(self, fraction: Floats) -> Floats:
-        """Return values [SI] at fractions of the range from minimum to maximum."""
+        """Return values of the parameter [SI] at fractions of its range from minimum to maximum."""
         between = LogUniformBetween if self.is_logarithmic else UniformBetween
         return between(self.minimum, self.maximum).values(fraction)
 
     def fraction(self, value: float) -> float:
-        """Return the fraction of the range at which a value lies; below 0 or above 1 beyond the bounds."""
+        """Return the position of a value [SI] in the range, from 0 to 1; below 0 or above 1 beyond the bounds."""
         if self.is_logarithmic:
             return math.log(value / self.minimum) / math.log(self.maximum / self.minimum) if value > 0.0 else -math.inf
         return (value - self.minimum) / (self.maximum - self.minimum)
@@ -167,7 +167,7 @@ class ObjectiveTerm:
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Draws over which candidates are judged, and the statistic of the result.
+    """Draws over which candidates are evaluated, and the statistic of their metrics that counts.
 
     ``uncertainty``: distributions of the uncertain values
     ``study``: name of the study; empty if only sensor noise is drawn
@@ -185,7 +185,7 @@ class Spread:
 
     @property
     def measure(self) -> str:
-        """Statistic by which candidates are judged, in words."""
+        """Statistic by which candidates are evaluated, in words."""
         if self.fraction is not None:
             return f"{100.0 * self.fraction:g} % quantile"
         if self.deviations == 0.0:
@@ -265,7 +265,7 @@ class Problem:
         return {gain.path: gain.place.level(gain.place.quote(values[gain.path])) for gain in self.searched}
 
     def lines(self, gains: Gains) -> list[str]:
-        """Return gains as overrides, ``PATH=VALUE``."""
+        """Format gains as overrides, ``PATH=VALUE``."""
         return [f"{gain.path}={gain.place.quote(gains[gain.path])}" for gain in self.searched]
 
 

@@ -117,7 +117,7 @@ class GainResult:
 
 @dataclass(frozen=True, slots=True)
 class Tuned:
-    """Result of a tuning, in SI units.
+    """Result of a tuning: gains before and after, starts of the search, and remarks; numbers in SI units.
 
     ``overrides``: overrides that turn the scenario of the tuning file into the tuned one
     ``bounds_reached``: gains that ended at a bound, with the bound; a better value may lie beyond

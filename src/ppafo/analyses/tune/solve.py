@@ -57,7 +57,7 @@ Costs = Callable[[Floats], Floats]
 
 
 def solve_tuning(problem: Problem, threads: int | None, progress: Report | None) -> Tuned:
-    """Return the result of a tuning: search, and evaluation of the gains before and after."""
+    """Solve a tuning problem: search for gains, and evaluation of the gains before and after."""
     spread = problem.spread
     metrics = with_companions(problem.metrics, problem.scenario)
     runs = scenario_runs(

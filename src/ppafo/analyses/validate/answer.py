@@ -35,7 +35,7 @@ _HEAD = ("channel", "RMS error", "in noise", "variation", "of range", "limit", "
 _UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
 """Pattern of characters that are replaced in file names."""
 _WRITTEN_AS_ZERO = 5.0e-4
-"""Absolute value below which a number is written as 0."""
+"""Absolute value below which a number in the table of errors is written as 0."""
 
 
 def panels_across(agreement: RecordingAgreement) -> int:
@@ -182,5 +182,5 @@ def _error(channel: ChannelAgreement, value: float) -> str:
 
 
 def _number(value: float) -> str:
-    """Return a number as text with three digits, or 0."""
+    """Format a number with three digits, or as 0."""
     return "0" if abs(value) < _WRITTEN_AS_ZERO else f"{value:.3g}"

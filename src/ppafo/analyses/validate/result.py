@@ -21,7 +21,7 @@ _EXPLAINS = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Validation:
-    """Validation of a parameter set against recordings.
+    """Result of the validation of a parameter set against recordings.
 
     ``device``: device of the set after the ``overrides``
     ``settings``: settings of the replay
@@ -38,7 +38,7 @@ class Validation:
 
     @property
     def passes(self) -> bool:
-        """True if every error is within its limit; causes do not affect the verdict."""
+        """True if every RMS error is within its limit; causes of the residual do not affect the verdict."""
         return all(recording.passes for recording in self.recordings)
 
     def json_document(self) -> dict[str, Any]:
@@ -146,7 +146,7 @@ def _cause_data(cause: ResidualCause | None) -> dict[str, Any] | None:
 
 
 def kind_of_channel(channel: ChannelAgreement) -> Kind:
-    """Return unit and format of the errors of a channel, which are differences."""
+    """Return display unit and number format of the errors of a channel, which are differences."""
     return Kind("", "", COMPARED[channel.channel].quantity)
 
 

@@ -195,7 +195,7 @@ _LIMITS = (
 
 @in_units(lambda comparison: comparison.with_device.scenario.device.shown)
 def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
-    """Return the report of a walk with and without the device.
+    """Return the comparison of a walk with and without the device as a finding.
 
     A walk that diverged has numbers but no figures, and the report has not passed.
     """

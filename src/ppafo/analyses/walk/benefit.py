@@ -34,7 +34,7 @@ _STIFFER = (2.0, 4.0)
 _NEARLY = 0.95
 """Ratio of a torque to its limit from which the limit counts as reached [-]."""
 _MINUTES = 0.15
-"""Minutes of a walk with a remedy: a few strides after the transient."""
+"""Duration of a walk with a remedy [min]: a few strides after the transient."""
 
 
 def benefit_sentence(comparison: WalkComparison) -> str:

@@ -18,7 +18,7 @@ from ppafo.wording import one_line
 LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
 """Curves that are undefined while the foot is off a force plate, which does not count as a gap."""
 _MOST_NAMES, _LONGEST_TEXT = 12, 160
-"""Limits of a message: number of column names, and characters of the names and of a remark."""
+"""Limits of an error message: number of column names, and characters of the names and of a remark."""
 _COORDINATES = (".x", ".y", ".z")
 """Suffixes of the column names of a marker's coordinates."""
 

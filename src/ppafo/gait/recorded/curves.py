@@ -16,7 +16,7 @@ from ppafo.gait.recorded.signal import Signal
 from ppafo.signals.recording import Floats
 
 SAMPLES = 101
-"""Samples of a time-normalised curve, both ends of the stride included."""
+"""Number of samples of a time-normalised curve, both ends of the stride included."""
 PHASES = np.linspace(0.0, 1.0, SAMPLES)
 """Phases [strides] of a time-normalised curve, from 0 to 1."""
 REMARKED_SPREAD, REFUSED_SPREAD = 0.1, 0.25

@@ -22,7 +22,7 @@ from ppafo.gait.recorded.table import OFF, STRIKE, MotionTable
 from ppafo.wording import count_of
 
 FORCE, SHANK, FILE = "vertical_force", "shank_angle", "events of the file"
-"""Sources of strides."""
+"""Names of the sources of strides: vertical force, shank angle, and events stored in the file."""
 LEAST_STRIDES = 2
 """Default of the smallest number of strides; 1 for a walk across a force plate and for a single cycle."""
 _SMOOTH = 6.0

@@ -43,7 +43,7 @@ from ppafo.wording import count_of
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImportedGait:
-    """Result of the import of a gait.
+    """Imported gait with the strides, curves and fit errors behind it.
 
     ``strides`` are the strides used and ``left_out`` the strides rejected. ``curves`` holds the single strides by curve
     name, ``fit_errors`` the errors of the Fourier series. ``events`` is the source of the strides: ``vertical_force``,
@@ -64,7 +64,7 @@ class ImportedGait:
 def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> ImportedGait:
     """Return the mean stride of one walk of one person, from recorded files that share a clock.
 
-    The files may be of any format of ``reading.FORMS``: .mot, .sto, .csv, .txt, .tsv, .emt, .c3d, .trc, .mat.
+    The files may be of any format of ``source.FORMS``: .mot, .sto, .csv, .txt, .tsv, .emt, .c3d, .trc, .mat.
 
     Strides come from the vertical force if available, otherwise from events of the file or from the shank. Raises a
     DataError that lists all problems with file, column, row and remedy: after a problem with one curve, the other

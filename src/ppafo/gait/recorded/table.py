@@ -43,7 +43,7 @@ class TrialData:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionTable:
-    """Columns over time [s] as stored in a file; a unit is empty if the file does not state it.
+    """Motion recording: columns over time [s] as stored in a file; a unit that the file does not state is empty.
 
     ``form`` is the name of the file format, set by the caller of the reader. ``kind`` is ``measured`` or ``synthetic``.
     ``remarks`` describe repairs, ``trial`` holds data on subject and events.

@@ -48,7 +48,7 @@ _UNITS = {
 }
 """SI units of the curves in a gait map, with the package's own unit first."""
 _POSITIVE = ("ankle_in_front", "plantarflexion", "up", "forward")
-"""Positive directions in the package."""
+"""Directions in a gait map that are positive in this package too."""
 
 MappedCurve = ShankMap | AngleMap | MomentMap | ForceMap | PressureMap
 """Entry of a gait map for a single curve; the knee, with two curves, is separate."""
@@ -62,7 +62,7 @@ def walk_signals(
     is_default: bool,
     wrong: list[PpafoError],
 ) -> dict[str, Signal]:
-    """Return the signals that a map finds in tables; all problems with their columns are added to ``wrong``.
+    """Return the signals of a recorded walk by curve; problems with their columns are added to ``wrong``.
 
     Loads are divided by ``body_mass`` [kg] or by the body weight; ``stature`` [m] gives the length of the thigh.
 

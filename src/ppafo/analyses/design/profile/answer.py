@@ -35,7 +35,7 @@ _TORQUE = Kind("Torque", "N m", "torque", ".3g")
 _GAS = Kind("Gas per repetition", "kg", "gas mass", ".3g")
 _MASS = Kind("Mass", "kg", "part mass")
 _MAXIMUM_OF_LIMIT = 4.0
-"""Top of the error axis divided by the error limit; larger errors are not resolved."""
+"""Upper end of the error axis divided by the error limit; larger errors are not plotted."""
 _DOTTED = {"marker": ".", "markersize": 4}
 _HEAD = (
     "valve",
@@ -139,7 +139,7 @@ class Sizing:
 
     @property
     def choice(self) -> SizedValve | None:
-        """Suggested valve; None if there is none."""
+        """Sizing result of the suggested valve; None without a suggestion."""
         return None if self.suggested is None else self.valves[self.suggested]
 
     @property
@@ -152,7 +152,7 @@ class Sizing:
         return tuple((part, name) for part in unique for name in part.doubtful)
 
     def json_document(self) -> dict[str, Any]:
-        """Return the valves and the suggestion as plain data in SI."""
+        """Return the sized valves and the suggestion as plain data in SI."""
         problem = self.problem
         return {
             "format": "ppafo sizing",

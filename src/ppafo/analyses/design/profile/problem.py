@@ -60,21 +60,21 @@ class RequiredTorque:
 
     @property
     def period(self) -> float:
-        """Length of a repetition [s]."""
+        """Duration of a repetition of the profile [s]."""
         return float(self.time[-1])
 
     @property
     def table_error(self) -> float:
-        """Largest difference between the table and the given samples [N m]."""
+        """Largest difference between the table of knots and the given samples [N m]."""
         return float(np.max(np.abs(self.at(self.time[:-1]) - self.torque[:-1])))
 
     @property
     def largest(self) -> float:
-        """Largest absolute torque of the table [N m]."""
+        """Largest absolute torque of the table of knots [N m]."""
         return float(np.max(np.abs(self.knot_values)))
 
     def at(self, time: Floats) -> Floats:
-        """Return the torque of the table [N m] at times [s] from 0 on."""
+        """Return the torque of the repeated table of knots [N m] at times [s] from 0 on."""
         times, values = np.append(self.knot_times, self.period), np.append(self.knot_values, self.knot_values[0])
         return np.asarray(np.interp(np.mod(time, self.period), times, values))
 
@@ -91,7 +91,7 @@ class RequiredTorque:
 
 
 def read_profile(table: ProfileSection, folder: Path, file: str) -> RequiredTorque:
-    """Return the profile of a design file; a recording's path is relative to ``folder``."""
+    """Read the torque profile of a design file; the path of a recording is relative to ``folder``."""
     where = f"{file}: profile"
     is_typed = bool(table.time or table.torque)
     if is_typed == (table.recording is not None):
@@ -270,12 +270,12 @@ class SizingProblem:
 
     @property
     def carried(self) -> tuple[Part, ...]:
-        """Parts carried in addition to valve and bottle."""
+        """Parts that a wearer carries in addition to valve and bottle."""
         return self.regulators if self.actuator is None else (*self.regulators, self.actuator)
 
     @property
     def hours(self) -> float:
-        """Duration of all repetitions without a pause [h]."""
+        """Duration of all repetitions of the profile without a pause [h]."""
         return self.repetitions * self.profile.period / _SECONDS_PER_HOUR
 
 
@@ -343,7 +343,7 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
 
 
 def _scenario(document: SizingFile, profile: RequiredTorque, folder: Path, file: str) -> Scenario:
-    """Return the scenario with the profile as its reference, for all repetitions in whole samples."""
+    """Load the scenario with the profile as its reference; it ends with a whole controller and output sample."""
     name = beside(document.scenario, folder)
     plain = load_scenario(name, document.overrides)
     plain.device.check_torque_constant("the size of a device")

@@ -35,23 +35,23 @@ LIMITS: dict[Limit, str] = {
     "control": "the control: neither more pressure nor a larger opening would suffice",
     "pressure": "nothing: the lowest requested pressure suffices",
 }
-"""Limiting quantity of a valve, in words."""
+"""Quantities that limit a valve, each with its description in words."""
 ERROR, GAS = "rms_error", "gas_supplied"
 OSCILLATES = "the torque loop oscillates"
 _OPENINGS = ("valve.area", "valve.sonic_conductance")
 
 STREAMS = 16
-"""Number of noise streams of every trial, the same for all, if sensors are noisy."""
+"""Number of noise streams of each trial if sensors are noisy; the streams are the same for all trials."""
 _SEED = 1
-"""Seed of the sensor noise, the same for every pressure."""
+"""Random seed of the noise streams, the same for every pressure."""
 _AT_ONCE = 16_384
 """Number of runs of a batch: enough to occupy all threads with little memory."""
 GRID = 17
 """Number of supply pressures that are tried in each round of the search."""
 FINENESS = 0.1 * PASCALS_PER_PSI
-"""Tolerance [Pa] of the lowest pressure."""
+"""Tolerance [Pa] of the lowest feasible supply pressure."""
 WIDER = (2.0, 4.0, 16.0)
-"""Factors [-] on the opening with which the flow is tested as the limit."""
+"""Factors [-] on the valve opening that show whether the flow is the limit."""
 NEAR_CEILING = 1.2
 """Ratio [-] of lowest gauge pressure to ceiling gauge pressure up to which the torque counts as the limit."""
 LEAST_PEAK = 0.7
@@ -73,7 +73,7 @@ Error and gas are nan if a run failed or oscillated.
 
 @final
 class Trials:
-    """Runner of the trials of a problem, which counts runs and failures.
+    """Runner of the trials of a sizing problem, which counts runs and failures.
 
     ``gain_sets`` (sets, gains): every combination of the gain factors
     ``seeds``: noise streams of every trial, the same for all; empty without noise
@@ -169,7 +169,7 @@ def highest_pressure(problem: SizingProblem, valve: Part) -> float:
 
 
 def try_pressures(trials: Trials, valve: Part) -> Trial:
-    """Return the best trial of a valve at each pressure; the lowest feasible pressure is within 0.1 psi."""
+    """Search the lowest feasible pressure of a valve to 0.1 psi; returns the best trial at each pressure tried."""
     problem = trials.problem
     tried = trials.best(valve, np.linspace(problem.lowest_pressure, highest_pressure(problem, valve), GRID))
     if np.isnan(tried["error"]).all():
