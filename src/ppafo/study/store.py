@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.documents.json_text import json_text
+from ppafo.engine.lanes import Count, count_nothing
 from ppafo.errors import DataError, ScenarioError, StudyError, refused_as
 from ppafo.metrics import METRICS
 from ppafo.signals.recording import CHANNELS
@@ -166,11 +167,13 @@ def check_types(table: "pa.Table", name: str) -> None:
             )
 
 
-def compute_chunk(study: Study, number: int, threads: int | None) -> tuple[FinishedChunk, bytes]:
+def compute_chunk(
+    study: Study, number: int, threads: int | None, count: Count = count_nothing
+) -> tuple[FinishedChunk, bytes]:
     """Return the content of a chunk file, not yet written: a row per run in SI units, nan for missing values."""
     part = chunk(study, number)
     values = drawn_values(study, np.arange(part.first, part.first + part.runs))
-    result = _result(study, part, values, threads)
+    result = _result(study, part, values, threads, count)
     columns = {
         **_columns_of_runs(study, part, values),
         **_columns_of_endings(study, part, values, result),
@@ -253,7 +256,13 @@ def note_file(number: int) -> str:
     return f"finished/chunk-{number:07d}.json"
 
 
-def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int | None) -> EnsembleResult:
+def _result(
+    study: Study,
+    part: Chunk,
+    values: dict[str, Floats],
+    threads: int | None,
+    count: Count = count_nothing,
+) -> EnsembleResult:
     """Return the results of a chunk with varied ``values`` [SI] by path; StudyError for a path that cannot vary."""
     configuration, outputs = study.configurations[part.configuration], study.outputs
     columns = varied_columns(study, configuration, values) or unvaried(configuration.scenario, part.runs)
@@ -268,6 +277,7 @@ def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int |
             threads,
             study.gauge,
             outputs.errors,
+            count,
         )
 
 
