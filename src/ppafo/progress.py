@@ -45,8 +45,8 @@ Report = Callable[[Progress], None]
 """Callback for the progress of a long task; may raise KeyboardInterrupt."""
 
 
-def report_nothing(_progress: Progress) -> None:
-    """Ignore the report, if no progress was requested."""
+def report_nothing(_progress: object) -> None:
+    """Ignore a report or a count, if no progress was requested."""
 
 
 @final

@@ -30,7 +30,7 @@ from ppafo.engine.package_key import package_key
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import MadeFrom, SourceCollector
 from ppafo.engine.step.lane import SAME_MOMENT
-from ppafo.progress import time_text
+from ppafo.progress import report_nothing, time_text
 
 if TYPE_CHECKING:
     from ppafo.engine.interpreter import PythonProgram
@@ -109,11 +109,6 @@ class BatchResult:
 
 Count: TypeAlias = Callable[[int], object]
 """Callback from the calling thread with the number of runs that have ended since the last call."""
-
-
-def count_nothing(_runs: int) -> None:
-    """Count no runs, if no progress was requested."""
-
 
 RunnableProgram: TypeAlias = "ModuleType | PythonProgram"
 """Program whose ``advance`` advances a block of runs by some steps: compiled, or run by Python itself."""
@@ -200,7 +195,7 @@ def run_blocks(
     take: Callable[[slice, BatchResult], None],
     threads: int | None = None,
     effort: Effort = Effort.FULL,
-    count: Count = count_nothing,
+    count: Count = report_nothing,
 ) -> None:
     """Run a batch block by block on ``threads`` threads (all cores by default), and pass on each result immediately.
 

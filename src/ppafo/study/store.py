@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.documents.json_text import json_text
-from ppafo.engine.lanes import Count, count_nothing
+from ppafo.engine.lanes import Count
 from ppafo.errors import DataError, ScenarioError, StudyError, refused_as
 from ppafo.metrics import METRICS
+from ppafo.progress import report_nothing
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
 from ppafo.simulation.ensemble.columns import absolute
@@ -168,7 +169,7 @@ def check_types(table: "pa.Table", name: str) -> None:
 
 
 def compute_chunk(
-    study: Study, number: int, threads: int | None, count: Count = count_nothing
+    study: Study, number: int, threads: int | None, count: Count = report_nothing
 ) -> tuple[FinishedChunk, bytes]:
     """Return the content of a chunk file, not yet written: a row per run in SI units, nan for missing values."""
     part = chunk(study, number)
@@ -261,7 +262,7 @@ def _result(
     part: Chunk,
     values: dict[str, Floats],
     threads: int | None,
-    count: Count = count_nothing,
+    count: Count = report_nothing,
 ) -> EnsembleResult:
     """Return the results of a chunk with varied ``values`` [SI] by path; StudyError for a path that cannot vary."""
     configuration, outputs = study.configurations[part.configuration], study.outputs

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.channels import TRACED
-from ppafo.engine.lanes import Count, Floats, count_nothing
+from ppafo.engine.lanes import Count, Floats
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError
 from ppafo.metrics import MetricKind, metric_kind
 from ppafo.model.controlled import CONTROLLED
+from ppafo.progress import report_nothing
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.check import MARGIN, finer
 from ppafo.simulation.ensemble.columns import check_columns
@@ -57,7 +58,7 @@ def run_ensemble(
     threads: int | None = None,
     gauge: Collection[str] = (),
     errors: bool = False,
-    count: Count = count_nothing,
+    count: Count = report_nothing,
 ) -> EnsembleResult:
     """Run ``base`` once for each row of values; each run gives exactly the same result as alone.
 
@@ -94,7 +95,7 @@ def run_ensemble(
         times = np.arange(int(longest / interval * (1.0 + _ROUNDING)) + 1, dtype=np.float64) * interval
     request = OutputRequest(metrics, tuple(dict.fromkeys(bands)), interval, times, base.controller.custom)
     # The runs with finer steps take most of the time.
-    runs = MeteredRuns(checked.runs, request, count_nothing if errors else count)
+    runs = MeteredRuns(checked.runs, request if errors else count)
     runs.run_all(plan.batches, threads)
     estimated = {}
     if errors:

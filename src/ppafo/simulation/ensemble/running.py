@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.compilers import Effort
-from ppafo.engine.lanes import Batch, BatchResult, Count, Floats, count_nothing, load_programs, run_blocks
+from ppafo.engine.lanes import Batch, BatchResult, Count, Floats, load_programs, run_blocks
 from ppafo.engine.metering import add_meters, meters_of
 from ppafo.engine.rows import group_of
 from ppafo.engine.run import NEVER_FAILED, Members
@@ -16,6 +16,7 @@ from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS, has_channels
 from ppafo.metrics.gas import WITH_ENERGY_BALANCE
 from ppafo.metrics.metric import MetricKind, Readings
+from ppafo.progress import report_nothing
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Scenario
@@ -44,7 +45,7 @@ class OutputRequest:
 class MeteredRuns:
     """Results of all runs so far: arrays that batches fill by column; nan for runs not yet made."""
 
-    def __init__(self, runs: int, request: OutputRequest, count: Count = count_nothing) -> None:
+    def __init__(self, runs: int, request: OutputRequest, count: Count = report_nothing) -> None:
         self.request, self._count = request, count
         self.failure_time = np.full(runs, np.nan)
         self.is_completed = np.zeros(runs, dtype=bool)
