@@ -95,7 +95,7 @@ def run_ensemble(
         times = np.arange(int(longest / interval * (1.0 + _ROUNDING)) + 1, dtype=np.float64) * interval
     request = OutputRequest(metrics, tuple(dict.fromkeys(bands)), interval, times, base.controller.custom)
     # The runs with finer steps take most of the time.
-    runs = MeteredRuns(checked.runs, request if errors else count)
+    runs = MeteredRuns(checked.runs, request, report_nothing if errors else count)
     runs.run_all(plan.batches, threads)
     estimated = {}
     if errors:
