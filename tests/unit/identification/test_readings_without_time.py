@@ -32,7 +32,9 @@ def test_static_torque_needs_no_column_of_times(tmp_path: Path) -> None:
 
 def test_a_decay_needs_times_and_the_message_says_how_a_table_without_them_is_read(tmp_path: Path) -> None:
     columns = "angle [deg],pressure_difference [psi_d],torque [N m],direction [-]"
-    with pytest.raises(DataError, match=r'not \'angle\'; .*give the sample rate in the map: time = \{ rate = "100 Hz" \}'):
+    with pytest.raises(
+        DataError, match=r'not \'angle\'; .*give the sample rate in the map: time = \{ rate = "100 Hz" \}'
+    ):
         identify(problem(tmp_path, columns, "free-decay"))
 
 
