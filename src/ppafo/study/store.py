@@ -15,7 +15,7 @@ from ppafo.documents.json_text import json_text
 from ppafo.engine.lanes import Count
 from ppafo.errors import DataError, ScenarioError, StudyError, refused_as
 from ppafo.metrics import METRICS
-from ppafo.progress import report_nothing
+from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
 from ppafo.simulation.ensemble.columns import absolute
@@ -76,7 +76,9 @@ class StudyStore:
     folder: StudyFolder
 
     @classmethod
-    def claim(cls, study: Study, folder: StudyFolder, agreed: bool, threads: int | None) -> "StudyStore":
+    def claim(
+        cls, study: Study, folder: StudyFolder, agreed: bool, threads: int | None, report: Report
+    ) -> "StudyStore":
         """Use a folder for a study; StudyError for results of another study or version, or too little disk space."""
         names = folder.names()
         if MANIFEST in names:
@@ -88,6 +90,7 @@ class StudyStore:
             )
         else:
             check_room(study, folder, agreed)
+            report(Progress("preparing", 0, study.runs))
             # A few runs of each configuration, spread evenly: a path that cannot vary is refused at once.
             total = study.runs_of_configuration
             runs = np.unique(np.linspace(0, total - 1, min(total, _TRIED_RUNS)).astype(np.int64))

@@ -255,8 +255,7 @@ def sweep(
                 configuration.scenario, [path for path in varied if chosen.varies(path, configuration.name)]
             )
     report = progress or report_nothing
-    report(Progress("preparing", 0, chosen.runs))
-    store = StudyStore.claim(chosen, folder, agreed, threads)
+    store = StudyStore.claim(chosen, folder, agreed, threads, report)
     _compute_missing_chunks(store, threads, progress)
     report(Progress("summarising", chosen.runs, chosen.runs))
     results = StudyResults(folder, read_manifest(folder), {}, kept)
