@@ -70,7 +70,7 @@ def write_file(path: str | Path, content: bytes) -> Path:
 
 
 def add_files(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Write files into a folder, replacing files with the same names, each by renaming after all are written."""
+    """Write files into a folder, replacing files of equal names; all are written before the first is renamed."""
     with _write_errors(folder), _make_folder(folder):
         _check_no_folder(folder, contents)
         aside = _sibling(folder / "files", "writing")
@@ -107,7 +107,7 @@ def temporary_folder(purpose: str, contents: Mapping[str, bytes] | None = None) 
 
 
 def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Replace ``folder`` by a folder with exactly these files, by path; the old folder stays until that is complete."""
+    """Replace ``folder`` by a new folder with exactly these files, by path; the old folder stays until then."""
     target = _real(folder)
     with _write_errors(folder), _make_folder(target.parent):
         aside = _sibling(target, "writing")

@@ -31,9 +31,9 @@ _SUPPORTED_FILTERS = frozenset({_GZIP, _SHUFFLE, _FLETCHER})
 _BYTES_OF_A_FLOAT = 8
 """Bytes per number in a recording, independent of the type in the file."""
 _ALWAYS_ALLOWED = 32_000_000
-"""Memory [bytes] allowed for any file."""
+"""Memory that reading may take for a file of any size [bytes]."""
 _MAXIMUM_GROWTH = 100
-"""Largest ratio of memory to file size [-] for larger files."""
+"""Largest ratio of memory for reading to file size [-], for larger files."""
 _CHECKSUM_BYTES = 64
 """Largest excess of a chunk over its numbers [bytes]; a Fletcher checksum takes four."""
 

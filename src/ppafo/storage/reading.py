@@ -22,7 +22,7 @@ ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
 """Column map, or text ``FILE.toml[:NAME]`` that selects a map of a file."""
 
 TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log", ".asc")
-"""Suffixes of text tables."""
+"""File-name suffixes of text tables."""
 
 
 @checked
