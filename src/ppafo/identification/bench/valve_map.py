@@ -82,8 +82,18 @@ def valve_map(
 ) -> BenchResult:
     """Identify dead band [-], gain [m^2], saturation [-] and hysteresis [-] from command and flow; (6), (7).
 
-    ``path`` is the path of the valve in a set (``valves.main``). Raises IdentificationError, with file, sample and
-    remedy, for recordings from which the map cannot be estimated.
+    Arguments:
+        sources: recordings of command, mass flow, upstream and downstream pressure
+        gas: gas of the bench
+        path: path of the valve in a set, ``valves.main``
+        confidence: confidence level of the intervals [-]
+        tolerances: limits of the errors of the bench
+
+    Returns:
+        the estimates with intervals and verdicts, a summary and two panels
+
+    Raises:
+        IdentificationError: recordings that do not determine the map; names file, sample and remedy
     """
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("command", "mass_flow"), absolute=PRESSURES)
     branches = []
