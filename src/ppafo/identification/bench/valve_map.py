@@ -41,7 +41,7 @@ _SHUT, _HALF_OPEN = 0.05, 0.5
 _SATURATES = 0.02
 """Least distance of the saturation from the highest command [-] to be identified."""
 _CLEAR_COMMAND = 0.1
-"""Magnitude of a command [-] from which its direction is clear."""
+"""Least magnitude of a command with a clear direction [-]."""
 _SMALL_COMMAND = 0.2
 """Typical magnitude [-] of a dead band or backlash, which may be 0."""
 _GAIN, _PLAY, _SATURATION = "valve_map.gain", "effects.spool_play.width", "valve_map.saturation_command"

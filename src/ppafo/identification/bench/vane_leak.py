@@ -216,7 +216,7 @@ class _ClosedChambers(NamedTuple):
 
 
 def closed_chambers(source: RecordingSource, start: float | None, end: float | None, number: int) -> _ClosedChambers:
-    """Return the chambers in the recording of a decay, from its start until the pressures are nearly equal.
+    """Return the pressure decay of closed chambers in a recording, until the pressures are nearly equal.
 
     Raises IdentificationError if too few samples are left.
     """
