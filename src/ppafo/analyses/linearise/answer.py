@@ -19,6 +19,7 @@ from ppafo.report.finding import Column, Finding, Section, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
+from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, with_control
 from ppafo.units.shown import in_units, quantity_of_unit
@@ -201,6 +202,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         ],
         found=model,
         files={"linearise.npz": partial(_arrays, model)},
+        overrides=changes_in(model.scenario),
     )
 
 

@@ -171,6 +171,7 @@ def finding_of(tuned: Tuned) -> Finding[Tuned]:
         found=tuned,
         passed=after.is_feasible and not after.useless,
         files={"overrides.txt": pasted.encode},
+        overrides=problem.changes,
     )
 
 
