@@ -1,4 +1,4 @@
-"""Recordings as CSV: one header line ``time [s],angle [rad],...``, then one line per sample, exact to the last bit.
+"""Recordings as CSV: a header line ``time [s],angle [rad],...`` and a line for each sample, without loss of bits.
 
 A channel with an unusual interpolation between samples states it in its header, ``supply_pressure [Pa] hold`` or
 ``linear``.
@@ -39,7 +39,7 @@ _NO_TIMES = f'for a table without times the map has {TIME} = {{ rate = "100 Hz" 
 
 @dataclass(frozen=True, slots=True)
 class HeaderColumn:
-    """Column as declared in a header: channel name (or time), unit of the numbers, interpolation between samples."""
+    """Column of a CSV header: channel name (or time), unit of the numbers, interpolation between samples."""
 
     name: str
     unit: str
@@ -54,7 +54,7 @@ class HeaderColumn:
 
 
 def parse_header(cells: list[str]) -> list[HeaderColumn]:
-    """Return the columns of a header such as ``time [s]``, ``pressure_1 [psi_g]``; time comes first.
+    """Parse a header such as ``time [s]``, ``pressure_1 [psi_g]`` into columns, time first.
 
     Raises DataError for an invalid header.
     """
@@ -97,7 +97,7 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
 
 
 def _column_map_remedy() -> str:
-    """Return the end of a message on columns of other names: a column map reads them."""
+    """Return the remedy, appended to messages, to read columns with other names through a column map."""
     named = argument_text("columns", "FILE.toml:NAME")
     return (
         f"; other columns are read through a column map: validate {named}, or columns = 'NAME' in a problem file of "
@@ -106,7 +106,7 @@ def _column_map_remedy() -> str:
 
 
 def is_of_frame(cells: Sequence[str]) -> bool:
-    """Return whether a header was written by ``to_dataframe().to_csv()`` of a result: bare channel names, in SI units.
+    """Return whether a header was written by ``to_dataframe().to_csv()`` of a result: bare channel names, in SI.
 
     Bare names alone are not enough: a logger may call a column in degrees ``angle``.
     """
@@ -115,7 +115,7 @@ def is_of_frame(cells: Sequence[str]) -> bool:
 
 
 def check_clock(time: Floats, lines: Sequence[int], noun: str = "line", may_have_trials: bool = True) -> None:
-    """Raise DataError for times [s] that do not increase; ``lines`` are the line numbers of the rows in the file.
+    """Raise DataError unless times [s] increase; ``lines`` are the line numbers of the rows in the file.
 
     The message names the line, or the row in units of ``noun``. If the clock restarts, the message suggests a column
     map for several trials, provided that the format ``may_have_trials``.
@@ -137,7 +137,7 @@ def check_clock(time: Floats, lines: Sequence[int], noun: str = "line", may_have
 
 
 def in_si(column: HeaderColumn, values: Floats, atmosphere: float) -> Floats:
-    """Return values converted to the unit of the recording; gauge pressure is relative to ``atmosphere`` [Pa absolute].
+    """Convert values to the unit of the recording; gauge pressure is relative to ``atmosphere`` [Pa absolute].
 
     Raises UnitError for a unit that does not fit.
     """
@@ -152,7 +152,7 @@ def in_si(column: HeaderColumn, values: Floats, atmosphere: float) -> Floats:
 
 
 _SPELT = {"Pa": _LEVEL, PLAIN_NUMBER: ""}
-"""Unit names for ``ppafo.units``, which needs the kind of a pressure and no unit for a plain number."""
+"""Unit names as ``ppafo.units`` requires: pressure with its kind, no unit for a plain number."""
 _MARKS: dict[RecordingKind, str] = {
     "simulated": "# simulated: a model's own output, not measured",
     "synthetic": "# synthetic: made by a model to stand for a measurement",
@@ -169,7 +169,7 @@ SPLIT_NUMBERS = (
 """Message for rows with twice as many cells as columns."""
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*", re.ASCII)
 _SIMILAR = 0.8
-"""Similarity [-] above which a word is a misspelt kind; a comment such as 'measurement: run 3' stays below."""
+"""Similarity [-] above which a word counts as a misspelt kind; 'measurement: run 3' in a comment stays below."""
 
 
 def write_csv(path: str | Path, recording: Recording) -> Path:
@@ -178,7 +178,7 @@ def write_csv(path: str | Path, recording: Recording) -> Path:
 
 
 def marked_csv_bytes(recording: Recording) -> bytes:
-    """Return the CSV table of a recording for use as a separate file, with its kind in a comment unless measured."""
+    """Return the CSV table of a recording as a separate file, with a comment line on its kind unless measured."""
     return mark_of(recording.kind).encode() + csv_bytes(recording)
 
 
@@ -211,7 +211,7 @@ def read_csv(
     atmosphere: float = STANDARD_ATMOSPHERE,
     row_time: float | None = None,
 ) -> Recording:
-    """Return the recording in a CSV file, in SI units, labelled with the file name by default.
+    """Read a recording from a CSV file, in SI units, labelled with the file name by default.
 
     Gauge pressure is relative to ``atmosphere`` [Pa absolute]. ``row_time`` [s] is the time between the rows of a table
     without a time column; None requires the column. Raises DataError for an invalid file.
@@ -271,7 +271,7 @@ def recording_of_columns(
     atmosphere: float,
     noun: str = "line",
 ) -> Recording:
-    """Return the recording of columns in the units of their headers, time first; ``rows`` are row numbers in the file.
+    """Return a recording from columns in the units of their headers, time first; ``rows`` are row numbers in the file.
 
     Raises DataError for a unit that does not fit, and for times that do not increase, naming the row in units of
     ``noun``.
@@ -316,7 +316,7 @@ def kind_of_comments(comments: Iterable[str]) -> RecordingKind:
 
 
 def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats:
-    """Return the numbers below the header, parsed row by row, since all cells as text would need far more memory."""
+    """Parse the numbers below the header row by row, which needs far less memory than all cells as text."""
     # Blank lines may only follow the last row: one between rows is a sample that was lost.
     numbers, blank = array("d"), None
     for line, row in enumerate(rows, start=skipped + 2):

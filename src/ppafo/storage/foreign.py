@@ -1,4 +1,4 @@
-"""Foreign tables, with their own columns, units and signs, read as recordings through a column map.
+"""Foreign tables, with other columns, units and signs, read as recordings through a column map.
 
 Error messages name file, line and column of an invalid cell, and the key of an error in the map.
 """
@@ -29,7 +29,7 @@ from ppafo.storage.matlab import MATLAB_SUFFIX, read_mapped_matlab, read_matlab
 from ppafo.wording import one_line
 
 _SHORTEST = 1e-12
-"""Least time [s] between two means of samples for their slope; a shorter time is rounding."""
+"""Least time [s] between the two means of samples that give a slope; a shorter time is rounding."""
 _MASS_FLOW = "kg/s"
 
 
@@ -41,7 +41,7 @@ def read_foreign(
     map_name: str = "",
     gas: str = "",
 ) -> Recording:
-    """Return the recording in a table, read through a column map, in SI units; arguments and errors as ``read_trials``.
+    """Read a single recording from a table through a column map, in SI units; arguments and errors as ``read_trials``.
 
     Gauge pressure is relative to ``atmosphere`` [Pa absolute]. Raises DataError if the map selects several trials.
     """
@@ -63,7 +63,7 @@ def read_trials(
     map_name: str = "",
     gas: str = "",
 ) -> tuple[Recording, ...]:
-    """Return the recordings in a table, read through a column map: one, or one for each trial that the map selects.
+    """Read all recordings from a table through a column map: one, or one for each trial that the map selects.
 
     ``gas`` is the gas of volume flows if the map states none. Raises DataError with file and column or, for an error in
     the map, with the key and the name of the map.
@@ -105,7 +105,7 @@ def read_trials(
 
 
 def _rows_of_trials(time: Floats, wanted: str | int | tuple[int, ...]) -> dict[str, slice]:
-    """Return the rows of each selected trial, by the suffix of its label; a trial starts where the time [s] falls."""
+    """Return the rows of each selected trial by label suffix; a trial starts where the time [s] falls."""
     starts = [0, *(np.flatnonzero(np.diff(time) < 0.0) + 1).tolist(), time.size]
     count = len(starts) - 1
     numbers = range(1, count + 1) if isinstance(wanted, str) else np.atleast_1d(wanted).tolist()
@@ -119,7 +119,7 @@ def _rows_of_trials(time: Floats, wanted: str | int | tuple[int, ...]) -> dict[s
 
 
 def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: float, gas: str = "") -> Channel:
-    """Return a channel in SI units, from a column or a constant; a multiplier ``times`` contributes its own unit.
+    """Return a channel in SI units, from a column or a constant; a factor ``times`` contributes its own unit.
 
     ``atmosphere`` [Pa absolute] and ``gas`` (empty if unknown) complete gauge pressures and volume flows.
     """
@@ -145,7 +145,7 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: f
 
 
 def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
-    """Return the unit of a channel; a volume flow in place of a mass flow gets its reference condition and gas."""
+    """Return the unit of a channel; a volume flow measured as mass flow gets its reference condition and gas."""
     from ppafo.units import is_volume_flow, with_condition
 
     is_flow = HeaderColumn(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
@@ -157,7 +157,7 @@ def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
 
 
 def _time(mapped: MappedChannel, table: MappedTable, atmosphere: float) -> Floats:
-    """Return the time [s] of the rows: from a rate and row numbers, from times of day, or from numbers with a unit."""
+    """Return the time [s] of the rows: from a rate, from times of day, or from numbers with a unit."""
     if mapped.rate is not None:
         from ppafo.units import parse_quantity
 
@@ -182,7 +182,7 @@ def _time(mapped: MappedChannel, table: MappedTable, atmosphere: float) -> Float
 
 
 def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
-    """Return a recording with the channel ``direction``: 1 up, -1 down, 0 for slower than the threshold.
+    """Add the channel ``direction`` to a recording: 1 up, -1 down, 0 for slower than the threshold.
 
     Unless the recording has a channel ``repetition``, one is added that numbers the sweeps from 1; it is 0 where the
     motion is too slow. Raises DataError for a channel that is absent or never moves, and for an invalid threshold or

@@ -1,4 +1,4 @@
-"""Recordings read from NetCDF files, as HDF5, with protection against damaged and malicious files.
+"""Recordings read from NetCDF files by h5py, with protection against damaged and malicious files.
 
 With h5netcdf a damaged file would print a traceback. Before any number is decompressed, all data must be inside the
 file, in a common format, and need no more memory than is plausible for the file.
@@ -31,22 +31,22 @@ _SUPPORTED_FILTERS = frozenset({_GZIP, _SHUFFLE, _FLETCHER})
 _BYTES_OF_A_FLOAT = 8
 """Bytes per number in a recording, independent of the type in the file."""
 _ALWAYS_ALLOWED = 32_000_000
-"""Memory [bytes] that any file may need."""
+"""Memory [bytes] allowed for any file."""
 _MAXIMUM_GROWTH = 100
-"""Largest ratio of memory needed to file size for larger files [-]."""
+"""Largest ratio of memory to file size [-] for larger files."""
 _CHECKSUM_BYTES = 64
-"""Bytes by which a chunk may exceed its numbers; a Fletcher checksum takes four."""
+"""Largest excess of a chunk over its numbers [bytes]; a Fletcher checksum takes four."""
 
 _PACKING = ("scale_factor", "add_offset")
-"""NetCDF attributes of packed variables, whose stored numbers are not the recorded values."""
+"""NetCDF attributes of packed variables, in which stored numbers differ from the values."""
 _GAPS = ("_FillValue", "missing_value")
-"""NetCDF attributes that state the number used for missing values."""
+"""NetCDF attributes with the fill value of missing samples."""
 _LIMITS = {"valid_range": 2, "valid_min": 1, "valid_max": 1}
-"""NetCDF attributes of the valid range, each with its number of limits; values outside are missing."""
+"""NetCDF attributes of the valid range, with their number of limits; values outside are missing."""
 
 
 def read_netcdf(path: str | Path) -> Recording:
-    """Return the recording in a NetCDF file.
+    """Read a recording from a NetCDF file.
 
     Raises DataError for a file that is damaged, refers to other files, or decompresses to far more than its size, and
     for numbers that are packed, have gaps or are outside the stated valid range.
@@ -80,7 +80,7 @@ def read_netcdf(path: str | Path) -> Recording:
 
 
 def _own_variables(file: Any) -> dict[str, Any]:
-    """Return the variables by name. Raises DataError for links and external data, before they are opened."""
+    """Return the variables of a file by name. Raises DataError for links and external data before they are opened."""
     import h5py
 
     names = [str(name) for name in file]
@@ -108,7 +108,7 @@ def _own_variables(file: Any) -> dict[str, Any]:
 
 
 def _check_is_whole(name: str, variable: Any) -> None:
-    """Raise DataError for values that were never written, and for chunks that decompress to more than they state."""
+    """Raise DataError for values never written, and for chunks that decompress to more than stated."""
     size, chunks = variable.size, variable.chunks
     if chunks is None:
         if variable.id.get_storage_size() < size * variable.dtype.itemsize:
@@ -132,7 +132,7 @@ def _check_is_whole(name: str, variable: Any) -> None:
 
 
 def _channel(name: str, variable: Any) -> Channel:
-    """Return a variable as a channel. Raises DataError if its attributes mark numbers as missing or packed."""
+    """Convert a variable to a channel. Raises DataError if its attributes mark numbers as missing or packed."""
     for key in _PACKING:
         if key in variable.attrs:
             raise DataError(f"'{name}' is packed by its attribute '{key}'; save it as plain numbers")

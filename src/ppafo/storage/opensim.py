@@ -25,17 +25,17 @@ _COUNT = re.compile(r"(nRows|nColumns|datarows|datacolumns)\s*(?:=|\s)\s*(\S+)",
 _DEGREES = re.compile(r"inDegrees\s*=\s*(\w+)", re.IGNORECASE)
 _SENTENCE = re.compile(r"angles are in (degrees|radians)", re.IGNORECASE)
 _KIND = "kind="
-"""Header word for a recording that was not measured, in a file written by this package."""
+"""Header key for the kind of a recording that was not measured, in files of this package."""
 _MOST_DIGITS = 11
-"""Largest number of digits of a count in a header."""
+"""Largest number of digits in a header count."""
 GAPS = ("nan",)
-"""Cells that mean a gap in a table."""
+"""Cell texts of a gap in a table."""
 _KINDS: tuple[RecordingKind, ...] = ("simulated", "synthetic")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _OpenSimTable:
-    """OpenSim table.
+    """Content of an OpenSim table.
 
     ``time``: times [s]. ``columns``: values by label. ``in_degrees``: None if the header does not state the unit of
     angles. ``is_old``: the header is in the older style of SIMM, with angles in degrees. ``kind``: kind of the
@@ -54,7 +54,7 @@ class _OpenSimTable:
 
 
 class _Header(NamedTuple):
-    """Header of a table; the counts of rows and columns are None if not stated.
+    """Header of an OpenSim table; counts of rows and columns are None if not stated.
 
     ``end`` is the index, from 0, of the last header line.
     """
@@ -69,7 +69,7 @@ class _Header(NamedTuple):
 
 
 def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> _OpenSimTable:
-    """Return the table in a ``.mot`` or ``.sto`` file. Raises DataError with file, line and column of an error.
+    """Read a ``.mot`` or ``.sto`` file. Raises DataError with file, line and column of an error.
 
     A column count in the header that contradicts all rows, and last rows that repeat a time, are repaired with a
     remark. A cell with one of the texts in ``gaps`` becomes NaN; without ``gaps`` such a cell is an error.
@@ -124,7 +124,7 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> _OpenSimTable:
 
 
 def _numbers(lines: list[str], row_lines: range, labels: list[str], gaps: Sequence[str]) -> Floats:
-    """Return the numbers of all rows (rows, columns), time first."""
+    """Parse the numbers of all rows (rows, columns), time first."""
     table = np.empty((len(row_lines), len(labels)))
     for row, number in enumerate(row_lines):
         cells = lines[number - 1].split()
@@ -137,7 +137,7 @@ def _numbers(lines: list[str], row_lines: range, labels: list[str], gaps: Sequen
 
 
 def _header(lines: list[str]) -> _Header:
-    """Return the header, up to ``endheader``. Raises DataError with the line of an error."""
+    """Parse the header, up to ``endheader``. Raises DataError with the line of an error."""
     end = next((index for index, line in enumerate(lines) if line.strip().lower() == _END), None)
     if end is None:
         raise DataError(f"has no line '{_END}': it is cut off in its header, or is no .mot or .sto file")
@@ -175,7 +175,7 @@ def _header(lines: list[str]) -> _Header:
 
 
 def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
-    """Return the line number of the labels (from 1) and the labels."""
+    """Return the column labels and their line number (from 1), number first."""
     for number in range(header.end + 2, len(lines) + 1):
         if lines[number - 1].strip():
             # Labels may hold blanks where tabs separate them.
@@ -197,11 +197,11 @@ _SIGNS = {
     r"ankle_angle_[rl]_device(_moment)?": "is what the device gives the wearer, above 0 in dorsiflexion",
     r"ground_force_[rl]_vy": "is above 0 upward",
 }
-"""Sign conventions stated in the header, for the columns in OpenSim's names."""
+"""Sign conventions for the header, by column name of OpenSim."""
 
 
 def opensim_bytes(recording: Recording) -> bytes:
-    """Return a recording as a ``.sto`` file: SI units, angles in radians, labels ``time`` and channel names.
+    """Return the ``.sto`` file of a recording: SI units, angles in radians, labels ``time`` and channel names.
 
     The header states units and signs as text, which OpenSim preserves, and the kind of a recording that was not
     measured.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ppafo.storage.column_map import ColumnMap
 
 ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
-"""Column map, or the name of one: file, and the name of the map if the file has several."""
+"""Column map, or text ``FILE.toml[:NAME]`` that selects a map of a file."""
 
 TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log", ".asc")
 """Suffixes of text tables."""
@@ -32,7 +32,7 @@ def read_recording(
     atmosphere: Pressure = STANDARD_ATMOSPHERE,
     columns: ColumnsLike | None = None,
 ) -> Recording:
-    """Return the recording in a ``.nc`` or ``.parquet`` file, a table of text such as ``.csv``, or a result folder.
+    """Read a recording from a ``.nc`` or ``.parquet`` file, a text table such as ``.csv``, or a result folder.
 
     A pandas DataFrame or an xarray Dataset is taken as well: columns ``name [unit]``, or units in its ``attrs``.
 

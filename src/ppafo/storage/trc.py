@@ -22,12 +22,12 @@ _HEAD_LINES = 5
 """Number of lines before the first row."""
 _UNITS = ("mm", "cm", "m")
 _UNSEEN = ("", "nan")
-"""Cell texts of an unseen marker."""
+"""Cell texts for a marker that was not seen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _MarkerTable:
-    """Marker positions over time [s]: coordinates (3, frames) by name, in ``unit``; NaN if a marker was not seen.
+    """Marker positions over time [s]: coordinates (3, frames) by name, in ``unit``; NaN for a marker not seen.
 
     ``remarks`` name markers that were renamed because of duplicated names.
     """
@@ -39,7 +39,7 @@ class _MarkerTable:
 
 
 def read_trc(path: str | Path) -> _MarkerTable:
-    """Return the markers in a ``.trc`` file. Raises DataError with file, line and error."""
+    """Read the markers of a ``.trc`` file. Raises DataError with file, line and error."""
     try:
         lines = text_lines(path)
         if not lines[0].startswith(_FIRST_WORD) or len(lines) <= _HEAD_LINES:
@@ -66,7 +66,7 @@ def read_trc(path: str | Path) -> _MarkerTable:
 
 
 def _rows(lines: list[str], names: list[str]) -> tuple[Floats, list[Floats]]:
-    """Return the times of the frames [s], and the coordinates (3, frames) of each marker in the unit of the file."""
+    """Parse the frame times [s], and the coordinates (3, frames) of each marker in the unit of the file."""
     labels = [f"{axis} of {name}" for name in names for axis in "XYZ"]
     width = 2 + len(labels)
     numbers = [number for number, line in enumerate(lines, 1) if number > _HEAD_LINES and line.strip()]

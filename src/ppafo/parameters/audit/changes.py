@@ -1,4 +1,4 @@
-"""Changes of a parameter set with respect to its parent set, value by value, in any units."""
+"""Changes of a parameter set relative to its parent set, value by value, in any units."""
 
 import math
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _SAME = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class ValueChange:
-    """Changed value: text in the parent ('' if absent), text in the set ('' if absent), and origin of the new value."""
+    """Changed value of a parameter set: text in parent and set ('' if absent), and origin of the new value."""
 
     path: str
     before: str

@@ -63,7 +63,7 @@ def check_choked_flow(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def _exponent(evidence: Evidence, gas: Gas) -> Iterator[AuditFinding]:
-    """Compare C1 with the reported exponent to C1 with (k + 1)/(k - 1)."""
+    """Yield a finding if the reported exponent in C1 differs from (k + 1)/(k - 1)."""
     formula = evidence.text(_EXPONENT)
     k = gas.heat_capacity_ratio
     exponent = None if formula is None else evaluate(formula, k)
@@ -114,7 +114,7 @@ def evaluate(formula: str, heat_capacity_ratio: float) -> float | None:
 
 
 def _value(node: ast.expr, k: float) -> float:
-    """Return the value of a syntax tree of arithmetic in k; ValueError for anything else."""
+    """Return the value of a syntax tree of arithmetic in k. Raises ValueError for any other tree."""
     match node:
         case ast.BinOp(left, operation, right) if type(operation) in _BINARY:
             return _BINARY[type(operation)](_value(left, k), _value(right, k))
