@@ -208,11 +208,6 @@ class Finding(Generic[T_co]):
     overrides: Sequence[str] = ()
 
     @property
-    def opening(self) -> Sequence[str]:
-        """Opening sentences, the last of which states the values that overrides changed."""
-        return [*self.said, *filter(None, [changed_text(self.overrides)])]
-
-    @property
     def figures(self) -> dict[str, Section]:
         """Sections with a figure, by the stem of the figure's files."""
         return {section.name: section for section in self.parts if section.name}
@@ -275,7 +270,7 @@ class Finding(Generic[T_co]):
 @_in_own_units
 def text_of(finding: Finding[Any]) -> str:
     """Return the report as text: opening sentences and sections, without the sections meant for the page only."""
-    blocks = ["\n".join(finding.opening)]
+    blocks = ["\n".join(filter(None, (*finding.said, changed_text(finding.overrides))))]
     for section in finding.parts:
         if section.is_detail:
             continue
@@ -315,6 +310,7 @@ def page_files(finding: Finding[Any]) -> dict[str, bytes]:
         parts.append((section, heads, inline_figure(on_page[section.name]) if section.name else ""))
     values = {
         "finding": finding,
+        "changed": changed_text(finding.overrides),
         "parts": parts,
         "origin": _ORIGINS[finding.kind],
         "versions": f"ppafo {__version__}",

@@ -25,11 +25,20 @@ def linearise(
     The equilibrium is the steady state whose torque is the last value of the reference, or, where the controller is a
     constant command, whose command is that one; the ankle stands where the run leaves it. Derivatives
     are differences of the plant's own equations, good to 1e-6 of the largest of their row.
-    ScenarioError for a time outside the run, where there is no equilibrium, and for a valve that is on or off.
 
-    at: a time of the run, such as '1.5 s', or 'equilibrium' (default): the steady state that holds the last value of
-        the reference
-    plugins: modules of your own, files or names, whose objects files may name
+    Arguments:
+        scenario: name of a scenario, or a .toml file
+        at: a time of the run, such as '1.5 s', or 'equilibrium' (default): the steady state that holds the last value
+            of the reference
+        overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
+        plugins: modules of your own, files or names, whose objects files may name
+
+    Returns:
+        a Finding whose ``found`` is a LinearModel: matrices in SI units, poles [1/s], and margins of the loop, whose
+        ``phase_margin`` is in rad (in the report in degrees) and whose crossovers and bandwidth are in Hz
+
+    Raises:
+        ScenarioError: a time outside the run, no equilibrium, or a valve that is on or off
 
     >>> import ppafo
     >>> model = ppafo.linearise("torque-task-proportional", overrides={"reference.level": 3.0}).found
