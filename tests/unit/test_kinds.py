@@ -129,7 +129,7 @@ def test_a_name_without_its_module_is_told_the_object_of_the_plugin(
         with pytest.raises(ScenarioError, match=rf"kind = '{name}' is not known{hint}; allowed: [^:]*$"):
             load(task, [f"controller.kind={name}"], plugins=both)
         # A controller is no motion, and no metric.
-        with pytest.raises(ScenarioError, match="is not known; allowed: [^:]*$"):
+        with pytest.raises(ScenarioError, match=r"is not known; allowed: [^:]*$"):
             load(task, [f"motion.kind={name}"])
     with pytest.raises(StudyError, match="no metric 'MINE', did you mean 'bang:MINE'"):
         ppafo.find("torque-task-proportional", vary="reference.level=1..3 N m", such_that="MINE <= 1 N m")

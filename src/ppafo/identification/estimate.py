@@ -22,7 +22,7 @@ UNKNOWN = 1.0
 """Relative half-width of the confidence interval [-] from which a value is not identifiable; the interval then
 contains zero or twice the value."""
 _WIDE = 0.1
-"""Relative half-width of the confidence interval [-] above which the verdict states it."""
+"""Relative half-width of the confidence interval [-] above which the verdict states the half-width."""
 
 
 def interval_factor(confidence: float) -> float:

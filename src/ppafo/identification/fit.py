@@ -91,7 +91,7 @@ _GAIN = 0.05
 _CONVERGED = 0.5
 """Decrease of the squares in the last step [-] below which the search has converged within the standard errors."""
 _AT_BOUND = 1.0e-6
-"""Distance from a bound [-], absolute below 1 and relative above, up to which a variable is at it."""
+"""Largest distance of a variable from its bound [-] that counts as at the bound, relative above 1."""
 _SHOWN = 0.01
 """Least share of the variance [-] for a tolerance to be listed."""
 _OTHER_STARTS = 32
@@ -265,7 +265,7 @@ def _outliers(runs: FitRuns, residuals: Floats) -> Indices:
 
 
 class _SearchEnd(NamedTuple):
-    """End of the Gauss-Newton steps: scaled point, residuals [SI], linearisation there, and the last step tried.
+    """End of the Gauss-Newton steps: scaled point, residuals [SI], linearisation at this point, and last step tried.
 
     ``gain`` is the decrease of the cost by this step [-]: at most 0 if the step was not taken, -inf if no run succeeds.
     """

@@ -1,4 +1,4 @@
-"""New parameter set: identified values replace earlier ones, each with interval and origin."""
+"""New parameter set: identified values with interval and origin replace earlier values."""
 
 import math
 from collections.abc import Iterable

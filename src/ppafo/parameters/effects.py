@@ -12,7 +12,7 @@ from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device
 
 SEEN_BY_EFFECTS = ("gas", "actuator", "friction", "foot_plate", "supply")
-"""Device sections that an effect may read in ``prepare``; exported libraries contain them in C."""
+"""Device sections that ``prepare`` of an effect may read; exported libraries contain these sections in C."""
 
 
 Sections = Mapping[str, Any]

@@ -14,7 +14,7 @@ from ppafo.errors import UnitError
 from ppafo.units import flow_of, is_volume_flow, split_number, to_si
 
 USUAL_CRITICAL_RATIO = 0.3
-"""Critical pressure ratio b [-] of spool valves, used if a data sheet does not state it."""
+"""Usual critical pressure ratio b of spool valves [-], for data sheets without b."""
 
 CV_PER_KV = 1.156
 """Ratio of Cv to Kv: US gal/min at 1 psi per m^3/h at 1 bar, both of water (IEC 60534-1)."""

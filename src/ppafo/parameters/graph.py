@@ -141,7 +141,7 @@ def counts_from(path: str, atmosphere: float) -> float:
 
 
 def fixed_zero(path: str) -> float | None:
-    """Return the standard atmosphere [Pa] if a gauge pressure counts from it, None if it counts from the device's."""
+    """Return the standard atmosphere [Pa] if it is the gauge zero of a path, None for the device's atmosphere."""
     return None if path.startswith(_COUNTS_FROM_ATMOSPHERE) else STANDARD_ATMOSPHERE
 
 

@@ -133,7 +133,7 @@ def one_path(path: str, valve: str) -> str:
 
 
 def of_another_valve(path: str, valve: str) -> bool:
-    """Return True if a path names a valve other than the chosen one."""
+    """Return True if a path names a valve other than the chosen valve."""
     return path.startswith(NAMED_VALVE) and not path.startswith(f"{NAMED_VALVE}{valve}.")
 
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:  # few devices have a measured actuator
     from ppafo.model.actuators.table import Table
 
 Origin = Literal["published", "datasheet", "derived", "identified", "fitted", "assumed"]
-"""Provenance of a value; ``fitted``: neither determined by its recordings nor explained by a model of them."""
+"""Provenance of a value; ``fitted`` values hold for one model of the recordings only."""
 
 
 CONFIDENCE = 0.95

@@ -74,7 +74,7 @@ def clock_seconds(
     stamps = [_stamp(cell, form, row) for cell, row in zip(cells, rows, strict=True)]
     zones = dict.fromkeys(re.sub(r"[+-].*", "", stamp.zone) for stamp in stamps)
     if len(zones) > 1:
-        raise DataError(f"the clock changes its time zone ({', '.join(zones)}): give times of one zone, or numbers")
+        raise DataError(f"the times are in several time zones ({', '.join(zones)}): use one time zone, or numbers")
     seconds = np.array([stamp.seconds for stamp in stamps])
     days_in_words = [stamp.date for stamp in stamps] if dates is None else [cell.strip() for cell in dates]
     if any(days_in_words):
@@ -144,7 +144,7 @@ def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: Dat
     since_first = [days - days[0] for days in growing]
     if len(since_first) > 1 and not np.array_equal(since_first[0], since_first[1]):
         raise DataError(
-            f"{rows[0]}: the date {words[0][:LONGEST_SHOWN]!r} may begin with the day or with the month; give "
+            f"{rows[0]}: the date {words[0][:LONGEST_SHOWN]!r} is ambiguous; give "
             'date_order = "day month" or date_order = "month day"'
         )
     return growing[0]

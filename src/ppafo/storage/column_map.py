@@ -157,18 +157,18 @@ _KEYS_OF_TIME = ("rate", "date", "date_order", "clock")
 def check_sources(columns: ColumnMap) -> None:
     """Raise DataError for a missing time, a channel without exactly one source, or a misplaced key."""
     if TIME not in columns.channels:
-        raise DataError(f'has no channels.{TIME}; give a column, or {TIME} = {{ rate = "100 Hz" }}')
+        raise DataError(f'channels.{TIME} is missing; add it with a column, or as {TIME} = {{ rate = "100 Hz" }}')
     for name, mapped in columns.channels.items():
         for key in () if name == TIME else _KEYS_OF_TIME:
             if getattr(mapped, key) is not None:
-                raise DataError(f"channels.{name}.{key} belongs to channels.{TIME}; omit it here")
+                raise DataError(f"channels.{name}.{key} is allowed only in channels.{TIME}; remove the key")
         sources = [key for key in ("column", "constant", "rate") if getattr(mapped, key) is not None]
         if not sources:
             allowed = "column, constant or rate" if name == TIME else "column or constant"
-            raise DataError(f"channels.{name} gives no {allowed}; give one of them")
+            raise DataError(f"channels.{name} needs a {allowed}")
         if len(sources) > 1:
             several = "both" if len(sources) == 2 else "all of"
-            raise DataError(f"channels.{name} gives {several} a {' and a '.join(sources)}; give one of them")
+            raise DataError(f"channels.{name} has {several} a {' and a '.join(sources)}; keep one of them")
 
 
 class MappedTable(NamedTuple):

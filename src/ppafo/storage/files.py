@@ -70,7 +70,7 @@ def write_file(path: str | Path, content: bytes) -> Path:
 
 
 def add_files(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Write files into a folder, replacing files with the same names, each by renaming after all are written."""
+    """Write files into a folder, replacing files of equal names; all are written before the first is renamed."""
     with _write_errors(folder), _make_folder(folder):
         _check_no_folder(folder, contents)
         aside = _sibling(folder / "files", "writing")
@@ -101,13 +101,13 @@ def temporary_folder(purpose: str, contents: Mapping[str, bytes] | None = None) 
             made.cleanup()
             raise
     except OSError as error:
-        remedy = "make room there, or set TMPDIR to another folder"
+        remedy = "free disk space, or set TMPDIR to another folder"
         raise DataError(f"temporary files cannot be written: {reason(error)}; {remedy}") from error
     return made
 
 
 def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Replace ``folder`` by a folder with exactly these files, by path; the old folder stays until that is complete."""
+    """Replace ``folder`` by a new folder with exactly these files, by path; the old folder stays until then."""
     target = _real(folder)
     with _write_errors(folder), _make_folder(target.parent):
         aside = _sibling(target, "writing")
@@ -159,7 +159,7 @@ def _try_renaming(folder: Path, trial: Path) -> None:
         folder.rename(trial)
     except OSError as error:
         if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
-            why = f"the folder itself cannot be replaced ({reason(error)}); choose a new folder in it"
+            why = f"the folder itself cannot be replaced ({reason(error)}); choose a new subfolder"
             raise OSError(None, why) from error
     else:
         trial.rename(folder)
@@ -181,7 +181,7 @@ def _make_folder(folder: Path) -> Iterator[None]:
     new = [ancestor for ancestor in (folder, *folder.parents) if not ancestor.exists()]
     nearest = folder if folder.exists() else new[-1].parent
     if not nearest.is_dir():
-        raise NotADirectoryError(None, f"there is a file '{nearest}' in the place of a folder")
+        raise NotADirectoryError(None, f"'{nearest}' is a file, not a folder")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         yield
@@ -195,7 +195,7 @@ def _check_no_folder(folder: Path, names: Iterable[str]) -> None:
     """Raise IsADirectoryError if a folder has the name of a file to be written, before any file is written."""
     for name in names:
         if (folder / name).is_dir():
-            raise IsADirectoryError(None, f"there is a folder '{name}' in it, in the place of a file")
+            raise IsADirectoryError(None, f"'{name}' in it must be a file, and is a folder")
 
 
 def _swap(new: Path, target: Path) -> None:

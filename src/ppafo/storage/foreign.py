@@ -49,8 +49,8 @@ def read_foreign(
     if len(recordings) > 1:
         with refused_as(DataError, path, DataError), in_map(map_name):
             raise DataError(
-                f"trial: the file has {len(recordings)} recordings; name one, or use all in a procedure of 'ppafo "
-                "identify'"
+                f"trial selects {len(recordings)} recordings; give the number of one trial (only a procedure of 'ppafo "
+                "identify' reads several)"
             )
     return recordings[0]
 
@@ -73,7 +73,7 @@ def read_trials(
     content = read_matlab(path) if suffix == MATLAB_SUFFIX else read_bytes(path)
     with refused_as(DataError, path, DataError):
         if remedy_for(path):
-            raise DataError(f"is no table of text{remedy_for(path)}")
+            raise DataError(f"is not a text table{remedy_for(path)}")
         if suffix == ".nc":
             raise DataError("is a NetCDF file, which names its own channels and units: read it without a column map")
         with in_map(map_name):
@@ -151,7 +151,7 @@ def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
     is_flow = HeaderColumn(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
     if not is_flow:
         if mapped.at is not None or mapped.gas is not None:
-            raise UnitError("at and gas apply only to a volume flow, such as 'L/min'")
+            raise UnitError("'at' and 'gas' are allowed only for a volume flow, such as 'L/min'")
         return unit
     return with_condition(unit, mapped.at, mapped.gas or gas) if mapped.at else unit
 
@@ -175,8 +175,8 @@ def _time(mapped: MappedChannel, table: MappedTable, atmosphere: float) -> Float
     if table.size > 2 and (steps == 0.0).any() and time[-1] > 0.0 and (steps >= 0.0).all():
         mean_rate = float(f"{(table.size - 1) / time[-1]:.3g}")
         raise DataError(
-            f"channels.{TIME}: several rows have the same time of day; give the rate of the rows in place of the "
-            f'column, such as {TIME} = {{ rate = "{mean_rate:g} Hz" }}, which is the mean of this file'
+            f"channels.{TIME}: several rows have the same time of day; give the sample rate instead of the column: "
+            f'{TIME} = {{ rate = "{mean_rate:g} Hz" }} (mean of this file)'
         )
     return time
 
@@ -209,7 +209,9 @@ def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
     direction = np.where(rate > threshold, 1.0, np.where(rate < -threshold, -1.0, 0.0))
     moving = np.flatnonzero(direction)
     if moving.size == 0:
-        raise DataError(f"direction.threshold: '{wanted.of}' never moves faster than {wanted.threshold}")
+        raise DataError(
+            f"direction.threshold = {wanted.threshold!r}: '{wanted.of}' never changes faster; give a lower threshold"
+        )
     directed = recording.with_channel("direction", direction, PLAIN_NUMBER)
     if "repetition" in recording:
         return directed

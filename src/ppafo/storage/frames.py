@@ -36,7 +36,7 @@ def remedy_for(path: str | Path) -> str:
     """Return the remedy, appended to messages, to read another format with pandas; empty for unknown suffixes."""
     advice = written_as_csv(path)
     # The same advice, behind the one to do without a file.
-    return f"; in Python give the table itself, {_call_of_pandas(path)}, or{advice[1:]}" if advice else ""
+    return f"; in Python pass the table itself, {_call_of_pandas(path)}, or{advice[1:]}" if advice else ""
 
 
 def written_as_csv(path: str | Path) -> str:
@@ -101,7 +101,7 @@ def read_parquet(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> R
         try:
             table = pq.read_table(pa.BufferReader(content))
         except (pa.ArrowException, OSError, ValueError) as error:
-            raise DataError(f"is not a Parquet file that can be read: {one_line(error)}") from error
+            raise DataError(f"is not a readable Parquet file: {one_line(error)}") from error
         units = {
             field.name: (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace") for field in table.schema
         }
@@ -138,7 +138,7 @@ def _recording(
         try:
             numbers = column.astype(np.float64)
         except (TypeError, ValueError) as error:
-            raise DataError(f"column '{one_line(name)}' is not of numbers") from error
+            raise DataError(f"column '{one_line(name)}' is not numeric") from error
         wrong = np.flatnonzero(~np.isfinite(numbers))
         if wrong.size:
             raise DataError(f"column '{one_line(name)}': row {wrong[0]} is {numbers[wrong[0]]}, not a finite number")

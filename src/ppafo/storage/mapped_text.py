@@ -65,7 +65,7 @@ def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> Mappe
     Raises DataError with line and column of an invalid cell or, for an error in the map, with the key and, if it has
     one, the name of the map.
     """
-    lines = text_of(content, columns.encoding, remedy='; give encoding = "latin-1" if it is that').splitlines()
+    lines = text_of(content, columns.encoding, remedy='; give encoding = "latin-1" for a Latin-1 file').splitlines()
     if any(map(_SERIAL_MONITOR.match, lines)):
         lines = _with_stamps_as_column(lines, columns)
     with in_map(map_name):
@@ -144,13 +144,13 @@ def _begin(lines: list[str], columns: ColumnMap) -> _StartedTable:
     rows = _split(lines, columns)
     head = next(rows, None)
     if head is None:
-        skipped = f"after the {columns.skip_lines} of skip_lines = {columns.skip_lines}" if columns.skip_lines else ""
+        skipped = f"after skip_lines = {columns.skip_lines}" if columns.skip_lines else ""
         raise DataError(f"has no rows {skipped}".rstrip())
     names = [name.strip() for name in head[1]] if columns.header else []
     rows = islice(rows if columns.header else chain([head], rows), columns.skip_rows, None)
     first = next(rows, None)
     if first is None:
-        remedy = ": header = false, if the first line is one of numbers" if columns.header else ""
+        remedy = "; give header = false if the first line contains numbers" if columns.header else ""
         raise DataError(f"has no rows of numbers{remedy}")
     return _StartedTable(names, first[1], chain([first], rows))
 
@@ -179,7 +179,9 @@ def _index_of(key: str, column: int | str, table: _StartedTable, lines: list[str
             raise DataError(f"{key} = {column}: the file has {count} columns{remedy}")
         return column - 1
     if not names:
-        raise DataError(f"{key} = {column!r} names a column, but the file has no header; give its number")
+        raise DataError(
+            f"{key} = {column!r}: a file without header (header = false) has no column names; give the column number"
+        )
     numbers = [number for number, name in enumerate(names, start=1) if name == column]
     if not numbers:
         head = enumerate(lines[:_HEADER_WITHIN])
@@ -189,17 +191,17 @@ def _index_of(key: str, column: int | str, table: _StartedTable, lines: list[str
             split = ((number, name, line.split(mark)) for number, line in head for name, mark in _DELIMITERS.items())
             remedy = next(
                 (
-                    f'; line {number + 1} has it: give skip_lines = {number} and delimiter = "{name}"'
+                    f'; line {number + 1} contains this name: give skip_lines = {number} and delimiter = "{name}"'
                     for number, name, cells in split
                     if column in (stripped := [cell.strip() for cell in cells]) and stripped != names
                 ),
                 "",
             )
         hint = "" if remedy else nearest_name(column, names)
-        raise DataError(f"{key} = {column!r}: there is no such column{hint}; the file has {shown_names(names)}{remedy}")
+        raise DataError(f"{key} = {column!r}: the file has no such column{hint}; it has {shown_names(names)}{remedy}")
     if len(numbers) > 1:
         shown = " and ".join(map(str, numbers))
-        raise DataError(f"{key}: columns {shown} are both called {column!r}; give the number of one")
+        raise DataError(f"{key} = {column!r}: columns {shown} have this name; give the number of one of them")
     return numbers[0] - 1
 
 
@@ -224,7 +226,7 @@ def _check_width(row: list[str], line: int, table: _StartedTable, last_index: in
     is_split = columns.delimiter == "comma" and width == 2 * expected
     remedy = f"; {SPLIT_NUMBERS}" if is_split else ""
     if line <= columns.skip_lines + 2 and not is_split:
-        remedy = "; where the table begins further down, give skip_lines"
+        remedy = "; if the table begins on a later line, give skip_lines"
     raise DataError(f"line {line} has {len(row)} values for {expected} columns{remedy}")
 
 
@@ -266,11 +268,11 @@ class _Numbers:
             return number
         remedy = ""
         if self.words:
-            remedy = f"; known words: {shown_names(self.words)}; others in channels.{self.channel}.words"
+            remedy = f"; known words: {shown_names(self.words)}; add others in channels.{self.channel}.words"
         elif self.decimal == "point" and "," in cell and finite_number(cell.strip().replace(",", ".")) is not None:
             remedy = '; give decimal = "comma"'
         elif is_clock(cell) and self.channel != TIME:
-            remedy = "; it is a time of day"
+            remedy = f"; a time of day is allowed only in channels.{TIME}"
         raise DataError(f"{at}: {_shown(cell)} is not a finite number {key}{remedy}")
 
 

@@ -65,10 +65,9 @@ class _MatlabFile:
         """Return the remedy, appended to messages, to save objects as arrays; empty without objects."""
         advice = ""
         for name, kind in self.objects:
-            save = "its numbers are saved as arrays of their own, such as t = ts.Time; y = ts.Data; save plain.mat t y"
-            if kind in _PLAIN:
-                save = f"it is saved as plain arrays by {_PLAIN[kind].format(name=name)}"
-            advice += f"; {name}{f' ({kind})' * bool(kind)} is an object that only MATLAB reads, where {save}"
+            save = _PLAIN.get(kind, "t = ts.Time; y = ts.Data; save plain.mat t y").format(name=name)
+            title = f"{name}{f' ({kind})' * bool(kind)}"
+            advice += f"; {title} is an object that only MATLAB reads; in MATLAB, save plain arrays, such as {save}"
         return advice
 
 
@@ -108,7 +107,7 @@ def open_matlab(path: str | Path) -> _MatlabFile:
     except _OF_DAMAGE as error:
         raise DataError(f"{path}: cannot be read as a .mat file: {one_line(error)}") from error
     if not contents.columns and not contents.texts:
-        raise DataError(f"{path}: has no variable of numbers{contents.advice_on_objects()}")
+        raise DataError(f"{path}: has no numeric variable{contents.advice_on_objects()}")
     return contents
 
 
@@ -175,10 +174,12 @@ def _own_items(group: Any) -> Iterator[tuple[str, Any]]:
 
     for name in group:
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            raise ValueError(f"'{one_line(name)}' is a link; save its numbers in the file itself")
+            raise ValueError(f"'{one_line(name)}' is an HDF5 link; save its numbers in the file itself")
         node = group[name]
         if isinstance(node, h5py.Dataset) and (node.is_virtual or node.external):
-            raise ValueError(f"the numbers of '{one_line(name)}' are in another file; save them in the file itself")
+            raise ValueError(
+                f"the numbers of '{one_line(name)}' are stored in another file; save them in the file itself"
+            )
         yield name, node
 
 
@@ -277,7 +278,7 @@ def read_mapped_matlab(file: _MatlabFile, columns: ColumnMap, map_name: str) -> 
             lengths[TIME] = len(clock)
         if len(set(lengths.values())) != 1:
             listed = ", ".join(f"channels.{name} has {length}" for name, length in lengths.items())
-            raise DataError(f"all columns must have the same number of samples: {listed or 'there is no column'}")
+            raise DataError(f"all columns must have the same number of samples: {listed or 'no channel has a column'}")
         size = next(iter(lengths.values()))
         for name, values in numbers.items():
             gaps = np.flatnonzero(~np.isfinite(values))
@@ -294,13 +295,15 @@ def _variable(key: str, column: int | str, file: _MatlabFile) -> str:
     if isinstance(column, int):
         matrices = sorted({name.partition("(")[0] for name in file.columns if "(:," in name and "." not in name})
         if len(matrices) != 1:
-            raise DataError(f"{key} = {column}: columns of a .mat file have names; it has {shown_names(file.columns)}")
+            raise DataError(
+                f"{key} = {column}: give the name of a variable instead; the file has {shown_names(file.columns)}"
+            )
         column = f"{matrices[0]}(:,{column})"
     name = re.sub(r"\s+", "", column) if "(" in column else column
     if name not in file.columns and name not in file.texts:
         known = (*file.columns, *file.texts)
         raise DataError(
-            f"{key} = {column!r}: the file has no such column{nearest_name(name, known)}; it has {shown_names(known)}"
+            f"{key} = {column!r}: the file has no such variable{nearest_name(name, known)}; it has {shown_names(known)}"
             f"{file.advice_on_objects()}"
         )
     return name

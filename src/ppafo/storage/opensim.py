@@ -88,8 +88,8 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> _OpenSimTable:
             raise DataError("has labels but no rows")
         if header.row_count is not None and header.row_count != len(row_lines):
             raise DataError(
-                f"has {len(row_lines)} rows, its header states {header.row_count}: the file is cut off or was edited; "
-                "get it again, or correct the header"
+                f"has {len(row_lines)} rows, but the header states {header.row_count}: the file is cut off or was "
+                "edited; export it again, or correct the header"
             )
         table = _numbers(lines, row_lines, labels, gaps)
         # Some tools repeat the last time.
@@ -105,8 +105,8 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> _OpenSimTable:
     remarks = []
     if header.column_count not in (None, len(labels)):
         remarks.append(
-            f"the header states {header.column_count} columns, labels and every row have {len(labels)}, which were "
-            "taken"
+            f"the header states {header.column_count} columns, but labels and rows have {len(labels)}: "
+            f"{len(labels)} columns were read"
         )
     if dropped := len(table) - count:
         rows, verb = ("the last row repeats", "was") if dropped == 1 else (f"the last {dropped} rows repeat", "were")
@@ -140,7 +140,7 @@ def _header(lines: list[str]) -> _Header:
     """Parse the header, up to ``endheader``. Raises DataError with the line of an error."""
     end = next((index for index, line in enumerate(lines) if line.strip().lower() == _END), None)
     if end is None:
-        raise DataError(f"has no line '{_END}': it is cut off in its header, or is no .mot or .sto file")
+        raise DataError(f"has no line '{_END}': the header is cut off, or this is not a .mot or .sto file")
     counts: dict[str, int] = {}
     in_degrees: bool | None = None
     kind: RecordingKind | None = None
@@ -153,12 +153,14 @@ def _header(lines: list[str]) -> _Header:
             counts[count[1].lower()] = int(text)
         key = _DEGREES.match(line)
         if key is not None and key[1].lower() not in ("yes", "no"):
-            raise DataError(f"line {number}: inDegrees is {one_line(key[1])[:LONGEST_SHOWN]!r}; it is 'yes' or 'no'")
+            raise DataError(
+                f"line {number}: inDegrees is {one_line(key[1])[:LONGEST_SHOWN]!r}; it must be 'yes' or 'no'"
+            )
         stated = key or _SENTENCE.search(line)
         if stated is not None:
             says_degrees = stated[1].lower() in ("yes", "degrees")
             if in_degrees is not None and says_degrees != in_degrees:
-                raise DataError(f"line {number}: the header states degrees and radians; correct the one that is wrong")
+                raise DataError(f"line {number}: the header states both degrees and radians; remove the wrong unit")
             in_degrees = says_degrees
         if kind is None and line.startswith(_KIND):
             kind = next((known for known in _KINDS if line == f"{_KIND}{known}"), None)
@@ -183,7 +185,7 @@ def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
             labels = [cell.strip() for cell in line.strip().split("\t")] if "\t" in line else line.split()
             if labels[0].lower() != TIME:
                 first = one_line(labels[0])[:LONGEST_SHOWN]
-                raise DataError(f"line {number}: the first column must be '{TIME}', it is {first!r}")
+                raise DataError(f"line {number}: the first column must be '{TIME}', not {first!r}")
             if "" in labels:
                 raise DataError(f"line {number}: column {labels.index('') + 1} has no name")
             return number, labels

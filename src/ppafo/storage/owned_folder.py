@@ -95,7 +95,7 @@ def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes]
     Files in ``kept``, such as one that grows from run to run, may have been changed if they have the given content.
     """
     if is_address(folder):
-        raise DataError(f"{folder}: is an address; a {kind.noun} is written into a folder of this computer")
+        raise DataError(f"{folder}: is a remote address; a {kind.noun} needs a local folder")
     is_folder = os.path.isdir(folder)  # noqa: PTH112  # Path.is_dir raises where no file can have the name
     # A link to nowhere is there too, and would be replaced by a folder.
     if not is_folder and os.path.lexists(folder):
@@ -113,7 +113,7 @@ def _check_earlier_result(folder: Path, kind: FolderKind, present: Collection[st
     hashes = kind.document_of(folder).get(HASHES)
     if not isinstance(hashes, dict):
         raise DataError(
-            f"{folder / kind.mark}: has no hashes of its files, because an earlier version of ppafo wrote it; "
+            f"{folder / kind.mark}: has no file hashes (written by an earlier version of ppafo); "
             "remove the folder, or choose another one"
         )
     # Before hashes are compared: a file of somebody else's is the likelier and the clearer reason.

@@ -82,7 +82,7 @@ def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | No
         groups = (parquet.metadata.row_group(number) for number in range(parquet.metadata.num_row_groups))
         value_count = sum(group.column(column).num_values for group in groups for column in range(group.num_columns))
         if value_count > _MAXIMUM_VALUES:
-            raise DataError(f"{name}: has {value_count:,} values, more than any table of a study")
+            raise DataError(f"{name}: has {value_count:,} values; a table of a study has at most {_MAXIMUM_VALUES:,}")
         missing = [column for column in columns or () if column not in parquet.schema_arrow.names]
         if missing:
             raise DataError(f"{name}: has no column '{one_line(missing[0])}'")
@@ -108,7 +108,7 @@ def _opened(file: io.BufferedIOBase, name: str) -> "Iterator[pq.ParquetFile]":
         with file, pq.ParquetFile(file, page_checksum_verification=True) as parquet:
             yield parquet
     except (pa.ArrowException, OSError, ValueError) as error:
-        raise DataError(f"{name}: is not a whole Parquet file: {one_line(error)[:_LONGEST_SHOWN]}") from error
+        raise DataError(f"{name}: is not a complete Parquet file: {one_line(error)[:_LONGEST_SHOWN]}") from error
 
 
 def matrix_of(column: "pa.ChunkedArray") -> "np.ndarray[Any, Any]":

@@ -22,7 +22,7 @@ ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
 """Column map, or text ``FILE.toml[:NAME]`` that selects a map of a file."""
 
 TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log", ".asc")
-"""Suffixes of text tables."""
+"""File-name suffixes of text tables."""
 
 
 @checked
@@ -92,7 +92,7 @@ def read_recording(
         return read_parquet(file, atmosphere)
     if file.suffix.lower() == ".mat":
         raise DataError(
-            f"{file}: is a .mat file, whose variables have no units: name them in a column map, "
+            f"{file}: the variables of a .mat file have no units: give names and units in a column map, "
             f"{argument_text('columns', 'FILE.toml:NAME')}"
         )
     if not file.exists():
@@ -100,8 +100,8 @@ def read_recording(
     from ppafo.storage.frames import remedy_for
 
     named = argument_text("columns", "FILE.toml:NAME")
-    other = f"; a table of text of another suffix is read through a column map, {named}"
+    other = f"; read a text table with another suffix through a column map, {named}"
     raise DataError(
-        f"{file}: is no .nc, .parquet or {', '.join(TEXT_SUFFIXES)} file and no result folder"
-        f"{remedy_for(file) or other}"
+        f"{file}: must be a result folder or a .nc, .parquet, {', '.join(TEXT_SUFFIXES[:-1])} or "
+        f"{TEXT_SUFFIXES[-1]} file{remedy_for(file) or other}"
     )

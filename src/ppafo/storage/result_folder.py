@@ -110,8 +110,8 @@ def read_stored(folder: str | Path) -> StoredResult:
     if not (folder_path / RUN_FILE).is_file() and (folder_path / MARK).is_file():
         command = marking_command(folder_path)
         raise DataError(
-            f"{folder}: is a result of 'ppafo {command}', not of a run; 'ppafo export figure' draws what has a figure, "
-            "read_recording reads a file of it, and its JSON file has the numbers"
+            f"{folder}: is a result of 'ppafo {command}', not of a run; use its JSON file for numbers, read_recording "
+            "for a recording in it, and 'ppafo export figure' for its figures"
         )
     document = read_document(folder_path)
     if sha256(read_bytes(folder_path / NETCDF_FILE)).hexdigest() != document["recording"].get("sha256"):
@@ -127,7 +127,7 @@ def read_document(folder: str | Path) -> dict[str, Any]:
     path = Path(folder) / RUN_FILE
     document = read_json(path)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise DataError(f"{path}: is not of a ppafo result (its 'format' is not '{FORMAT}')")
+        raise DataError(f"{path}: does not belong to a ppafo result ('format' is not '{FORMAT}')")
     if document.get("schema_version") is True or document.get("schema_version") != SCHEMA_VERSION:
         version = document.get("schema_version")
         raise DataError(
@@ -135,7 +135,7 @@ def read_document(folder: str | Path) -> dict[str, Any]:
             f"make the result again with this version"
         )
     if not isinstance(document.get("recording"), dict) or not isinstance(document.get("files"), list):
-        raise DataError(f"{path}: does not state what its recording and its files are")
+        raise DataError(f"{path}: 'recording' must be an object and 'files' a list; make the result again")
     return document
 
 
@@ -154,7 +154,9 @@ def add_to_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
                 or not isinstance(stated, list)
                 or not all(type(name) is str for name in stated)
             ):
-                raise DataError(f"{folder / name}: does not state what its files are")
+                raise DataError(
+                    f"{folder / name}: 'files' must be a list of names and '{HASHES}' an object; make the result again"
+                )
             document[HASHES] = dict(sorted({**hashes, **hashes_of(contents)}.items()))
             document["files"] = sorted({*stated, *contents})
             marks[name] = f"{json_text(document)}\n".encode()

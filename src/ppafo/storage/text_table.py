@@ -81,9 +81,16 @@ def without_copies(columns: Mapping[str, Floats], twins: Mapping[str, Sequence[s
 def said_of_doubled(twins: Mapping[str, Sequence[str]], left: Mapping[str, object], noun: str) -> list[str]:
     """Return a remark on each duplicated name whose columns all remain in ``left``; above a limit, only a count."""
     said = [
-        f"{noun} of one name, {one_line(name)[:LONGEST_SHOWN]!r}: they are {', '.join(map(repr, own))} here"
+        f"several {noun} are named {one_line(name)[:LONGEST_SHOWN]!r}: they were renamed {', '.join(map(repr, own))}"
         for name, own in twins.items()
         if all(other in left for other in own)
     ]
     more = len(said) - _MOST_SAID
-    return said if more <= 0 else [*said[:_MOST_SAID], f"so are {noun} of {more} more names"]
+    return (
+        said
+        if more <= 0
+        else [
+            *said[:_MOST_SAID],
+            f"{noun} of {more} more repeated {'name' if more == 1 else 'names'} were renamed likewise",
+        ]
+    )

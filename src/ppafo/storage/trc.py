@@ -44,7 +44,7 @@ def read_trc(path: str | Path) -> _MarkerTable:
         lines = text_lines(path)
         if not lines[0].startswith(_FIRST_WORD) or len(lines) <= _HEAD_LINES:
             raise DataError(
-                f"is not a .trc file: its first line begins with '{_FIRST_WORD}', and five lines come before rows"
+                f"is not a .trc file: line 1 must begin with '{_FIRST_WORD}', and rows must follow line {_HEAD_LINES}"
             )
         unit = dict(zip(lines[1].split(), lines[2].split(), strict=False)).get("Units", "")
         if unit not in _UNITS:
@@ -55,7 +55,7 @@ def read_trc(path: str | Path) -> _MarkerTable:
             raise DataError("line 4: must begin with 'Frame#', 'Time' and the names of markers, separated by tabs")
         written = [name for name in head[2:] if name]
         if not written:
-            raise DataError("line 4: names no marker; every marker needs a name of its own")
+            raise DataError("line 4: has no marker names")
         names = told_apart(written)
         time, coordinates = _rows(lines, names)
     except DataError as error:

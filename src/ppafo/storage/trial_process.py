@@ -15,9 +15,9 @@ from ppafo.errors import DataError
 REFUSED, OUT_OF_MEMORY = 76, 77
 """Exit codes: invalid file, with one line of explanation on the output; and excessive memory."""
 _ALWAYS_ALLOWED = 400_000_000
-"""Memory [bytes] allowed for any file."""
+"""Memory that reading may take for a file of any size [bytes]."""
 _MAXIMUM_GROWTH = 100
-"""Largest ratio of memory to file size [-] for larger files."""
+"""Largest ratio of memory for reading to file size [-], for larger files."""
 
 
 def read_on_trial(reader: str, library: str, path: str) -> int:

@@ -117,7 +117,7 @@ _ZEROS = _both_ways(0.003, 0.01, 0.03, 0.1, 0.3, 0.6)
 _GAINS = (0.3, 0.6, 0.8, 0.95, 0.98, 1.02, 1.05, 1.25, 1.6, 3.0)
 """Trial gains of a sensor [-]."""
 _DELAYS = _both_ways(0.001, 0.003, 0.006, 0.012, 0.025)
-"""Trial delays [s] of one sensor with respect to the others."""
+"""Trial delays of a sensor relative to the other sensors [s]."""
 _LONG_DELAYS = _both_ways(0.015, 0.03, 0.05, 0.08, 0.12)
 """Trial delays [s] of all sensors with respect to the command."""
 _RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)

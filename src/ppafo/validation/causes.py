@@ -163,7 +163,7 @@ def _units_of_moving(
 
 
 def _tried_in_turn(stages: Iterable[Sequence[SizedCause]]) -> tuple[list[SizedCause], list[SizedCause]]:
-    """Return the candidates tried, stage by stage until a candidate explains the recordings, and those that do."""
+    """Return the candidates tried stage by stage until success, and the candidates that explain the recordings."""
     tried: list[SizedCause] = []
     for stage in stages:
         tried += stage
@@ -255,7 +255,7 @@ def _in_other_unit(
 
 
 def _samples(records: Sequence[Record]) -> list[CandidateCause]:
-    """Return faulty samples of all channels as one candidate cause; an empty list if there are none."""
+    """Return faulty samples of all channels as a single candidate cause; empty without faulty samples."""
     faulty = [record for record in records if record.words]
     if not faulty:
         return []
@@ -293,7 +293,7 @@ def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[Candid
 
 
 def _cause_of(named: Sequence[SizedCause], penalty: float, others: Sequence[SizedCause] = ()) -> ResidualCause:
-    """Return the best of the ``named`` causes, with all others that the recordings cannot distinguish from it.
+    """Return the best of the ``named`` causes, with all causes that the recordings cannot distinguish from it.
 
     ``others`` explain the recordings only together with usual sensor errors, and are listed last.
     """

@@ -9,7 +9,7 @@ from ppafo.signals.recording import Floats
 from ppafo.validation.compared import ErrorLimit
 
 _SHIFTS = 81
-"""Number of delays on the initial grid, from one limit to the other."""
+"""Number of delays on the initial search grid between both limits."""
 _MAXIMUM_SAMPLES = 4000
 """Largest number of samples of a channel used to estimate the delay."""
 _MINIMUM_GAIN = 25.0
@@ -17,7 +17,7 @@ _MINIMUM_GAIN = 25.0
 _SMALLEST_GAIN = 1.0e-12
 """Reduction of the squared error below which two curves are equal to engine accuracy."""
 _RESOLUTION = 0.02
-"""Delay below which it is taken as 0, as a fraction of the sample interval [-]."""
+"""Smallest detectable delay, as a fraction of the sample interval [-]; smaller delays count as 0."""
 _ACCURACY = 1.0e-7
 """Accuracy of the estimated delay as a fraction of the limit [-]."""
 _AT_LIMIT = 0.99

@@ -70,7 +70,7 @@ def read_measured(
     columns: ColumnMap | None = None,
     map_name: str = "",
 ) -> MeasuredRecording:
-    """Read a recording from a file or result folder, or take it from an object, and check it.
+    """Read and check a recording, given as an object, a file or a result folder.
 
     With ``columns``, a file is read through this column map, which messages call ``map_name``. Raises DataError if the
     recording cannot be compared with a model.

@@ -179,7 +179,7 @@ class Opening:
         return through + sizes.beside * laminar if self.law == "both" else through
 
     def rough_sizes(self, first: Floats, second: Floats, flow: Floats) -> tuple[OpeningSizes, OpeningSizes]:
-        """Return non-negative least-squares sizes for a flow [kg/s], and sizes if each part alone carried all of it.
+        """Return start sizes by non-negative least squares, and the sizes if each part alone carried the whole flow.
 
         The flow is linear in the sizes; the nonlinear critical ratio is set to its usual value.
         """

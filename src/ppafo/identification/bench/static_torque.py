@@ -211,7 +211,7 @@ def _straight_line(readings: TorqueReadings, files: str) -> tuple[float, float, 
 
 
 def _of_files(at: Values, names: list[str], files: NDArray[np.int64]) -> Floats:
-    """Return the tolerance of each reading: the value of its file, or the common value; 0 if there is none."""
+    """Return the tolerance of each reading: value of its file, or common value; 0 without tolerance."""
     values = np.array([at[name] for name in names] or [0.0])
     return np.asarray(values[files] if len(names) > 1 else values)
 

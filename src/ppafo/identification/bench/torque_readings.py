@@ -23,7 +23,7 @@ _MINIMUM_SAMPLES = 6
 _MINIMUM_LEVELS = 3
 """Least number of different pressures to test whether the torque is linear in pressure."""
 _SAME_LEVEL = 0.1
-"""Fraction of the highest pressure [-] within which pressures are one level, because a regulator jitters."""
+"""Largest pressure difference within a level, relative to the highest pressure [-]; a regulator jitters."""
 _MORE_THAN_FRICTION = 0.3
 """Largest jump of the torque at one pressure when friction reverses, as a fraction of its range [-]."""
 _BINS = 20

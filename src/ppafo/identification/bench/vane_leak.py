@@ -142,7 +142,7 @@ class _ClosedChambers(NamedTuple):
 
     @property
     def changes(self) -> tuple[float, float]:
-        """Fall of the fuller chamber's pressure and rise of the other's [Pa]."""
+        """Fall of the pressure in the fuller chamber, and rise in the other chamber [Pa]."""
         edge = self.edge
         fall, rise = (
             float(np.mean(pressure[-edge:]) - np.mean(pressure[:edge])) for pressure in (self.first, self.second)
@@ -159,12 +159,12 @@ class _ClosedChambers(NamedTuple):
 
     @property
     def changing(self) -> int:
-        """Index of the pressure that determines the leak: the fuller chamber's, or the other's if that is constant."""
+        """Index of the changing pressure that determines the leak: 0 for the fuller chamber, 1 for the other."""
         return 1 if self.room == 0 else 0
 
     @property
     def sensors(self) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
-        """Channels of the fuller chamber and of the other, with their pressures [Pa]."""
+        """Channels of the fuller and the other chamber, with their pressures [Pa]."""
         return (f"pressure_{self.fuller}", self.first), (f"pressure_{3 - self.fuller}", self.second)
 
     @property
@@ -186,7 +186,7 @@ class _ClosedChambers(NamedTuple):
         return float(start), float(end)
 
     def numbers(self) -> Iterator[FitVariable]:
-        """Yield the unknowns: initial pressures (in a room, with a prior of its noise) and relaxation after filling."""
+        """Yield the unknowns: initial pressures, with a prior in a room, and relaxation after filling."""
         for side, (sensor, values) in enumerate(self.sensors):
             size = max(abs(self.changes[self.changing]), float(np.std(np.diff(values))), 1.0)
             initial = sought(_START.format(sensor, self.number), float(values[: self.edge].mean()), 1.0, scale=size)
@@ -358,7 +358,7 @@ def _over_volume(size: ReportedNumber, fuller: int) -> ReportedNumber:
 def _ratio(
     decays: tuple[_ClosedChambers, ...], volume: float | None, other: float | None, deviation: float
 ) -> tuple[FitVariable, ...]:
-    """Return the volume ratio as unknown, or with a prior if both volumes [m^3] are known; nothing with a room."""
+    """Return the chamber volume ratio as unknown, or with a prior for known volumes [m^3]; empty with a room."""
     changes = [decay.changes for decay in decays if decay.room is None]
     if not changes:
         return ()

@@ -1,4 +1,4 @@
-"""Outliers: samples far from their neighbours, and flow against its direction."""
+"""Detection of wrong readings: samples far from their neighbours, and flow against its direction."""
 
 import math
 from collections.abc import Sequence

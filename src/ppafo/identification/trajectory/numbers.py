@@ -107,7 +107,7 @@ _FURTHEST = 100.0
 """Default bounds of a positive parameter, as the largest ratio to its start value, up and down [-]."""
 
 _SCALE = 100.0
-"""Scale of a parameter with a prior, in standard deviations [-]; finite differences are at most a thousandth of it."""
+"""Scale of a parameter with a prior, in standard deviations [-]; a finite difference is at most 0.001 scales."""
 
 _STATE = frozenset({"motion", "initial"})
 """Sections with the initial state of a run, which a recording may give more accurately."""

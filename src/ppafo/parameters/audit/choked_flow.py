@@ -12,7 +12,7 @@ from ppafo.parameters.device import Gas
 _C1 = "reported.choked_flow_constant"
 _EXPONENT = "reported.choked_flow_exponent"
 _ROUNDING = 1e-3
-"""Relative tolerance beyond the reported digits, for other values of R, M and 273 or 273.15 K."""
+"""Relative tolerance besides the reported digits [-], for other values of R, M and 273 or 273.15 K."""
 
 _LONGEST, _LARGEST = 80, 1e3
 """Largest number of characters of a formula, and largest magnitude of its value."""
@@ -25,7 +25,7 @@ _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
 
 
 def check_choked_flow(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a finding for each reported constant, a note if it agrees, and a finding for the reported exponent."""
+    """Yield a finding for each reported flow constant, a note if it agrees, and for the reported exponent."""
     gas = evidence.gas()
     if gas is None:
         return

@@ -159,7 +159,7 @@ class Evidence:
         return self.number(ATMOSPHERE_PATH) or STANDARD_ATMOSPHERE
 
     def angle_range(self) -> tuple[str, float, str, float] | None:
-        """Return path and value [rad] of the smallest and the largest angle in use: reported ones, else the stops."""
+        """Return path and value [rad] of the smallest and the largest angle in use, from reports or else the stops."""
         numbers = self.parameter_set.numbers
         low_path, high_path = (
             reported if reported in numbers else stop

@@ -20,7 +20,7 @@ _SHIFTS = (-3, -2, -1, 1, 2, 3)
 
 
 def check_inertia(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for each violated product, and a note on a single inertia that satisfies both."""
+    """Yield errors for damping or friction contradicting inertia times decay rate, and a note on a fitting inertia."""
     inertia = evidence.magnitude(_INERTIA)
     decay_path, decay = _decay_rate(evidence)
     if inertia is None:

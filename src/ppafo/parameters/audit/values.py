@@ -1,4 +1,4 @@
-"""Checks of the values of a set: dimensions, ranges, data of the named gas, and error of the ideal gas law."""
+"""Checks of the values of a parameter set: dimensions, ranges, data of the named gas, ideal-gas error."""
 
 import contextlib
 import math
@@ -62,7 +62,7 @@ def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
 
 
 def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a warning with the values missing for a device, unless the set names another set that completes it."""
+    """Yield a warning on values that a device lacks, unless the set names a completed set."""
     parameter_set = evidence.parameter_set
     if parameter_set.completed_by:
         return
