@@ -30,7 +30,7 @@ def linearise(
         scenario: name of a scenario, or a .toml file
         at: a time of the run, such as '1.5 s', or 'equilibrium' (default): the steady state that holds the last value
             of the reference
-        overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
+        overrides: override one value, for example valve.area=12.6mm^2; may be repeated
         plugins: modules of your own, files or names, whose objects files may name
 
     Returns:
