@@ -30,15 +30,15 @@ def linearise(
         scenario: name of a scenario, or a .toml file
         at: a time of the run, such as '1.5 s', or 'equilibrium' (default): the steady state that holds the last value
             of the reference
-        overrides: override one value, for example valve.area=12.6mm^2; may be repeated
+        overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
         plugins: modules of your own, files or names, whose objects files may name
 
     Returns:
-        a Finding whose ``found`` is a LinearModel: matrices in SI units, poles [1/s], and margins of the loop, whose
-        ``phase_margin`` is in rad (in the report in degrees) and whose crossovers and bandwidth are in Hz
+        a Finding whose ``found`` is a LinearModel: matrices and signals in SI units, poles [1/s], and margins, of which
+        ``phase_margin`` is in rad (in the report in degrees), crossovers and bandwidth in Hz
 
     Raises:
-        ScenarioError: a time outside the run, a scenario without equilibrium, or an on/off valve
+        ScenarioError: a time outside the run, a scenario without equilibrium, and a valve that is on or off
 
     >>> import ppafo
     >>> model = ppafo.linearise("torque-task-proportional", overrides={"reference.level": 3.0}).found
