@@ -334,8 +334,10 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
         for constraint in parsed.constraints:
             bounds = [text for text in (constraint.at_most, constraint.at_least) if text is not None]
             if len(bounds) != 1:
-                has = "both" if bounds else "none"
-                raise StudyError(f"constraint '{constraint.metric}': give at_most or at_least, it has {has}")
+                has = "both" if bounds else "neither"
+                raise StudyError(
+                    f"constraint '{constraint.metric}': has {has} of at_most and at_least; give one of them"
+                )
             where = f"constraint '{constraint.metric}' = '{bounds[0]}'"
             limit = level_of(bounds[0], constraint.metric, where, atmosphere)
             limits.append(MetricLimit(constraint.metric, limit, constraint.at_most is not None, bounds[0]))

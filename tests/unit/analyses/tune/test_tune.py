@@ -162,7 +162,7 @@ def test_the_tunings_of_the_package_load_and_fit_the_published_schema() -> None:
         ({"objective": [{"metric": "rms_error", "weight": 0.0}]}, "weight = 0 has no effect"),
         ({"objective": [{"metric": "rms_error", "scale": "2 g"}]}, "objective 'rms_error': scale = '2 g'"),
         ({"objective": [{"metric": "rms_error", "scale": "0 N m"}]}, "must be above 0"),
-        ({"constraints": [{"metric": "rms_error"}]}, "give at_most or at_least, it has none"),
+        ({"constraints": [{"metric": "rms_error"}]}, "has neither of at_most and at_least; give one of them"),
         ({"constraints": [{"metric": "rms_error", "at_most": "2 g"}]}, "constraint 'rms_error' = '2 g'"),
         (
             {"robust": {"study": "torque-task-uncertain"}},
@@ -262,7 +262,7 @@ def test_gains_with_which_the_loop_rests_beside_its_reference_are_not_recommende
     assert lazy.tracking is not None
     assert lazy.metrics["gas_supplied"].value < finding.found.after.values["gas_supplied"]
     assert finding.found.after.result.tracking is None
-    assert "the loop follows its reference, with the previous gains it did not" in finding.found.verdict
+    assert "the loop follows its reference, unlike with the previous gains" in finding.found.verdict
     never = tune(tuning | {"search": [tuning["search"][0] | {"maximum": "0.01 1/(N m)"}]})
     assert not never.passed
     assert "no gains within the bounds let the loop follow its reference" in never.found.verdict
