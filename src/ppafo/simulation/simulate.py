@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ppafo.simulation.tracking import Tracking
 
 REMEDY = (
-    "the step may be too long for this device, or a value unrealistic: try a smaller run.step, "
+    "the time step may be too long for this device, or a value unrealistic: try a smaller run.step, "
     "and check the inertia, the volumes and the valve area (ppafo sets audit)"
 )
 

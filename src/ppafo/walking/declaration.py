@@ -159,15 +159,15 @@ def _check_motion(kind: object, place: str) -> None:
     """Raise ScenarioError for an unknown motion, or a motion that is no walk; the message starts with ``place``."""
     if kind in VANE_MOTIONS:
         raise ScenarioError(
-            f"{place}: a walk file needs the motion '{WALK}'; 'ppafo simulate' runs a scenario without one, and "
-            "'ppafo export opensim' takes the folder of its result"
+            f"{place}: a walk file needs motion.kind = '{WALK}'; use 'ppafo simulate' for other scenarios, and give "
+            "'ppafo export opensim' the folder of its result"
         )
     with refused_as(ScenarioError, place, KindError):
         is_known = not kind or is_walk(str(kind))
     if not is_known:
         # The motions of a vane are named too: the file may be meant for one.
         known = tuple(MOTIONS)
-        raise ScenarioError(f"{place} is not known{nearest_name(str(kind), known)}; allowed: {', '.join(known)}")
+        raise ScenarioError(f"{place} is unknown{nearest_name(str(kind), known)}; allowed: {', '.join(known)}")
 
 
 def _texts(_document: Mapping[str, Any]) -> tuple[str, ...]:

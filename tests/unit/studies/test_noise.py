@@ -97,7 +97,7 @@ def test_a_seed_varies_as_whole_numbers() -> None:
     [
         (
             {"path": NOISE, "kind": "uniform", "minimum": 1, "maximum": 9},
-            "gives no whole numbers, which 'sensors.seed' needs",
+            "does not give whole numbers, which 'sensors.seed' needs",
         ),
         ({"path": NOISE, "kind": "list", "values": [1, 2.5]}, "2.5 must be a whole number"),
         ({"path": NOISE, "kind": "grid", "first": 1, "last": 4, "count": 3}, "2.5 must be a whole number"),

@@ -51,7 +51,7 @@ def test_an_uncertainty_of_a_gauge_pressure_is_a_difference(stating: Callable[..
     ("path", "overrides", "expected"),
     [
         ("valve.area", (), "needs an uncertainty in the parameter set 'mine.toml', which has none"),
-        ("supply.pressure", ("supply.pressure=40 psi_g",), "was changed by an override"),
+        ("supply.pressure", ("supply.pressure=40 psi_g",), "an override replaced it"),
         ("reference.level", (), "which has none"),
     ],
 )

@@ -241,7 +241,7 @@ def test_what_python_hands_over_wrongly_is_refused_in_one_line(steady: LinearMod
     with pytest.raises(ArgumentError, match=r"at=None: must be a number of seconds, a time .* or 'equilibrium'"):
         linear(TASK, None)  # type: ignore[arg-type]
     for answer in (linearise, ppafo.simulate):
-        with pytest.raises(ScenarioError, match="overrides apply to the name or file of a scenario"):
+        with pytest.raises(ScenarioError, match="a loaded scenario accepts no overrides"):
             answer(steady.scenario, overrides=["run.duration=1 s"])
 
 

@@ -69,7 +69,7 @@ def test_a_request_beyond_the_actuator_names_both_torques() -> None:
     tracking = ppafo.walk("proportional", minutes=0.1, overrides=["supply.pressure=15 psi_g"]).tracking
     assert tracking is not None
     assert re.fullmatch(
-        r"its controller requests more torque than the actuator can give in \d+ % of the time, such as -5 N m where "
+        r"for \d+ % of the time the controller requests more torque than the actuator gives, such as -5 N m where "
         r"the actuator gives -1\.\d+ N m",
         tracking.cause,
     )

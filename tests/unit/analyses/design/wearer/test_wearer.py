@@ -222,7 +222,7 @@ def test_a_device_for_a_child_is_found_once_the_stature_that_is_asked_for_is_giv
     finding = ppafo.design(**wanted, stature=stature)
     assert isinstance(finding.found, WearerSizing)
     assert finding.found.device is not None
-    assert ("extrapolated here: set measured segments" in text_of(finding)) == (stature < 1.45)
+    assert ("extrapolated here: give the measured segments" in text_of(finding)) == (stature < 1.45)
 
 
 @pytest.mark.usefixtures("little")
