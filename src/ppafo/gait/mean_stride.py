@@ -12,7 +12,7 @@ SignSource = Literal["map", "columns", "gait_file"]
 
 @dataclass(frozen=True, slots=True)
 class MeanStride:
-    """Stride to be checked: mean curves (101 samples, SI) by name, stance fraction [-] and stride time [s]."""
+    """Mean stride: files and curves (101 samples, SI) by curve name, stance fraction [-] and stride time [s]."""
 
     file: Mapping[str, str]
     curves: Mapping[str, Floats]

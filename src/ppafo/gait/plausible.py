@@ -22,7 +22,7 @@ STRIDE_TIME = (0.5, 3.0)
 
 
 def check_gait(gait: Gait, file: str) -> None:
-    """Raise DataError for a gait file with an implausible stride; the checks are the ones of ``check_plausible``."""
+    """Raise DataError for a gait file with an implausible stride, by the checks of ``check_plausible``."""
     percent = np.linspace(0.0, 1.0, 101)
     curves = {name: curve.values_at(percent) for name, curve in gait.curves.items()}
     check_plausible(MeanStride(dict.fromkeys(curves, file), curves, gait.stance_share, gait.stride_time, "gait_file"))
@@ -79,13 +79,13 @@ USUAL_FORCE_MEAN = (0.42, 0.58)
 """Plausible mean of the vertical force [body weights]: both legs together carry 1, each half in symmetric walking."""
 
 _ON_GROUND = 0.05
-"""Force [body weights], in either direction, below which a plate reads without a foot on it."""
+"""Magnitude of the force [body weights] below which a force plate counts as unloaded."""
 _AFTER_TOE_OFF = 0.03
-"""Least time after toe-off [strides], because toe-off found from the shank is not more accurate."""
+"""Time after toe-off [strides] from which moments are checked; toe-off found from the shank has about this error."""
 _LEFT_IN_SWING = 0.25
-"""Largest moment in swing relative to the peak [-]; the swinging foot needs a few hundredths."""
+"""Largest moment in swing relative to the peak moment [-]; a swinging foot needs a few hundredths."""
 _FOOT_ALONE = 0.05
-"""Moment that a swinging foot may need in any case [N m/kg], however weak the push-off."""
+"""Moment that is accepted in swing however weak the push-off [N m/kg]."""
 
 
 def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
@@ -144,7 +144,7 @@ def moment_remarks(moment: Floats) -> list[str]:
 
 
 def check_moment_time(walk: MeanStride) -> None:
-    """Raise DataError for an ankle moment that acts while the foot is off the ground; a stride without one passes."""
+    """Raise DataError for an ankle moment that acts while the foot is off the ground; skipped without a moment."""
     if "ankle_moment" not in walk.curves:
         return
     moment = walk.curves["ankle_moment"]

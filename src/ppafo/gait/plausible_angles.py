@@ -11,7 +11,7 @@ SHANK_RANGE = (25.0, 120.0)
 ANKLE_RANGE = (5.0, 80.0)
 ANKLE_LIMITS = (40.0, 150.0)
 MIDSTANCE = slice(15, 41)
-"""Samples [percent of the stride] in which the foot stands, so that the ankle rotates with the shank."""
+"""Mid-stance samples [percent of the stride], in which the foot stands and the ankle rotates with the shank."""
 _TURNS = 2.0
 """Least rotation of a standing foot [deg, RMS] that shows a wrong sign; recorded feet rotate by 0.5 to 1.5 deg."""
 _TURNED_BACK = 0.1

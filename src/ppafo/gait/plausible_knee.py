@@ -18,7 +18,7 @@ SHANK_LENGTHS = (0.25, 0.6)
 """Range of shank lengths [m] for the best fit, as a gait does not contain the length."""
 
 _FITS = 0.6
-"""Largest relative misfit of the rotation [-, RMS] that counts as a fit; correct recordings have 0.3 to 0.46."""
+"""Largest misfit to a rotation about the ankle [-, RMS] that counts as a fit; correct recordings have 0.3 to 0.46."""
 _LEFT_BY_MISTAKE, _LEFT_BY_ONE = 0.7, 0.62
 """Fractions of the misfit that remain after correction of a mistake: below the first for a remark, below the second
 for an error. Correct knees in units of g leave 0.48 to 0.57, and a correct knee in its own unit has shown 0.68."""
@@ -54,7 +54,7 @@ def _too_small(factor: float, words: str) -> tuple[_Mistake, ...]:
 def _too_large(factor: float) -> tuple[_Mistake, ...]:
     """Return the mistakes of values too large by a factor, first for one curve alone.
 
-    The order matters because a knee_up divided by the factor fits almost as well as none.
+    The order matters because knee_up divided by the factor fits almost as well as the given curves.
     """
     words, fraction = f"{factor:g} times too large", 1.0 / factor
     return (
@@ -130,7 +130,7 @@ def turning_about_ankle(shank: Floats, stride_time: float) -> Floats:
 
 
 def _misfit(measured: Floats, expected: Floats) -> float:
-    """Return the misfit for the best shank length relative to the expected acceleration [-]; infinite at rest."""
+    """Return the relative misfit to the expected acceleration at the best shank length [-]; infinite at rest."""
     square = float(np.sum(expected**2))
     if square == 0.0:
         return float("inf")
@@ -144,13 +144,13 @@ KNEE_TRAVEL = (0.5, 80.0)
 KNEE_MEAN = 1.5
 """Largest mean of the knee acceleration over a stride [m/s^2]; it is 0 for a periodic motion."""
 _HELD_BACK = 0.2
-"""Fraction of its range by which a knee must decelerate in the phase of usual acceleration to reject its sign.
+"""Fraction of its range by which a knee must decelerate in the phase of usual acceleration to reject its sign [-].
 
 A measured knee accelerates by 0.8 to 0.9 of its range.
 """
 
 _PARTS = {"knee_forward": ((-0.3, 0.0), (0.3, 0.6)), "knee_up": ((0.0, 0.3), (0.4, 0.7))}
-"""Intervals from toe-off, as fractions of the swing, of acceleration forward or up, and of deceleration or fall."""
+"""Intervals about toe-off [fractions of the swing] of acceleration (forward, up) and of deceleration."""
 
 
 def check_knee(walk: MeanStride) -> None:
@@ -168,7 +168,7 @@ def check_knee(walk: MeanStride) -> None:
 
 
 def check_knee_means(walk: MeanStride) -> None:
-    """Raise DataError for knee accelerations that do not average to 0 over a stride; a stride without any passes."""
+    """Raise DataError for knee accelerations whose mean over a stride is not 0; skipped without accelerations."""
     # Without the last sample, which is the first phase again.
     means = {name: float(np.mean(walk.curves[name][:-1])) for name in KNEE if name in walk.curves}
     raise_noted(

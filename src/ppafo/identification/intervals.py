@@ -16,10 +16,10 @@ from ppafo.identification.whitened import Linear, cost_of, squares_of, whitened_
 from ppafo.signals.recording import Floats
 
 _TRIES, _CORRECTIONS, _LINEARISATIONS = 6, 3, 4
-"""Largest numbers of trial points per limit, of steps with the Jacobian of the estimate, of steps with a new one."""
+"""Largest numbers of trial points per limit, of steps with the fixed Jacobian, and of steps with a new Jacobian."""
 
 _SHARES = 0.5 ** np.arange(4.0)[:, None]
-"""Fractions of a step with a new Jacobian [-], of which the best is taken."""
+"""Trial fractions of a step with a new Jacobian [-]; the best is taken."""
 
 _STILL = 0.3
 """Decrease of the squares [-] below which the other variables have converged."""
@@ -28,10 +28,10 @@ _FURTHER = 1.3
 """Least factor by which a trial limit is moved outwards while the recordings are still explained [-]."""
 
 _NARROW = 0.1
-"""Width of the bracket of a limit, relative to its distance from the estimate [-], at which interpolation is linear."""
+"""Relative width of the bracket of a limit [-] below which the limit is interpolated linearly."""
 
 _BENT = 1.1
-"""Least ratio of profile and linear limits [-] for which the profile is followed."""
+"""Least ratio of profile to linear distance [-] above which the limit follows the profile likelihood."""
 
 _SHOWN_WEIGHT = 0.1
 """Least weight of a variable in a combination [-] for which it is listed."""
@@ -71,7 +71,7 @@ def _end(
     straight: tuple[float, Floats],
     times: float,
 ) -> float:
-    """Return one confidence limit of a variable, between the limit of the linear law and the bound.
+    """Return one confidence limit of a variable by profile likelihood, searched from the linear limit to the bound.
 
     ``least`` is the sum of squares at the estimate; ``straight`` is the sum of squares near the linear limit, and the
     point at which it is reached.
@@ -104,7 +104,7 @@ def _end(
 
 
 def _least_beside(runs: FitRuns, points: Floats, fixed: list[int], linear: Linear) -> tuple[Floats, Floats]:
-    """Return the minimum of the squares with one variable fixed, for each scaled point, and the points of the minima.
+    """Return the least sum of squares [-] at each scaled point with one variable fixed, and the points that reach it.
 
     ``fixed`` is the index of the fixed variable of each point. The other variables take Gauss-Newton steps with the
     Jacobian of the estimate. The minimum is infinite if no run succeeds.
@@ -131,7 +131,7 @@ def _least_beside(runs: FitRuns, points: Floats, fixed: list[int], linear: Linea
 
 
 def _least_along(runs: FitRuns, point: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
-    """Return the minimum of the squares with one variable of a scaled point fixed, and the point of the minimum.
+    """Return the least sum of squares [-] with one variable of a scaled point fixed, and the point that reaches it.
 
     The other variables take Gauss-Newton steps within their bounds, each with a new Jacobian, because far from the
     estimate its Jacobian leads out of a curved valley. The minimum is infinite if no run succeeds.

@@ -57,7 +57,7 @@ _LARGEST_FRACTION = 0.5
 
 
 class BenchSection(StrictTable):
-    """Tolerances of the bench as limits (+-); 0 for an exact value."""
+    """Table [bench] of a problem file: tolerances as limits (+-); 0 for an exact value."""
 
     load: Annotated[
         Text | None, Field(description="tolerance of the external torque, for each recording; default 2 %")
@@ -196,7 +196,7 @@ def tolerances_of(section: BenchSection | None, file: str) -> Tolerances:
 
 
 def quantity_of(where: str, text: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Return the number in a text of a problem file, in ``unit``; ``where`` is the file and key in messages.
+    """Parse a quantity of a problem file into a number in ``unit``; ``where`` is the file and key in messages.
 
     Raises IdentificationError if the text does not fit the unit.
     """

@@ -16,7 +16,7 @@ _ROUNDS = 20
 """Largest number of iterations between noise and variables; most fits converge in a few."""
 
 _RANK = 1.0e-13
-"""Least eigenvalue of the scaled curvature [-] of an observable direction."""
+"""Least eigenvalue of the scaled curvature [-] for a direction to be observable."""
 
 
 class Linear(NamedTuple):

@@ -1,4 +1,4 @@
-"""Candidate causes of a disagreement, with the trial magnitudes of each: one generator per stage of the search."""
+"""Candidate causes of a disagreement with trial magnitudes, in one generator for each stage of the search."""
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -52,7 +52,7 @@ _CONVERTED = "", "Pa", "Pa_a", "Pa_g"
 
 
 def _groups(names: Collection[str]) -> Iterator[tuple[tuple[str, ...], str, str]]:
-    """Yield groups of pressure sensors that may share an error: their channels, a description, and "seem" or "seems".
+    """Yield groups of pressure sensors that may share an error: channels, description, and "seem" or "seems".
 
     Groups are each recorded sensor, both chambers, both supplies, and all sensors; the largest group comes first.
     """
@@ -69,7 +69,7 @@ def _groups(names: Collection[str]) -> Iterator[tuple[tuple[str, ...], str, str]
 def exchanges(
     device: Device, names: Collection[str], units: Mapping[str, AbstractSet[str]]
 ) -> Iterator[CandidateCause]:
-    """Yield mistakes without a magnitude: wrong unit, gauge read as absolute or reverse, swapped channels, wrong signs.
+    """Yield causes without a magnitude: wrong unit, gauge read as absolute or reverse, swapped channels, wrong signs.
 
     ``units`` has, for each channel that moves, the units declared in the files, empty for none. Units are not tried for
     a chamber that stays at atmospheric pressure, which shows no factor, nor against a unit that the file declares.
@@ -107,7 +107,7 @@ def exchanges(
 
 
 def _both_ways(*sizes: float) -> tuple[float, ...]:
-    """Return the given magnitudes with both signs, in increasing order."""
+    """Return magnitudes with both signs, in increasing order."""
     return (*(-size for size in reversed(sizes)), *sizes)
 
 
@@ -117,18 +117,18 @@ _ZEROS = _both_ways(0.003, 0.01, 0.03, 0.1, 0.3, 0.6)
 _GAINS = (0.3, 0.6, 0.8, 0.95, 0.98, 1.02, 1.05, 1.25, 1.6, 3.0)
 """Trial gains of a sensor [-]."""
 _DELAYS = _both_ways(0.001, 0.003, 0.006, 0.012, 0.025)
-"""Trial delays [s] of one sensor with respect to the others."""
+"""Trial delays of a sensor relative to the other sensors [s]."""
 _LONG_DELAYS = _both_ways(0.015, 0.03, 0.05, 0.08, 0.12)
 """Trial delays [s] of all sensors with respect to the command."""
 _RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)
 """Trial rates [-] of the clock of a recording."""
 
 _EXACT = SensorErrors(zero=0.0, gain=0.0, delay=0.0)
-"""Usual sensor errors of a command: none, since no sensor reads the command."""
+"""Usual sensor errors of a command: none, because a command is not read by a sensor."""
 
 
 def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
-    """Yield errors with a magnitude: gain and zero of pressures, angle and command; delays; the rate of the clock."""
+    """Yield causes with a magnitude: gain and zero of pressures, angle and command; delays; clock rate."""
     atmosphere = device.supply.atmospheric_pressure
     gauge = max(device.supply.pressure, device.supply.dorsiflexion_pressure) - atmosphere
     unit, per_pascal = _unit_of_pressure(device)
@@ -189,12 +189,12 @@ _ATMOSPHERES = (0.6, 0.7, 0.8, 0.9, 0.95, 1.03, 1.1)
 _SECTIONS = ("valve", "actuator", "friction", "foot_plate", "supply", "gas")
 """Sections of the parameter set whose parameters are tried, in this order."""
 _NOT_TRIED = ("actuator.angle_min", "actuator.angle_max", "actuator.restitution")
-"""Parameters that are observable only in a vane that reaches a stop; a replay starts between the stops."""
+"""Parameters observable only when the vane reaches a stop; a replay starts between the stops."""
 _OF_SUPPLY = {"supply.pressure": SUPPLY, "supply.dorsiflexion_pressure": DORSIFLEXION_SUPPLY}
 
 
 def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> Iterator[CandidateCause]:
-    """Yield each parameter of the set with trial values, and a wrong atmospheric pressure of gauge sensors."""
+    """Yield every parameter of the set with trial values, and a wrong atmospheric pressure for gauge sensors."""
     request = replay_of(measured, device, settings)
     scenario = replace(replayed_scenario(request), device=request.device)
     # Supply pressures that a replay follows in the recording, whatever the set has.
@@ -230,18 +230,18 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
 
 
 def _unit_of_pressure(device: Device) -> tuple[str, float]:
-    """Return the display unit of a pressure difference, and its value for a difference of 1 Pa."""
+    """Return the display unit of a pressure difference, and the number of these units in 1 Pa."""
     with shown_in(device.shown):
         return shown_unit("Pa_d").removesuffix("_d"), shown_value(1.0, "Pa_d")
 
 
 def _scaled(path: str, value: float, factor: float) -> ModelChange:
-    """Return a change in which one parameter is ``factor`` times its ``value`` [SI]."""
+    """Return a change of one parameter to ``factor`` times its ``value`` [SI]."""
     return ModelChange(numbers={path: factor * value})
 
 
 class _UnknownEffect(NamedTuple):
-    """Effect that a device may have and its model has not, with one magnitude to fit.
+    """Effect that is off in the model and may be present in the device, with one magnitude to fit.
 
     ``words`` describes the effect in messages. ``scaled`` are the settings equal to the magnitude, which is tried from
     ``lowest`` to ``highest`` [unit of these settings]; ``constant`` are the constant settings.

@@ -152,7 +152,7 @@ def test_a_label_of_two_points_refuses_nothing_but_itself(
     nobody = np.zeros((3, np.arange(0.0, walk.duration, 0.01).size))
     found = import_gait([written({"C1": nobody, "Other:C1": nobody})], ImportSettings(normative.body_mass))
     assert same(found.gait, normative)
-    assert "points of one name, 'C1': they are 'C1#1', 'C1#2' here" in "\n".join(found.remarks)
+    assert "several points are named 'C1': they were renamed 'C1#1', 'C1#2'" in "\n".join(found.remarks)
     with pytest.raises(
         DataError, match=r"has several different columns 'RANK'; choose 'RANK#1' or 'RANK#2' in a gait map"
     ):

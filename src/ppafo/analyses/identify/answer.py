@@ -30,13 +30,13 @@ from ppafo.units.shown import counted_from, in_units
 from ppafo.wording import count_of
 
 _FAR = 2.0
-"""Number of standard deviations above which a tolerance counts as contradicted."""
+"""Number of standard deviations above which a tolerance counts as contradicted by the recordings."""
 _SHOWN = 0.05
-"""Smallest share of a variance that is shown."""
+"""Smallest share of a variance that the report shows [-]."""
 _FAR_FROM_SET = 5.0
 """Ratio to the previous value above which a wrong unit is suspected: 6.89 is psi read as kPa, 8.85 N m as lbf in."""
 _ROW_HEAD = ("",) * 4
-"""Column heads of the rows of ``estimate_row``, which need none."""
+"""Empty column heads for the rows of ``estimate_row``."""
 _KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
 _CHANNELS = {
     "angle": (Kind("Vane angle", "rad", "angle"), ACTUAL),
@@ -47,7 +47,7 @@ _CHANNELS = {
 
 @dataclass(frozen=True, slots=True)
 class Identification:
-    """Result of an identification problem.
+    """Result of an identification: estimates of procedures and trajectory fit, and the new parameter set.
 
     ``name``: name of the problem
     ``results``: results of the procedures, in the order of their evaluation
@@ -183,7 +183,7 @@ def finding_of(identification: Identification) -> Finding[Identification]:
 
 
 def _conflict(sentence: str) -> tuple[str, ...]:
-    """Return a remark on the validity of the numbers under a conflict; empty without a conflict."""
+    """Return a remark that numbers hold for this model only, with the conflict; empty without a conflict."""
     return (f"holds for this model only: {sentence}",) if sentence else ()
 
 
@@ -246,7 +246,7 @@ def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> lis
 
 
 def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[float, str]:
-    """Return a number in the unit of the set, or in the display unit if the set does not have the number."""
+    """Convert a number [SI] to the unit of the parameter set, or to the display unit if the set does not have it."""
     reported, set_unit = in_set_unit(number, path, unit, before)
     return in_shown_unit(number, unit) if set_unit == unit else (reported, set_unit)
 

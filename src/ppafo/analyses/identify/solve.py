@@ -27,13 +27,13 @@ from ppafo.storage.result_folder import RUN_FILE
 from ppafo.units.shown import counted_from, shown_in
 
 _FILES_IN_TITLE = 4
-"""Number of recordings named in the title of the new set; its notes name all."""
+"""Largest number of recordings named in the title of the new set; the notes of the set name all."""
 _REPORTED = "reported."
-"""Prefix of the paths of values that others report of their device."""
+"""Prefix of the paths of values that a publication reports about its own device."""
 
 
 def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:
-    """Return the result of an identification problem.
+    """Solve an identification problem: procedures in order, trajectory fit, new parameter set.
 
     Paths are relative to ``folder``; ``file`` is the name used in error messages. The procedures run first, in the
     order in which each depends on the earlier ones, then the section [trajectory]. Raises the errors of ``identify``.
@@ -89,7 +89,7 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
 
 
 _ROW_TIMES = dict.fromkeys(("static-torque", "open-valve-flow", "valve-map"), 1.0)
-"""Time between rows without a time column [s], by procedure: those whose laws do not depend on time."""
+"""Time between rows of a table without a time column [s], for procedures whose laws do not depend on time."""
 
 
 def _sources(
@@ -122,7 +122,7 @@ def _sources(
 def _experiment_source(
     problem: ProblemFile, folder: Path, file: str, parameter_set: ParameterSet, experiment: ExperimentSection
 ) -> RecordingSource:
-    """Return the recording of an experiment; IdentificationError for a file with several."""
+    """Return the recording of an experiment; IdentificationError for a file with several recordings."""
     recording, columns = experiment.recording, experiment.columns
     source, *others = _sources(problem, folder / recording, file, columns, parameter_set)
     if others:

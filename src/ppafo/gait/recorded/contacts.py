@@ -1,4 +1,4 @@
-"""Contacts of a foot with the ground: heel strike and toe-off in a vertical force, and the plates of one foot."""
+"""Contacts of a foot with the ground: heel strike and toe-off from a vertical force, and force plates of one foot."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -89,7 +89,7 @@ def force_of_plates(
 
 
 def _is_of_foot(start: float | None, end: float | None, plate: Signal, shank: Signal) -> bool:
-    """Return whether the shank leans forward over a contact, as it does over a contact of its own foot."""
+    """Return whether the shank leans forward over a contact, which shows a contact of the same foot."""
     least = _LEAST_LEAN_OF_PART if start is None or end is None else _LEAST_LEAN
     first = max(float(plate.time[0] if start is None else start), float(shank.time[0]))
     last = min(float(plate.time[-1] if end is None else end), float(shank.time[-1]))

@@ -16,15 +16,15 @@ from ppafo.gait.recorded.signal import Signal
 from ppafo.signals.recording import Floats
 
 SAMPLES = 101
-"""Samples of a time-normalised curve, both ends of the stride included."""
+"""Number of samples of a time-normalised curve, both ends of the stride included."""
 PHASES = np.linspace(0.0, 1.0, SAMPLES)
 """Phases [strides] of a time-normalised curve, from 0 to 1."""
 REMARKED_SPREAD, REFUSED_SPREAD = 0.1, 0.25
-"""Standard deviation between strides relative to the range, for a remark and for rejection; steady: 0.004 to 0.06."""
+"""Standard deviation between strides relative to the range [-] for a remark and for rejection; usual: 0.004 to 0.06."""
 REMARKED_MISFIT, REFUSED_MISFIT = 0.03, 0.1
 """RMS residual of the series relative to the range [-] for a remark, and for rejection; correct curves: below 0.01."""
 _UNLOADED_PHASE = 0.02
-"""Interval at both ends of the stance [strides] with too little force for a centre of pressure."""
+"""Duration at both ends of the stance [strides] with too little force for a centre of pressure."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -22,17 +22,17 @@ from ppafo.gait.recorded.table import OFF, STRIKE, MotionTable
 from ppafo.wording import count_of
 
 FORCE, SHANK, FILE = "vertical_force", "shank_angle", "events of the file"
-"""Sources of strides."""
+"""Names of the sources of strides: vertical force, shank angle, and events stored in the file."""
 LEAST_STRIDES = 2
-"""Default of the least number of strides; it is 1 for a walk past a plate and for one cycle."""
+"""Default of the smallest number of strides; 1 for a walk across a force plate and for a single cycle."""
 _SMOOTH = 6.0
 """Cut-off frequency [Hz] of the low pass for the shank angle before events are searched."""
 _SHORTEST_STRIDE = 0.5
 """Shortest time between two heel strikes of one foot [s]."""
 _TOP = 0.35
-"""Heel strikes lie in this upper fraction of the range of the shank angle."""
+"""Upper fraction of the range of the shank angle in which heel strikes lie [-]."""
 _DEEPEST = np.radians(-15.0)
-"""Shank angle [rad] that the backward lean before the swing must exceed."""
+"""Shank angle [rad] below which the shank must lean backwards before the swing."""
 _NEAR = 0.15
 """Largest time difference [s] between an event found from the shank and the same event on a plate."""
 _ABOUT_STANCE = 0.05
@@ -64,7 +64,7 @@ class Stride:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Footfalls:
-    """Strides of a walk.
+    """Strides found in a walk, with their source.
 
     ``walk`` holds the signals by name, ``events`` names the source of the strides. ``is_overground`` is True if some
     strides are off the plates, ``is_one_cycle`` if the record is one cycle that was repeated.
@@ -110,7 +110,7 @@ def find_footfalls(
 
 
 def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, least: int) -> Footfalls:
-    """Return the strides from the force, if it has the ``least`` number, or from the source with more strides."""
+    """Return the strides from the force, if these are at least ``least``, or from the source with more strides."""
     trials, recorded = [table.trial for table in tables if table.trial is not None], list[Stride]()
     # Events of two trials have two clocks.
     if len(trials) == 1:
@@ -214,7 +214,7 @@ def heel_strikes(events: str, walk: Mapping[str, Signal]) -> list[float]:
 
 
 def usable_strides(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> list[Stride]:
-    """Return the strides over which both angles were recorded."""
+    """Return the strides over which both shank and ankle angle were recorded."""
     return [stride for stride in strides if all(strides_within(walk[name], [stride]) for name in REQUIRED)]
 
 

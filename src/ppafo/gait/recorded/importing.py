@@ -43,7 +43,7 @@ from ppafo.wording import count_of
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImportedGait:
-    """Result of the import of a gait.
+    """Imported gait with the strides, curves and fit errors behind it.
 
     ``strides`` are the strides used and ``left_out`` the strides rejected. ``curves`` holds the single strides by curve
     name, ``fit_errors`` the errors of the Fourier series. ``events`` is the source of the strides: ``vertical_force``,
@@ -64,7 +64,7 @@ class ImportedGait:
 def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> ImportedGait:
     """Return the mean stride of one walk of one person, from recorded files that share a clock.
 
-    The files may be of any format of ``reading.FORMS``: .mot, .sto, .csv, .txt, .tsv, .emt, .c3d, .trc, .mat.
+    The files may be of any format of ``source.FORMS``: .mot, .sto, .csv, .txt, .tsv, .emt, .c3d, .trc, .mat.
 
     Strides come from the vertical force if available, otherwise from events of the file or from the shank. Raises a
     DataError that lists all problems with file, column, row and remedy: after a problem with one curve, the other
@@ -152,7 +152,7 @@ def _finish(
     remarks: Sequence[str],
     wrong: list[PpafoError],
 ) -> ImportedGait:
-    """Return the gait of the mean curves; raises DataError if any is implausible, with all problems in ``wrong``."""
+    """Return the import result of the mean curves; raises DataError, with all problems, if a curve is implausible."""
     taken, walk, settings, signs_from = strides.taken, footfalls.walk, source.settings, source.signs_from
     share, time = (float(np.mean([getattr(each, name) for each in taken])) for name in ("stance_share", "time"))
     means = {name: curve.mean for name, curve in curves.items()}
@@ -242,7 +242,7 @@ def _gait(
     curves: Mapping[str, Any],
     events: str,
 ) -> Gait:
-    """Return the gait with its series and its description of the source."""
+    """Build the gait from settings, source files, strides and the fitted curves."""
     origin: Origin = "measured" if all(table.kind == "measured" for table in tables) else "synthetic"
     names = ", ".join(Path(table.file).name for table in tables)
     return Gait(

@@ -1,4 +1,4 @@
-"""Knee of a recorded walk: its position from hip and thigh or from columns, its direction, and remarks."""
+"""Knee of a recorded walk: position from hip and thigh or from columns, walking direction, and remarks."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

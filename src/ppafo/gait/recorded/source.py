@@ -1,4 +1,4 @@
-"""Recording from which a gait is imported: tables, map and signals of its files, gaps filled, and remarks."""
+"""Recording from which a gait is imported: tables, gait map and signals of its files, gaps filled, and remarks."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -44,7 +44,7 @@ FORMS: Kinds[GaitForm] = Kinds(
 
 
 def form_of(path: str | Path, name: str = "") -> GaitForm:
-    """Return the format of a file: the named one, else the first that recognises it; raises DataError if none does."""
+    """Return the file format by name, or the first format that recognises the file; raises DataError if none does."""
     if name:
         form = FORMS.get(name)
         if form is None:

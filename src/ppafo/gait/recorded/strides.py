@@ -33,7 +33,7 @@ ODD_SHAPE, ODD_PHASE, ODD_AGAINST_OTHERS = 0.25, 0.4, 4.0
 and at any one phase, and relative to the median distance of all strides. Impaired walking varies more, but in every
 stride."""
 _FEWEST_TO_COMPARE = 3
-"""Least number of strides for the detection of an odd one."""
+"""Least number of strides for the detection of an odd stride."""
 _MOST_ODD = 0.4
 """Fraction of odd strides above which no stride is rejected."""
 

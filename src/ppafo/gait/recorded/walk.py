@@ -36,9 +36,9 @@ _LEAST_FLAT = 0.1
 _SHORTEST_WALK = 1.0
 """Duration [s] below which a record may contain a part of a stride only, with little rotation of the shank."""
 _LEAST_UPRIGHT = 0.5
-"""Least vertical component of the mean shank relative to its length [-]."""
+"""Least vertical component of the mean line from knee to ankle, relative to its length [-]."""
 _RIGHT_ANGLE = 0.5 * np.pi
-"""Angle of the ankle [rad] between a vertical shank and a flat foot."""
+"""Ankle angle [rad] with a vertical shank and a flat foot."""
 _UNITS = {
     "shank_angle": ("rad",),
     "ankle_angle": ("rad",),
@@ -46,12 +46,12 @@ _UNITS = {
     "vertical_force": ("", "N", "N/kg"),
     "centre_of_pressure": ("m",),
 }
-"""SI units of the curves in a map, the package's own unit first."""
+"""SI units of the curves in a gait map, with the package's own unit first."""
 _POSITIVE = ("ankle_in_front", "plantarflexion", "up", "forward")
-"""Positive directions in the package."""
+"""Directions in a gait map that are positive in this package too."""
 
 MappedCurve = ShankMap | AngleMap | MomentMap | ForceMap | PressureMap
-"""Entry of a gait map for one curve; the knee has two and is read apart."""
+"""Entry of a gait map for a single curve; the knee, with two curves, is separate."""
 
 
 def walk_signals(
@@ -62,7 +62,7 @@ def walk_signals(
     is_default: bool,
     wrong: list[PpafoError],
 ) -> dict[str, Signal]:
-    """Return the signals that a map finds in tables; all problems with their columns are added to ``wrong``.
+    """Return the signals of a recorded walk by curve; problems with their columns are added to ``wrong``.
 
     Loads are divided by ``body_mass`` [kg] or by the body weight; ``stature`` [m] gives the length of the thigh.
 

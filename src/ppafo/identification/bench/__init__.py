@@ -1,4 +1,4 @@
-"""Bench procedures: each compares one physical law with recordings, through the common least-squares estimator."""
+"""Bench procedures: each fits one physical law to recordings, with the common least-squares estimator."""
 
 from ppafo.identification.bench.free_decay import free_decay
 from ppafo.identification.bench.open_valve_flow import open_valve_flow

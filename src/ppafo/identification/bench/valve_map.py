@@ -33,15 +33,15 @@ PROCEDURE = "valve-map"
 CHANNELS = ("command", "mass_flow", "upstream_pressure", "downstream_pressure")
 PRESSURES = ("upstream_pressure", "downstream_pressure")
 MINIMUM_SAMPLES = 12
-"""Least number of readings that separates the unknowns of a map."""
+"""Least number of readings to separate the unknowns of a map."""
 _MINIMUM_RANGE = 0.5
-"""Least range of the command [-] that separates dead band and gain."""
+"""Least range of the command [-] to separate dead band and gain."""
 _SHUT, _HALF_OPEN = 0.05, 0.5
-"""Fraction of the largest area [-] below which the valve is shut, and fraction above which it is at least half open."""
+"""Fractions of the largest area [-]: below the first the valve is shut, above the second at least half open."""
 _SATURATES = 0.02
-"""Least distance from the highest command [-] for the saturation to be identified."""
+"""Least distance of the saturation from the highest command [-] to be identified."""
 _CLEAR_COMMAND = 0.1
-"""Magnitude of a command [-] from which its direction, to chamber 1 or 2, is clear."""
+"""Magnitude of a command [-] from which its direction is clear."""
 _SMALL_COMMAND = 0.2
 """Typical magnitude [-] of a dead band or backlash, which may be 0."""
 _GAIN, _PLAY, _SATURATION = "valve_map.gain", "effects.spool_play.width", "valve_map.saturation_command"
@@ -80,7 +80,7 @@ def valve_map(
     confidence: float = 0.95,
     tolerances: Tolerances = DEFAULTS,
 ) -> BenchResult:
-    """Return dead band [-], gain [m^2], saturation [-] and hysteresis [-] from command and flow; equations (6), (7).
+    """Identify dead band [-], gain [m^2], saturation [-] and hysteresis [-] from command and flow; (6), (7).
 
     ``path`` is the path of the valve in a set (``valves.main``). Raises IdentificationError, with file, sample and
     remedy, for recordings from which the map cannot be estimated.

@@ -149,7 +149,7 @@ def _unit_name(unit: str) -> str:
 
 
 def _texts(group: Any, key: str) -> list[str]:
-    """Return the texts of a parameter; with more than 255 texts it continues in KEY2, KEY3 and so on."""
+    """Return the texts of a C3D parameter; with more than 255 texts it continues in KEY2, KEY3 and so on."""
     keys = [key]
     for number in count(2):
         if f"{key}{number}" not in group:

@@ -1,4 +1,4 @@
-"""CSV files: of this package, with its names and units, and plain files with any usual delimiter.
+"""CSV files of gait recordings: with the names and units of this package, or plain with any usual delimiter.
 
 The header of a CSV file need not be ``name [unit]``: a name alone, or with the unit in other brackets, is accepted.
 """
@@ -39,7 +39,7 @@ def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Conventio
 
 
 def plain_names(path: str | Path) -> list[str]:
-    """Return the names in the header of a plain CSV file; an empty list for one of the package.
+    """Return the column names of a plain CSV file; an empty list for a CSV file of the package.
 
     A plain file has a foreign delimiter, or a column without a unit in square brackets.
     """

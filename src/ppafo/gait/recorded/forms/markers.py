@@ -53,7 +53,7 @@ _LEAST_WAY = 0.5
 """Travel of a marker [m] above which it shows the direction of walking; on a treadmill the travel is shorter."""
 
 _MOST_OBLIQUE = 25.0
-"""Largest angle [deg] between walk and axis, at which the lean of the shank is underestimated by 10 %."""
+"""Largest angle [deg] between walking direction and laboratory axis; the shank lean is then 10 % too small."""
 
 
 def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Convention:
@@ -222,11 +222,11 @@ _FACTORS = {
     "moment": {"N m/kg": 1.0, "N mm/kg": 1.0e-3, "N m": None, "N mm": None},
     "force": {"N/kg": 1.0, "N": None, "": 9.8, "percent": 0.098},
 }
-"""Factor from a unit to N m/kg or N/kg; None if the factor is the inverse of the body mass."""
+"""Factors from units to N m/kg or N/kg; None if the factor is the inverse of the body mass."""
 
 
 _PLAUSIBLE = {"moment": (0.35, 2.6), "force": (5.5, 20.0)}
-"""Plausible peaks in walking, N m/kg and N/kg; up to a body mass of 130 kg only one unit fits."""
+"""Plausible peaks in walking [N m/kg] and [N/kg]; up to a body mass of 130 kg only one unit fits."""
 
 
 def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tuple[str, list[str]]:

@@ -28,7 +28,7 @@ from ppafo.signals.recording import Floats
 from ppafo.wording import one_line
 
 _NEXUS_MOTION, _NEXUS_DEVICES = ("Trajectories", "Model Outputs"), "Devices"
-"""Blocks of a Nexus export: first markers, model angles and moments; then force plates and other analog channels."""
+"""Block titles of a Nexus export: markers and model outputs; then force plates and other analog channels."""
 _LENGTHS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm"}
 _MOTIVE_ROWS = 3
 """Least number of rows above the axes of a Motive export: types, names and quantities."""

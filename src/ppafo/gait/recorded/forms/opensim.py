@@ -1,4 +1,4 @@
-"""OpenSim's tables of motion and force (.mot, .sto), and CSV files with OpenSim's column names."""
+"""OpenSim's tables of motion and force (.mot, .sto), and CSV files with OpenSim's column names, as gait recordings."""
 
 import re
 from dataclasses import replace
@@ -54,7 +54,7 @@ def _read(path: str | Path) -> MotionTable:
 
 
 def unit_of_label(path: str, label: str, angle: str) -> str:
-    """Return the unit implied by a label, ``angle`` for a coordinate; ``path`` is the path of a state."""
+    """Return the unit implied by an OpenSim label; ``angle`` is the unit of angles, ``path`` the path of a state."""
     if path != label:
         # States are in radians and metres whatever the header says of other columns.
         angle = angle or "rad"
