@@ -104,7 +104,10 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
         ("time [s],pressure_1 [psi_d]\n0,1\n", "a pressure level is needed"),
         ("time [s],residual [N)]\n0,1\n", "column 'residual \\[N\\)\\]'"),
         ("# sythetic: by hand\ntime [s]\n0\n", "'# sythetic:' names no kind of recording, did you mean 'synthetic'\\?"),
-        ("# synthetic: a\n# simulated: b\ntime [s]\n0\n", "name two kinds of recording, synthetic and simulated; keep one"),
+        (
+            "# synthetic: a\n# simulated: b\ntime [s]\n0\n",
+            "name two kinds of recording, synthetic and simulated; keep one",
+        ),
         ('time [s],angle [rad]\n0,"1\n', "not a CSV file|not a number"),
     ],
 )

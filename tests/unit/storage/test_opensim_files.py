@@ -60,7 +60,10 @@ def test_line_ends_of_every_system_are_read(tmp_path: Path) -> None:
             NEW.replace("inDegrees=yes", "inDegrees=maybe") + ROWS,
             "line 5: inDegrees is 'maybe'; it must be 'yes' or 'no'",
         ),
-        (NEW.replace("endheader", "Angles are in radians.\nendheader") + ROWS, "the header states both degrees and radians"),
+        (
+            NEW.replace("endheader", "Angles are in radians.\nendheader") + ROWS,
+            "the header states both degrees and radians",
+        ),
         (NEW.replace("time\t", "frame\t") + ROWS, "line 7: the first column must be 'time', not 'frame'"),
         (NEW + ROWS.replace("\t2\n", "\tnan\n"), "line 8, column 'ankle_angle_r': 'nan' is not a finite number"),
         (NEW + ROWS.replace("-1.6", "1,6"), "line 9, column 'knee_angle_r': '1,6' is not a finite number"),

@@ -249,5 +249,8 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
 
 def test_a_folder_of_an_analysis_is_no_result_of_a_run_and_says_what_reads_it(tmp_path: Path) -> None:
     ppafo.audit("ppafo2011").save(tmp_path / "audit")
-    with pytest.raises(DataError, match="is a result of 'ppafo sets audit', not of a run; use its JSON file for numbers, .* and 'ppafo export figure' for its figures"):
+    with pytest.raises(
+        DataError,
+        match="is a result of 'ppafo sets audit', not of a run; use its JSON file for numbers, .* and 'ppafo export figure' for its figures",
+    ):
         ppafo.read_result(tmp_path / "audit")
