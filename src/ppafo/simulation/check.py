@@ -304,8 +304,8 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
         same = rerun([run])[0].recording
         if not all(np.array_equal(same[name], recording[name]) for name in same.names):
             raise SimulationError(
-                f"{scenario.name}: {type(controller).__name__} gives a different run each time, so nothing can be "
-                f"checked; its reset() must forget everything, and its random numbers need a fixed seed"
+                f"{scenario.name}: {type(controller).__name__} gives different results in equal runs and cannot "
+                f"be checked; reset() must restore the initial state, and random numbers need a fixed seed"
             )
     starts = [start_moved(run, move, opposite) for opposite in (1.0, -1.0) for move in (MOVE, -MOVE)]
     runs = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]

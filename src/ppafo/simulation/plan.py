@@ -202,7 +202,7 @@ def _gas(components: Components, effects: Sequence[Effect]) -> GasPhases:
         if is_present:
             off = " and ".join(f"{density_effect.section}.{name}=0" for name in density_effect.switch)
             raise ScenarioError(
-                f"effect '{density_effect.name}' cannot be combined with {component}; omit it, or set {off}"
+                f"effect '{density_effect.name}' cannot be combined with {component}; omit {component}, or set {off}"
             )
     from ppafo.engine.step import not_ideal  # most runs have ideal gas
 

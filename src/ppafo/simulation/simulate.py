@@ -185,7 +185,7 @@ class Result:
         time.
         """
         if not self.status.is_completed:
-            raise SimulationError(f"{self.scenario.name}: the run diverged, so there is nothing to check")
+            raise SimulationError(f"{self.scenario.name}: the run diverged and cannot be checked")
         from ppafo.simulation.check import checked
 
         return checked(self, plan_run(self.scenario), partial(results_of, self.scenario))

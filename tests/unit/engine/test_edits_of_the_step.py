@@ -107,7 +107,7 @@ def unannotated(plant, shown):  # type: ignore[no-untyped-def]
         ),
         (
             {"shown": Mine, "connect": connect_ideal},
-            r"vent_valve\.py:\d+: connect_ideal takes a VentedOpening, and .* shows a Mine",
+            r"vent_valve\.py:\d+: connect_ideal takes a VentedOpening, but .* shows a Mine",
         ),
     ],
 )

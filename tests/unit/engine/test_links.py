@@ -174,7 +174,7 @@ def test_what_would_lose_a_row_is_refused(function: Any, said: str) -> None:
         ({"switch": ("other",)}, "switch names 'other', which must be a quantity with minimum 0"),
         ({"switch": ()}, "has no switch"),
         ({"laws": {place: apart, apart: hides_it}, "name": "third"}, ""),
-        ({"laws": {place: applied}}, "applied(function, amount) must take (amount), as place does"),
+        ({"laws": {place: applied}}, "applied(function, amount) must take the arguments of place: (amount)"),
     ],
 )
 def test_an_effect_that_cannot_act_says_why(change: dict[str, Any], said: str) -> None:

@@ -187,7 +187,9 @@ def test_a_controller_that_gives_another_run_each_time_is_refused(torque_task: C
     before = torque_task("proportional")
     scenario = dataclasses.replace(before, run=dataclasses.replace(before.run, duration=0.05))
     result = simulate(scenario.controlled_by(Unforgetting(0.0)))
-    with pytest.raises(SimulationError, match=r"Unforgetting gives a different run each time.* reset\(\) must forget"):
+    with pytest.raises(
+        SimulationError, match=r"Unforgetting gives different results in equal runs.* reset\(\) must restore"
+    ):
         result.check()
 
 

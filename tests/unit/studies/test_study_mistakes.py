@@ -134,7 +134,7 @@ def test_a_study_without_configurations_is_refused(small: Any) -> None:
         ({"metrics": ["rms_error", "rms_error"]}, "'rms_error' is named twice"),
         ({"bands": ["torqe"]}, "there is no channel 'torqe', did you mean 'torque'?"),
         ({"trajectories": ["presure_1"]}, "did you mean 'pressure_1'?"),
-        ({"bands": ["torque"], "every": "1 s"}, "at most run.duration, 0.2 s"),
+        ({"bands": ["torque"], "every": "1 s"}, "at most run.duration = 0.2 s"),
         ({"bands": ["torque"], "every": "0 s"}, "must be above 0 s"),
         ({"bands": ["torque"], "every": "1 mm"}, "outputs.every = '1 mm'"),
         ({"bands": ["torque"], "quantiles": [1.5]}, "quantiles"),

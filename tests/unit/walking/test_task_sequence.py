@@ -57,7 +57,10 @@ MISTAKES = {
         WALK + '[[segment]]\nkind = "start"\n',
         ("segment 2 (start): the wearer is already walking at this point",),
     ),
-    "ramp to nowhere": (WALK + '[[segment]]\nkind = "ramp"\nstrides = 3\n', ("segment 2 (ramp): give the speed",)),
+    "ramp to nowhere": (
+        WALK + '[[segment]]\nkind = "ramp"\nstrides = 3\n',
+        ("segment 2 (ramp): give speed or cadence",),
+    ),
     "tight turn": ('[[segment]]\nkind = "turn"\nstrides = 2\nradius = "0.2 m"\n', ("radius must be at least 0.5 m",)),
     "steep slope": (WALK + 'slope = "20 deg"\n', ("segment 1 (walk): slope = '20 deg'", "at most")),
     "no segments": ("segment = []\n", ("segment",)),

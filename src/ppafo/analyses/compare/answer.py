@@ -129,8 +129,8 @@ _NOISE = (
     "one realisation"
 )
 _PARETO = (
-    "Marks: the nominal device; dots: draws. The line joins the configurations that no other beats in both error and "
-    "gas."
+    "Marks: the nominal device; dots: draws. The line joins the configurations that no other configuration beats in "
+    "both error and gas."
 )
 
 

@@ -324,7 +324,7 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
         goals, limits = [], []
         for goal in parsed.objective:
             if goal.weight == 0.0:
-                raise StudyError(f"objective '{goal.metric}': weight = 0 has no effect; omit it")
+                raise StudyError(f"objective '{goal.metric}': weight = 0 has no effect; omit this objective")
             scale, where = None, f"objective '{goal.metric}': scale = '{goal.scale}'"
             if goal.scale is not None:
                 scale = difference_of(goal.scale, goal.metric, where)
@@ -362,10 +362,10 @@ def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) ->
         minimum, maximum = varied.level(gain.minimum), varied.level(gain.maximum)
         before = value_at(gain.path, scenario)
         if before is None:
-            raise ScenarioError(f"scenario '{scenario.name}' has no value for '{gain.path}'; set it with an override")
+            raise ScenarioError(f"scenario '{scenario.name}' has no value for '{gain.path}'; give an override")
     if gain.path == NOISE:
         raise StudyError(
-            f"search '{gain.path}': cannot be searched, because all candidates use the same noise; omit it"
+            f"search '{gain.path}': cannot be searched, because all candidates use the same noise; omit this search"
         )
     if minimum >= maximum:
         raise StudyError(
@@ -396,7 +396,7 @@ def _spread(parsed: TuningFile, folder: Path, searched: Sequence[str], scenario:
     both = next((path for path in uncertainty.paths if path in searched), None)
     if both is not None:
         raise StudyError(
-            f"robust: study '{study.name}' draws '{both}', which is also searched; omit it from one of them"
+            f"robust: study '{study.name}' draws '{both}', which is also searched; omit its [[vary]] or [[search]]"
         )
     share = robust.share if robust.measure == "quantile" else None
     return Spread(uncertainty, study.name, robust.draws, study.sample.seed, robust.deviations, share)

@@ -45,7 +45,7 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
         f"actuator gives at most {level_text('N m', reach)}"
     )
     if lies:
-        return TrackingCause(text, (), f"lock the joint ({LOCKED.text}) or give it a load", is_beyond_reach=True)
+        return TrackingCause(text, (), f"lock the joint ({LOCKED.text}) or add a load", is_beyond_reach=True)
     remedies = []
     needed = supply_for(scenario.device, wanted_at, 1.05 * wanted)
     if needed is not None:

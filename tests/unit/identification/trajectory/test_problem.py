@@ -45,7 +45,7 @@ def test_bounds_and_scale_follow_from_the_declaration(experiment: FittedExperime
         (FreeParameter("foot_plate.inertia", start=float("nan")), "must be finite"),
         (FreeParameter("foot_plate.inertia", deviation=0.0), "standard deviation of a prior"),
         (FreeParameter("foot_plate.inertia", recordings=("stop",)), "did you mean 'step'"),
-        (FreeParameter("foot_plate.weight"), "no number 'foot_plate.weight'"),
+        (FreeParameter("foot_plate.weight"), "'foot_plate.weight' cannot be fitted"),
     ],
 )
 def test_a_parameter_that_makes_no_sense_is_refused(

@@ -297,8 +297,8 @@ def _remarks(sizing: Sizing) -> tuple[str, ...]:
     failed = sum(sizing.failures.values())
     failures = f"{failed:,} failed; the first: {next(iter(sizing.failures))}" if failed else "none failed"
     noisy = (
-        f"sensors are noisy: every trial was run in the same {sizing.streams} noise streams; its error is the "
-        "largest of them, its gas the mean"
+        f"sensors are noisy: every trial was run in the same {sizing.streams} noise streams; the error is the "
+        "largest over the streams, the gas the mean"
     )
     return (
         suggestion_sentence(sizing),
