@@ -52,7 +52,7 @@ WANTED = {
 def test_an_effect_that_the_rig_does_not_have_is_refused_before_it_records_without_it(name: str) -> None:
     with pytest.raises(
         ParameterError,
-        match=r"no effect 'silencer': switch the effect off with 'effects\.silencer\.sonic_conductance=0 m\^3/\(s Pa\)'",
+        match=r"no effect 'silencer': .* off with 'effects\.silencer\.sonic_conductance=0 m\^3/\(s Pa\)'",
     ):
         record(name, "ideal-laboratory", 1, overrides=["effects.silencer.sonic_conductance=1e-8 m^3/(s Pa)"])
     record("valve-map", "ideal-laboratory", 1, overrides=["effects.silencer.sonic_conductance=0 m^3/(s Pa)"])
