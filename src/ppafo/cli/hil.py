@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 _SAME_PERIOD = 1.0e-9
-"""Relative difference of two sample periods [-] that is due to rounding."""
+"""Relative rounding difference of two equal sample periods [-]."""
 
 
 def hil(

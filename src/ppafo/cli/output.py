@@ -237,7 +237,6 @@ def progress_line() -> Iterator[ProgressLine]:
 
 
 def _tell_drawing() -> None:
-    """Print at a terminal that drawing is in progress, after the numbers."""
     if sys.stderr.isatty():
         tell("drawing figures and page")
 

@@ -116,10 +116,10 @@ def delay_remarks(walk: MeanStride) -> list[str]:
     remarks = []
     for names in groups:
         delay, which = float(np.mean([late[name] for name in names])), " and ".join(names)
-        way = "behind" if delay > 0.0 else "ahead of"
+        timing = "late" if delay > 0.0 else "early"
         remarks.append(
-            f"{which}: about {1000.0 * abs(delay):.0f} ms {way} {other}, by healthy walking; are they on one clock, "
-            f"with the same filters? Adding {-delay:+.3f} s to their times would bring them together"
+            f"{which}: about {1000.0 * abs(delay):.0f} ms {timing} relative to {other}, judged by healthy walking; "
+            f"check clocks and filters, or add {-delay:+.3f} s to the times of {which}"
         )
     return remarks
 
@@ -146,8 +146,8 @@ def size_remarks(walk: MeanStride) -> list[str]:
         turns = float(np.ptp(np.degrees(walk.curves[name])))
         if not usual[0] <= turns <= usual[1]:
             remarks.append(
-                f"{name} covers {turns:.0f} deg in a stride, usual are {usual[0]:g} to {usual[1]:g} deg: "
-                "check its scale"
+                f"{name} has a range of {turns:.0f} deg per stride (usual: {usual[0]:g} to {usual[1]:g} deg); "
+                "check the scale"
             )
     # The turn of the ankle for each turn of the shank while the foot stands; 1 for a foot that rests.
     shank, ankle = (walk.curves[name][MIDSTANCE] for name in ("shank_angle", "ankle_angle"))
@@ -155,12 +155,12 @@ def size_remarks(walk: MeanStride) -> list[str]:
     follows, (low, high) = float(np.sum(lean * ankle) / np.sum(lean**2)), USUAL_FOLLOWING
     if follows > high or _RESTS < follows < low:
         remarks.append(
-            f"ankle_angle turns {follows:.2g} times as far as shank_angle while the foot stands, usual are {low:g} to "
-            f"{high:g}: check the scale of both"
+            f"while the foot is flat, ankle_angle changes {follows:.2g} times as much as shank_angle (usual: {low:g} "
+            f"to {high:g}); check the scale of both"
         )
     if "ankle_moment" not in walk.curves:
         return remarks
-    moment, why = walk.curves["ankle_moment"], "check its scale: N m/kg is per body mass, not per stature or weight"
+    moment, why = walk.curves["ankle_moment"], "check the scale: N m/kg is per body mass, not per stature or weight"
     peak, force = float(np.max(moment)), walk.curves.get("vertical_force")
     # The lever of the vertical force about the ankle, unless the scale of the force is in doubt itself.
     arm = None
@@ -168,14 +168,13 @@ def size_remarks(walk: MeanStride) -> list[str]:
         arm = peak / (STANDARD_GRAVITY * float(force[np.argmax(moment)]))
     if arm is not None and not USUAL_LEVER[0] <= arm <= USUAL_LEVER[1]:
         remarks.append(
-            f"ankle_moment reaches {without_exponent(peak, '.3g')} N m/kg,"
-            f" which is the vertical force at {100.0 * arm:.0f} cm from the "
-            f"ankle, usual are {100.0 * USUAL_LEVER[0]:.0f} to {100.0 * USUAL_LEVER[1]:.0f} cm: {why}"
+            f"ankle_moment reaches {without_exponent(peak, '.3g')} N m/kg, which gives the vertical force a lever arm "
+            f"of {100.0 * arm:.0f} cm about the ankle (usual: {100.0 * USUAL_LEVER[0]:.0f} to "
+            f"{100.0 * USUAL_LEVER[1]:.0f} cm); {why}"
         )
     elif arm is None and peak > 0.0 and not USUAL_MOMENT[0] <= peak <= USUAL_MOMENT[1]:
         remarks.append(
-            f"ankle_moment reaches {without_exponent(peak, '.3g')} N m/kg,"
-            f" usual are {USUAL_MOMENT[0]:g} to {USUAL_MOMENT[1]:g} N m/kg: "
-            f"{why}"
+            f"ankle_moment reaches {without_exponent(peak, '.3g')} N m/kg (usual: {USUAL_MOMENT[0]:g} to "
+            f"{USUAL_MOMENT[1]:g} N m/kg); {why}"
         )
     return remarks

@@ -167,7 +167,7 @@ _FILE = TomlKind(
     "gait",
     resources.files("ppafo") / "gait" / "normative",
     DataError,
-    made=", which 'ppafo gait import' makes of a recording",
+    made=", which 'ppafo gait import' makes from a recording",
 )
 
 

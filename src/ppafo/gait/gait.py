@@ -210,7 +210,8 @@ def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[G
     """
     if values.size < 2 * harmonics + 2:
         raise DataError(
-            f"{harmonics} harmonics need more than {values.size} samples; give fewer harmonics or more samples"
+            f"{harmonics} harmonics need at least {2 * harmonics + 2} samples, not {values.size}; give fewer harmonics "
+            "or more samples"
         )
     # Both ends are the same phase: a series through both weighs it twice, as the recording has it.
     turns = 2.0 * np.pi * np.linspace(0.0, 1.0, values.size)

@@ -102,7 +102,6 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         return picture(self._frames, self.world.task.unit, self._period, self.world.episodes.base.device)
 
     def _remember(self, error: float) -> None:
-        """Store the current frame for the picture."""
         self._frames.append(EpisodeFrame(len(self._frames) * self._period, self.numbers()["state.angle"], error))
 
     def episode(self) -> Any:

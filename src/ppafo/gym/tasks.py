@@ -18,7 +18,7 @@ BAR = 1.0e5
 GRAM = 1.0e-3
 """Kilograms per gram, the unit of gas in the reward."""
 LOADED, UNLOADED = 60.0, 30.0
-"""Heel forces [N] above which a heel counts as loaded, and below which it counts as unloaded."""
+"""Heel forces [N]: a heel counts as loaded above the first, and as unloaded below the second."""
 LONGEST_SINCE = 10.0
 """Upper bound of the observed time since heel strike [s]."""
 

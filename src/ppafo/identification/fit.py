@@ -108,7 +108,7 @@ def fit(
     memory: int = HIGHEST_ORDER,
     is_motion: bool = False,
 ) -> Fit:
-    """Return the variables that explain the recordings best, with covariance, intervals and consistency tests.
+    """Fit variables to recordings; the result has covariance, intervals and consistency tests.
 
     Weighted squares are minimised within bounds, at first with a robust loss (soft L1); the weights follow from the
     residuals of each channel. Then residuals are whitened by the noise model of each channel, and Gauss-Newton steps

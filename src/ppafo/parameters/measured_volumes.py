@@ -258,5 +258,4 @@ def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, 
 
 
 def _point_text(angle: float, pressure: float) -> str:
-    """Return an angle [rad] and a gauge pressure [Pa] as text for a message."""
     return f"{math.degrees(angle):.6g} deg and {pressure / 1e3:.6g} kPa_g"

@@ -107,7 +107,7 @@ def temporary_folder(purpose: str, contents: Mapping[str, bytes] | None = None) 
 
 
 def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Replace ``folder`` by a new folder with exactly these files, by path; the old folder stays until then."""
+    """Replace ``folder`` by these files, by path; the old folder stays until the new folder is complete."""
     target = _real(folder)
     with _write_errors(folder), _make_folder(target.parent):
         aside = _sibling(target, "writing")

@@ -14,7 +14,7 @@ TRIAL = ("-P", "-m", trial_process.__name__)
 """Python arguments for the separate process; ``-P`` prevents imports from the working folder."""
 
 _MAXIMUM_SECONDS = 30.0
-"""Time limit for any file [s], including the start of a process on a busy computer."""
+"""Time limit for reading a file [s], including the start of a process on a busy computer."""
 _BYTES_PER_SECOND = 5e6
 """Reading rate of a slow disk [bytes/s], which extends the time limit of large files."""
 

@@ -107,7 +107,6 @@ def exchanges(
 
 
 def _both_ways(*sizes: float) -> tuple[float, ...]:
-    """Return magnitudes with both signs, in increasing order."""
     return (*(-size for size in reversed(sizes)), *sizes)
 
 
@@ -236,7 +235,6 @@ def _unit_of_pressure(device: Device) -> tuple[str, float]:
 
 
 def _scaled(path: str, value: float, factor: float) -> ModelChange:
-    """Return a change of one parameter to ``factor`` times its ``value`` [SI]."""
     return ModelChange(numbers={path: factor * value})
 
 

@@ -45,7 +45,7 @@ _KILOPASCALS_AS_PSI = 1.0e3 / PASCALS_PER_PSI
 _LEAST_OF_SUPPLY = 0.5
 """Least peak chamber pressure after correction of the unit, as a fraction of the supply [-], to suggest the unit."""
 _MAXIMUM_RANGES = 20.0
-"""Largest reading in full ranges [-]; more means a damaged line or a wrong unit."""
+"""Largest plausible reading in full ranges [-]; a larger reading means a damaged line or a wrong unit."""
 _MINIMUM_CHANGE = 0.01
 """Least change in at least one channel, as a fraction of the full range [-]."""
 

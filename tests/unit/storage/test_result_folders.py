@@ -251,6 +251,6 @@ def test_a_folder_of_an_analysis_is_no_result_of_a_run_and_says_what_reads_it(tm
     ppafo.audit("ppafo2011").save(tmp_path / "audit")
     with pytest.raises(
         DataError,
-        match="is a result of 'ppafo sets audit', not of a run; use its JSON file for numbers, .* and 'ppafo export figure' for its figures",
+        match="is a result of 'ppafo sets audit', not of a run; use its JSON file for numbers, read",
     ):
         ppafo.read_result(tmp_path / "audit")

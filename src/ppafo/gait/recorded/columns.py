@@ -54,7 +54,7 @@ class CurveColumns:
         values = self.table.columns[name]
         if not unit:
             gait_map = f"a gait map ({setting_text('columns')})"
-            raise DataError(f"{where}: the file does not state its unit; give {self.unit_key} in {gait_map}")
+            raise DataError(f"{where} has no unit in the file; give {self.unit_key} in {gait_map}")
         parsed_unit = "" if unit == "-" else unit
         problem = ""
         for si_unit in si_units:
@@ -113,13 +113,13 @@ def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTa
                 f"map ({setting_text('columns')})"
             )
         reason = f"there is no column {missing!r}{nearest_column(missing, known)}"
-        reasons.append(f"{curve}: {'no file has all of its columns' if missing in known else reason}")
+        reasons.append(f"{curve}: {'no file has all columns of this curve' if missing in known else reason}")
     # A marker counts once, not by its coordinates.
     markers = list(dict.fromkeys(one_line(_marker(name)) for name in known))
     first_names = ", ".join(markers[:_MOST_NAMES]) + (", ..." if len(markers) > _MOST_NAMES else "")
     texts = [first_names, *(one_line(remark) for table in tables for remark in table.remarks)]
     listed = "; ".join(shorten(text, _LONGEST_TEXT, placeholder=" ...") for text in texts)
-    schema = f"a gait map ({setting_text('columns')}), 'ppafo doctor --schema gait-map'"
+    schema = f"a gait map ({setting_text('columns')}; format: 'ppafo doctor --schema gait-map')"
     return f"{'; '.join(reasons)} ({files}: {listed}); name the columns in {schema}"
 
 

@@ -102,19 +102,19 @@ def _scatters(
         if spread > most_spread or misfit > most_misfit:
             yield (
                 name,
-                f"{name} differs between strides by {100.0 * spread:.0f} % of its range and its series misses "
-                f"{100.0 * misfit:.1f} % (standard deviation, root mean square)",
+                f"{name} has, relative to its range, a standard deviation between strides of {100.0 * spread:.0f} % "
+                f"and an RMS error of its Fourier series of {100.0 * misfit:.1f} %",
             )
 
 
 def _remedy() -> str:
-    return f"smooth the recording ({setting_text('low_pass', 6.0, '6 Hz')}), or give better or more strides"
+    return f"smooth the recording ({setting_text('low_pass', 6.0, '6 Hz')}), or record more or steadier strides"
 
 
 def scatter_remarks(curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError]) -> list[str]:
     """Return a remark on each curve with unusual scatter between strides or an unusual misfit of its series."""
     scatters = _scatters(curves, errors, REMARKED_SPREAD, REMARKED_MISFIT)
-    return [f"{message}: that is noise, or the walk is not steady; {_remedy()}" for _, message in scatters]
+    return [f"{message}: the data are noisy, or the walk is not steady; {_remedy()}" for _, message in scatters]
 
 
 def acceleration_of(position: Floats, harmonics: int, stride_time: float) -> Floats:

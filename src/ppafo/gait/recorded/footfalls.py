@@ -103,8 +103,8 @@ def find_footfalls(
         return footfalls
     span = walk[SHANK].time[-1] - walk[SHANK].time[0]
     remark = (
-        f"one cycle that wraps around: {span:.3g} s of data around a stride of {period:.4g} s, whose start and "
-        f"end differ by {100.0 * misfit:.1f} % of the ranges; how much strides differ is not known"
+        f"the recording is one cycle: {span:.3g} s of data were closed to a stride of {period:.4g} s; start and end "
+        f"differ by {100.0 * misfit:.1f} % of the ranges, and the variation between strides is unknown"
     )
     return replace(again, walk=cycle, strides=whole[:1], remarks=(*again.remarks, remark), is_one_cycle=True)
 
@@ -149,13 +149,13 @@ def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[li
         if abs(start - stride.start) < _NEAR and abs(end - stride.toe_off) < _NEAR
     ]
     if not shifts:
-        return strides, "strides from the shank, which no plate corrects: heel strikes and toe-offs are less exact"
+        return strides, "heel strikes and toe-offs from shank_angle, less exact than from a force plate"
     # Strikes and toe-offs of the shank are early or late by one time for a person, which the plates show.
     strike, off = (float(np.mean(values)) for values in zip(*shifts, strict=True))
     moved = [Stride(stride.start + strike, stride.toe_off + off, stride.end + strike) for stride in strides]
     return moved, (
-        f"few contacts on plates: strides from the shank, its strikes moved by {1000.0 * strike:.0f} ms and its "
-        f"toe-offs by {1000.0 * off:.0f} ms as {count_of(len(shifts), 'contact')} on plates show"
+        f"few contacts on force plates: heel strikes and toe-offs from shank_angle, shifted by {1000.0 * strike:.0f} "
+        f"ms and {1000.0 * off:.0f} ms to match {count_of(len(shifts), 'plate contact')}"
     )
 
 

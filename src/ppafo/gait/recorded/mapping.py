@@ -159,7 +159,7 @@ def unsaid_axes(columns: GaitMap) -> list[str]:
         if mapped.terms is None and unsaid:
             assumed_axes = " and ".join(f'{key} = "{getattr(mapped, key)}"' for key in unsaid)
             verb = "is" if len(unsaid) == 1 else "are"
-            axes.append(f"the gait map does not say {' and '.join(unsaid)} of {name}: {assumed_axes} {verb} assumed")
+            axes.append(f"the gait map does not give {' and '.join(unsaid)} of {name}: {assumed_axes} {verb} assumed")
     return axes
 
 
@@ -260,11 +260,13 @@ def check_settings(settings: ImportSettings) -> None:
     if settings.body_mass is not None and not 1.0 <= settings.body_mass <= 500.0:
         wrong.append(f"a body mass of {settings.body_mass:g} kg is not plausible; give it in kg, such as '62 kg'")
     if settings.walking_speed is not None and not 0.05 <= settings.walking_speed <= 4.0:
-        wrong.append(f"a walking speed of {settings.walking_speed:g} m/s is not plausible; walking is 0.05 to 4 m/s")
+        wrong.append(f"a walking speed of {settings.walking_speed:g} m/s is not plausible; allowed is 0.05 to 4 m/s")
     if settings.stature is not None and not 0.5 <= settings.stature <= 2.5:
         wrong.append(f"a stature of {settings.stature:g} m is not plausible; give it in m, such as '1.75 m'")
     if settings.low_pass is not None and not (math.isfinite(settings.low_pass) and settings.low_pass >= 1.0):
-        wrong.append(f"a low pass at {settings.low_pass:g} Hz would remove the gait itself; 6 Hz is usual")
+        wrong.append(
+            f"a low pass at {settings.low_pass:g} Hz would remove the gait itself; give 1 Hz or more (usual: 6 Hz)"
+        )
     if not 0.0 <= settings.longest_gap <= LONGEST_FILLED:
         wrong.append(f"gaps of {settings.longest_gap:g} s cannot be filled; allowed is 0 to {LONGEST_FILLED:g} s")
     if settings.start is not None and settings.end is not None and not settings.start < settings.end:

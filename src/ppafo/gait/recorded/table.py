@@ -128,7 +128,7 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
             "not recorded": ~recorded,
             # A marker that is 0 throughout stands at the origin.
             "all coordinates 0": zero & bool((recorded & ~zero).any()),
-            "still at its last place": _held(at, MOST_ACCELERATION * interval**2),
+            "position unchanged": _held(at, MOST_ACCELERATION * interval**2),
         }
         lost = {cause: frames for cause, frames in causes.items() if frames.any()}
         if not lost:

@@ -172,12 +172,12 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
         return
     low, high = SHANK_RANGE
     travel = float(np.ptp(np.degrees(shank.values)))
-    range_text = f"covers a range of {travel:.2g} deg in the whole recording, walking at least {low:g} deg"
+    range_text = f"has a range of {travel:.2g} deg in the whole recording (walking: at least {low:g} deg)"
     message = f"{shank.file}: shank_angle {range_text}"
     if mapped.terms is not None:
         # Radians that are called degrees have no event either, but a unit as a remedy.
         if travel < low and not low <= np.degrees(travel) <= high:
-            raise DataError(f"{message}: the recording shows no walking, or the columns of the shank are wrong")
+            raise DataError(f"{message}: give a recording of walking, or check the columns of the shank")
         return
     ends = {
         axis: [columns.table.columns.get(f"{label}.{axis}") for label in (mapped.knee, mapped.ankle)] for axis in "xyz"
@@ -189,7 +189,7 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
     if abs(means[mapped.vertical]) < _LEAST_UPRIGHT * length:
         raise DataError(
             f"{shank.file}: shank_angle.vertical = {mapped.vertical!r}, but the line from {mapped.knee!r} to "
-            f"{mapped.ankle!r} is longest along {longest!r}; give {longest!r} in a gait map, also for the ankle"
+            f"{mapped.ankle!r} is longest along {longest!r}; give {longest!r} in a gait map, also for ankle_angle"
         )
     if travel >= low:
         return
@@ -199,7 +199,7 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
         leans = float(np.nanmax(lean) - np.nanmin(lean))
     if leans >= low:
         raise DataError(
-            f"{message}, but {leans:.2g} deg along {across}, and shank_angle.forward is {mapped.forward!r}; give "
-            f"{across!r} or '-{across}', the walking direction, in a gait map, also for the ankle"
+            f"{message}, but of {leans:.2g} deg along {across}; change shank_angle.forward = {mapped.forward!r} to the "
+            f"walking direction, {across!r} or '-{across}', in a gait map, also for ankle_angle"
         )
-    raise DataError(f"{message}: the recording shows no walking; give a recording of walking")
+    raise DataError(f"{message}: give a recording of walking")

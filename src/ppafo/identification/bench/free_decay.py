@@ -130,12 +130,23 @@ def free_decay(
 ) -> BenchResult:
     """Identify viscous damping [N m s/rad] and dynamic friction [N m], or both over inertia [1/s, rad/s^2].
 
-    The model is equation (1). Angle and, if recorded, angular velocity are fitted. Several recordings are several
-    impulses to the same device, with common parameters and separate initial states. The vane turns freely from
-    ``start`` to ``end`` [s]; without ``start`` the decay starts at the largest speed. ``inertia_deviation`` is the
-    standard deviation of ``inertia`` [kg m^2]; without an inertia only ratios to it are estimated. ``rise`` is the
-    ratio of friction at rest to dynamic friction, minus 1 [-], by which seals may grip near standstill. Raises
-    IdentificationError, with file, sample and remedy, for recordings that determine neither.
+    The model is equation (1), fitted to angle and, if recorded, angular velocity. Several recordings are several
+    impulses to the same device, with common parameters and separate initial states.
+
+    Arguments:
+        sources: recordings of the angle
+        start, end: interval in which the vane turns freely [s]; default start: the largest speed
+        inertia: inertia about the joint [kg m^2]; None to estimate only ratios to the inertia
+        inertia_deviation: standard deviation of the inertia [kg m^2]
+        rise: largest friction near standstill over dynamic friction, minus 1 [-]
+        confidence: confidence level of the intervals [-]
+        tolerances: limits of the errors of the bench
+
+    Returns:
+        the estimates with intervals and verdicts, a summary and two panels
+
+    Raises:
+        IdentificationError: recordings that determine neither parameter; names file, sample and remedy
     """
     check_sources(sources, PROCEDURE, (ANGLE,), MINIMUM_SAMPLES)
     sources, remarks = without_wrong_samples(sources, PROCEDURE, (ANGLE, VELOCITY), start, end)

@@ -1,4 +1,4 @@
-"""Bench laws: fit by the common estimator, and tolerances of the bench as variables with priors."""
+"""Fit of bench laws by the common estimator, and tolerances of the bench as variables with priors."""
 
 import math
 from collections import defaultdict

@@ -58,10 +58,23 @@ def open_valve_flow(
 ) -> BenchResult:
     """Identify Cd [-] or Cd A [m^2], C [m^3/(s Pa)] and b [-], or c [kg/(s Pa^2)] of the open valve.
 
-    The laws are equations (6) and (7), ISO 6358, and a laminar gap. With an ``area`` [m^2] the orifice law gives Cd,
-    without one the product Cd A. The law ``both`` gives Cd, Cd A or, with a ``critical_ratio`` [-], C, together with c
-    of a parallel laminar gap. ``path`` is the path of the valve in a set (``valves.main``). Raises IdentificationError,
-    with file, sample and remedy, for recordings from which the flow law cannot be estimated.
+    The laws are equations (6) and (7), ISO 6358, and a laminar gap.
+
+    Arguments:
+        sources: recordings of mass flow, upstream and downstream pressure
+        gas: gas of the bench
+        law: flow law; ``both`` adds a laminar gap, c, to Cd, Cd A or, with ``critical_ratio``, C
+        area: area of the opening [m^2], with which the orifice law gives Cd; None for the product Cd A
+        path: path of the valve in a set, ``valves.main``
+        critical_ratio: b of ISO 6358 [-] for the law ``both``
+        confidence: confidence level of the intervals [-]
+        tolerances: limits of the errors of the bench
+
+    Returns:
+        the estimates with intervals and verdicts, a summary and two panels
+
+    Raises:
+        IdentificationError: recordings that do not determine the flow law; names file, sample and remedy
     """
     readings = _open_readings(sources, gas, tolerances)
     upstream, flow, ratio = readings.upstream, readings.flow, readings.downstream / readings.upstream

@@ -84,8 +84,18 @@ def static_torque(
 
     The model is equation (2). The friction is static, or kinetic if the actuator slid. For a force the units are m^2
     and N. Readings with direction 0 belong to no branch and are left out. So is a flat start of the rising branch,
-    where a scale that only pulls shows nothing until friction is overcome. Raises IdentificationError, with file,
-    sample and remedy, for recordings that cannot separate the unknowns.
+    where a scale that only pulls shows nothing until friction is overcome.
+
+    Arguments:
+        sources: recordings of pressure difference, direction, and torque or force
+        confidence: confidence level of the intervals [-]
+        tolerances: limits of the errors of the bench
+
+    Returns:
+        the estimates with intervals and verdicts, a summary and two panels
+
+    Raises:
+        IdentificationError: recordings that cannot separate the unknowns; names file, sample and remedy
     """
     readings = torque_readings(sources, tolerances.zero_of_pressure)
     unknowns, channel = _unknowns_of(readings), readings.channel

@@ -35,7 +35,7 @@ _MOVES_WITH_DIRECTION = 0.5
 _MOST_REPETITIONS = 12
 """Largest number of repetitions tested separately; with more, whole recordings are tested."""
 _TINY = 1.0e-300
-"""Smallest range [unit of the channel], which avoids division by 0."""
+"""Smallest range [unit of the channel] for a division, in place of 0."""
 
 
 @dataclass(frozen=True, slots=True)

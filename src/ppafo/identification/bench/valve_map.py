@@ -41,7 +41,7 @@ _SHUT, _HALF_OPEN = 0.05, 0.5
 _SATURATES = 0.02
 """Least distance of the saturation from the highest command [-] to be identified."""
 _CLEAR_COMMAND = 0.1
-"""Magnitude of a command [-] from which its direction is clear."""
+"""Least magnitude of a command with a clear direction [-]."""
 _SMALL_COMMAND = 0.2
 """Typical magnitude [-] of a dead band or backlash, which may be 0."""
 _GAIN, _PLAY, _SATURATION = "valve_map.gain", "effects.spool_play.width", "valve_map.saturation_command"
@@ -82,8 +82,18 @@ def valve_map(
 ) -> BenchResult:
     """Identify dead band [-], gain [m^2], saturation [-] and hysteresis [-] from command and flow; (6), (7).
 
-    ``path`` is the path of the valve in a set (``valves.main``). Raises IdentificationError, with file, sample and
-    remedy, for recordings from which the map cannot be estimated.
+    Arguments:
+        sources: recordings of command, mass flow, upstream and downstream pressure
+        gas: gas of the bench
+        path: path of the valve in a set, ``valves.main``
+        confidence: confidence level of the intervals [-]
+        tolerances: limits of the errors of the bench
+
+    Returns:
+        the estimates with intervals and verdicts, a summary and two panels
+
+    Raises:
+        IdentificationError: recordings that do not determine the map; names file, sample and remedy
     """
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("command", "mass_flow"), absolute=PRESSURES)
     branches = []

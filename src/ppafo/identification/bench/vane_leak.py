@@ -81,12 +81,25 @@ def vane_leak(
 ) -> BenchResult:
     """Identify the leak: A_leak [m^2], C [m^3/(s Pa)] or a laminar coefficient [kg/(s Pa^2)]; equations (6), (7).
 
-    Recordings with a ``mass_flow`` are steady: the flow that maintains the pressure, at several pressures. For closed
-    chambers the samples from ``start`` to ``end`` [s] are used. Without the volume [m^3] of the emptying chamber, only
-    the area divided by the volume is estimated; ``volume_deviation`` is the relative standard deviation of a volume
-    [-]. A ``discharge_coefficient`` [-] turns the product Cd A into an area, a ``critical_ratio`` [-] selects the sonic
-    conductance, ``law`` "laminar" a laminar coefficient, and "both" a laminar gap in parallel with the law of the set.
-    Raises IdentificationError, with file, sample and remedy, for recordings from which the leak cannot be estimated.
+    Recordings with a ``mass_flow`` are steady: the flow that maintains the pressure, at several pressures.
+
+    Arguments:
+        sources: recordings of both chamber pressures
+        gas: gas of the bench
+        volume_1, volume_2: chamber volumes [m^3]; without the volume of the emptying chamber, area over volume is found
+        discharge_coefficient: Cd [-], with which an orifice gives an area; None for the product Cd A
+        start, end: samples used of closed chambers [s]
+        confidence: confidence level of the intervals [-]
+        critical_ratio: b of ISO 6358 [-], which selects the sonic conductance
+        law: ``laminar`` for a laminar coefficient, ``both`` for a laminar gap in parallel with the orifice
+        tolerances: limits of the errors of the bench
+        volume_deviation: relative standard deviation of a volume [-]
+
+    Returns:
+        the estimates with intervals and verdicts, a summary and two panels
+
+    Raises:
+        IdentificationError: recordings that do not determine the leak; names file, sample and remedy
     """
     form: Law = law if law != "orifice" or critical_ratio is None else "iso6358"
     opening = Opening(gas, form, discharge_coefficient or 1.0, critical_ratio)
@@ -203,7 +216,7 @@ class _ClosedChambers(NamedTuple):
 
 
 def closed_chambers(source: RecordingSource, start: float | None, end: float | None, number: int) -> _ClosedChambers:
-    """Return the chambers in the recording of a decay, from its start until the pressures are nearly equal.
+    """Return the pressure decay of closed chambers in a recording, until the pressures are nearly equal.
 
     Raises IdentificationError if too few samples are left.
     """

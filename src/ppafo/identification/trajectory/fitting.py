@@ -216,7 +216,6 @@ _INSIDE = 1.0e-3
 
 
 def _in_unit(value: float, estimate: Estimate) -> str:
-    """Return a value with the unit of an estimate, in the format of a problem file."""
     return f"{value:.4g}" if estimate.unit in ("", "-") else f"{value:.4g} {estimate.unit}"
 
 

@@ -49,7 +49,7 @@ _ZERO_OF_ANGLE = math.radians(1.0)
 _READ_INTERVAL = 5.0e-5
 """Record interval for interpolation at samples [s]; a chamber fills within milliseconds."""
 _MAXIMUM_RECORDS = 100_000
-"""Number of records above which the record interval is lengthened to limit memory."""
+"""Largest number of records, above which the record interval is lengthened to limit memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +137,7 @@ def prepare_samples(
 
 
 def _locate_samples(prepared: _PreparedExperiment, run: Run) -> _PreparedExperiment:
-    """Return the experiment with its samples located between records no finer than needed."""
+    """Locate the samples of an experiment between records that are no finer than needed."""
     time, recorded = prepared.time, prepared.recorded
     every = _steps_between_samples(time, prepared.reach, run.step)
     records = math.ceil((float(time[-1]) + prepared.reach) / (run.step * every) - _FITS)

@@ -1,7 +1,4 @@
-"""Checks of damping and dynamic friction against inertia and reported decay ratios.
-
-Equations (1) and (10).
-"""
+"""Checks of damping and dynamic friction against inertia and reported decay ratios. Equations (1) and (10)."""
 
 from collections.abc import Iterator
 

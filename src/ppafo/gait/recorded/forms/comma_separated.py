@@ -34,7 +34,7 @@ def _recognises(path: str | Path) -> bool:
 def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Convention:
     """Return the map of the package's column names and signs; raises DataError for a left foot."""
     if side != "right":
-        raise DataError(f"a CSV file without a gait map contains one foot; omit {setting_text('side')} left")
+        raise DataError(f"a CSV file without a gait map has one foot, read as right; omit {setting_text('side')}")
     return Convention(package_map())
 
 
@@ -69,7 +69,7 @@ def read_plain_csv(path: str | Path) -> MotionTable:
         at = 0
     if names[at].lower() not in _TIMES:
         raise DataError(
-            f"{path}: the first column must be 'time', it is {one_line(names[at])[:_LONGEST_SHOWN]!r}; give at "
+            f"{path}: the first column must be 'time', not {one_line(names[at])[:_LONGEST_SHOWN]!r}; give at "
             "least two strides over time instead of one mean stride over percent"
         )
     if "" in names[at:]:

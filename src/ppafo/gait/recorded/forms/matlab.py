@@ -38,7 +38,7 @@ def _read(path: str | Path) -> MotionTable:
     }
     stalled = np.flatnonzero(np.diff(time) <= 0.0)
     if stalled.size:
-        raise DataError(f"{path}: {name} does not increase after sample {stalled[0] + 1}")
+        raise DataError(f"{path}: variable '{name}' must increase, but does not after sample {stalled[0] + 1}")
     # The unit of angles that the kept header of an OpenSim table states.
     stated = [match[1].lower() for word in file.words if (match := _DEGREES.search(word))]
     angle = {"yes": "deg", "no": "rad"}[stated[0]] if stated else ""

@@ -49,7 +49,7 @@ def _read(path: str | Path) -> MotionTable:
     units = {name: unit_of_label(paths.get(name, name), name, angle) for name in columns}
     remarks = table.remarks
     if is_unstated and any(unit == "deg" for unit in units.values()):
-        remarks = (*remarks, "the header does not state the unit of angles: degrees, as in files of its older style")
+        remarks = (*remarks, "the header states no unit of angles; degrees assumed, as in older OpenSim files")
     return MotionTable(str(path), table.time, columns, units, kind=table.kind, remarks=remarks)
 
 
@@ -135,8 +135,8 @@ def _turned_forward(table: MotionTable) -> MotionTable:
             table,
             remarks=(
                 *table.remarks,
-                f"the walker turns by {turned:.0f} deg within the record (pelvis_rotation), and the walk is seen along "
-                f"its mean direction: give a straight part with {setting_text('start')} and {setting_text('end')}",
+                f"the walker turns by {turned:.0f} deg (pelvis_rotation), and angles refer to the mean walking "
+                f"direction; select a straight part with {setting_text('start')} and {setting_text('end')}",
             ),
         )
     if abs(facing) <= _ALONG:
@@ -150,7 +150,8 @@ def _turned_forward(table: MotionTable) -> MotionTable:
         forward = -np.sin(tilt) * np.cos(tipped) * cosine - np.sin(tipped) * sine
         columns["pelvis_tilt"] = np.arctan2(-forward, np.cos(tilt) * np.cos(tipped)) / degree["pelvis_tilt"]
     remarks = (
-        f"the walk goes {np.degrees(facing):.0f} deg to the left of x (pelvis_rotation): the pelvis is turned into it"
+        f"walking direction is {np.degrees(facing):.0f} deg to the left of x (pelvis_rotation); the pelvis was rotated "
+        "to x"
     )
     return replace(table, columns=columns, remarks=(*table.remarks, remarks))
 
