@@ -64,7 +64,7 @@ def sides_of(run: Run, point: Point, joint: JointNames) -> dict[str, str]:
     vane = motion[point.direction]
     if point.direction == 0.0:
         is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max
-        vane = "against a stop" if is_at_stop else "sticks: held by static friction"
+        vane = "against a stop" if is_at_stop else "sticks by static friction"
     valve = "closed"
     if any(openings):
         chamber = 1 if openings.source_1 > 0.0 else 2

@@ -186,7 +186,7 @@ def test_which_side_was_taken_is_said(steady: LinearModel) -> None:
     assert not deaf.b[:, 0].any()
     assert not finding_of(deaf).figures
     stuck = linear("step-response", 0.0, ["motion.kind=free", "initial.pressure_2=atmosphere", "motion.angle=60 deg"])
-    assert stuck.sides["ankle"] == "sticks: held by static friction"
+    assert stuck.sides["ankle"] == "sticks by static friction"
     assert [item.name for item in stuck.states] == ["pressure_1", "pressure_2"]
     assert linear("step-response", 0.1).sides["ankle"] == "slides in plantarflexion"
 
