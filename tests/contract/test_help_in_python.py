@@ -23,6 +23,11 @@ MOST_USED = (
     "evaluate",
     "load_device",
     "load_scenario",
+    "bottle",
+    "linearise",
+    "parts",
+    "reproduce",
+    "sensitivity",
 )
 
 

@@ -322,7 +322,6 @@ def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, Varie
 
 
 def _varying(entry: declared.Varied, configurations: Iterable[Configuration]) -> list[Configuration]:
-    """Return the configurations in which a path varies."""
     return [each for each in configurations if not entry.only or each.name in entry.only]
 
 

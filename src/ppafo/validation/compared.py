@@ -62,7 +62,7 @@ EXPLAINED_FRACTION = 0.5
 """Least explained fraction of signal variance (R^2) [-] for an acceptable model; the mean explains 0."""
 
 _FRACTION_UNITS = ("%", "percent")
-_EXAMPLES = "write 'angle=10%', 'pressure_1=3.7 psi_d', or '5%' for all channels"
+_EXAMPLES = "for example 'angle=10%', 'pressure_1=3.7 psi_d', or '5%' for all channels"
 
 
 @dataclass(frozen=True, slots=True)

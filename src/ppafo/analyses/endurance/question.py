@@ -40,19 +40,29 @@ def bottle(
 
     A walk in ``recordings``, as a result or its folder, continues on the bottle until the bottle ends; any other
     recording is repeated. Without recordings, the gas use is ``gas_per_stride`` every ``stride_time``, with at most
-    ``peak_flow``. ``overrides`` are texts such as ``room.temperature=5 degC``. Raises ParameterError or DataError for
-    bad input, SimulationError if the solver fails.
+    ``peak_flow``.
 
-    recordings: a .csv or .nc file with supplied_mass, or the result folder of a run or a walk; repeated until the
-        bottle ends; several are compared side by side
-    gas_per_stride: gas per stride, for example '0.3 g'
-    stride_time: time of one stride; default: '1.1 s', the whole recording, one stride of a walk, or its task sequence
-    peak_flow: largest flow, for example '4.5 g/s'; default: the mean flow
-    bottle: name of a bottle or a .toml file; default: the walk's, or the paper's bottle
-    walk: time of walking between two rests, with --rest; default '10 min'
-    rest: time of each rest; default '0 s' (no rest)
-    longest: maximum simulated time; default '1440 min'
-    plugins: modules of your own, files or names, whose objects files may name
+    Arguments:
+        recordings: a .csv or .nc file with supplied_mass, or the result folder of a run or a walk; repeated until the
+            bottle ends; several are compared side by side
+        gas_per_stride: gas per stride, for example '0.3 g'
+        stride_time: time of one stride; default: '1.1 s', the whole recording, one stride of a walk, or its task
+            sequence
+        peak_flow: largest flow, for example '4.5 g/s'; default: the mean flow
+        bottle: name of a bottle or a .toml file; default: the walk's, or the paper's bottle
+        walk: time of walking between two rests, with --rest; default '10 min'
+        rest: time of each rest; default '0 s' (no rest)
+        longest: maximum simulated time; default '1440 min'
+        overrides: values to change, for example 'room.temperature=5 degC'; may be repeated
+        plugins: modules of your own, files or names, whose objects files may name
+
+    Returns:
+        a Finding whose ``found`` is an Endurance, or the Endurance of each recording by name if there are several
+
+    Raises:
+        ParameterError: a bottle, a gas use or a schedule that cannot be used
+        DataError: a recording that cannot be used
+        SimulationError: a simulation of the bottle that fails
 
     >>> import ppafo
     >>> discharge = ppafo.bottle(gas_per_stride="0.3 g").found.discharge

@@ -301,7 +301,6 @@ def kind_of_fit(fit: TrajectoryFit) -> RecordingKind:
 
 
 def _estimate_data(estimate: Estimate) -> dict[str, Any]:
-    """Return an estimate as plain data in SI, with its verdict as it is printed."""
     return {**plain(estimate), "verdict_text": estimate.verdict_text}
 
 

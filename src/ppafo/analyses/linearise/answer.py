@@ -93,7 +93,6 @@ def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> _StepRes
 
 
 def _value_at_point(model: LinearModel, name: str) -> float:
-    """Value of a state or an input at the operating point [SI]."""
     return next(variable.value for variable in (*model.states, *model.inputs) if variable.name == name)
 
 

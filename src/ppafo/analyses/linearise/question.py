@@ -24,12 +24,20 @@ def linearise(
 
     The equilibrium is the steady state with the torque of the last reference value or, for a controller with constant
     command, with this command; the ankle stays at its angle at the end of the run. Derivatives are finite differences
-    of the equations of the plant, accurate to 1e-6 of the largest in their row. Raises ScenarioError for a time outside
-    the run, a scenario without equilibrium, and an on/off valve.
+    of the equations of the plant, accurate to 1e-6 of the largest in their row.
 
-    at: a time of the run, such as '1.5 s', or 'equilibrium' (default): the steady state that holds the last value of
-        the reference
-    plugins: modules of your own, files or names, whose objects files may name
+    Arguments:
+        scenario: name of a scenario, or a .toml file
+        at: a time of the run, such as '1.5 s', or 'equilibrium' (default): the steady state that holds the last value
+            of the reference
+        overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
+        plugins: modules of your own, files or names, whose objects files may name
+
+    Returns:
+        a Finding whose ``found`` is a LinearModel: matrices, signals, poles and margins
+
+    Raises:
+        ScenarioError: a time outside the run, a scenario without equilibrium, and a valve that is on or off
 
     >>> import ppafo
     >>> model = ppafo.linearise("torque-task-proportional", overrides={"reference.level": 3.0}).found

@@ -18,10 +18,15 @@ def parts(
 ) -> Finding[Parts]:
     """List real parts with the origin of every figure.
 
-    Raises ParameterError for an unknown part or a catalogue that cannot be used.
+    Arguments:
+        part: name of a part, for all its figures and their sources
+        catalogue: a .toml file; default: the catalogue of the package
 
-    part: name of a part, for all its figures and their sources
-    catalogue: a .toml file; default: the catalogue of the package
+    Returns:
+        a Finding whose ``found`` is the Parts: the catalogue, and the part if it is named
+
+    Raises:
+        ParameterError: a part that does not exist, or a catalogue that cannot be used
 
     >>> import ppafo
     >>> ppafo.parts("festo-mpye-5-m5-010-b").said[0]

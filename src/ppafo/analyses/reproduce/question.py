@@ -26,12 +26,18 @@ def reproduce(
 ) -> Finding[Reproduction] | Finding[Studies]:
     """Reproduce the paper's experiments and check its claims.
 
-    ``overrides`` change the experiments (not the paper's reported numbers): a path of a scenario applies to the
-    experiments that have it, a path of the device to all. Raises SimulationError for a run that diverges, ScenarioError
-    for an unknown study.
+    Arguments:
+        study: publication to run again: a name, a .toml file of claims, or 'all'; default ppafo-2011, the paper
+        overrides: values to change in the paper's experiments, for example 'valve.area=12.6 mm^2'; may be repeated
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with every count of a long computation
 
-    study: publication to run again: a name, a .toml file of claims, or 'all'; default ppafo-2011, the paper
-    plugins: modules of your own, files or names, whose objects files may name
+    Returns:
+        a Finding whose ``found`` is the Reproduction of the paper, or the claims of other publications with verdicts
+
+    Raises:
+        ScenarioError: a study that does not exist, or an override that no experiment has
+        SimulationError: a run that diverges
 
     >>> import ppafo
     >>> finding = ppafo.reproduce("jmd-2016")

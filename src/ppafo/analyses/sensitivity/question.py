@@ -42,15 +42,28 @@ def sensitivity(
 ) -> Finding[Influences]:
     """Rank uncertain values by their influence: Sobol or Shapley indices, signed changes.
 
-    Sensor noise counts as one of the values. Raises StudyError for bad input, and if more than the fraction
-    ``maximum_failed`` of the runs fails; otherwise blocks with failed runs are left out and counted.
+    Sensor noise counts as one of the values. A block of the sample with a failed run is left out and counted.
 
-    method: default: sobol, or shapley if values are correlated
-    metrics: metric to analyse, may be repeated; default: the metrics of the study
-    samples: number of base points (sobol, default 8192) or orders (shapley, 2048)
-    configuration: configuration of the study, needed if it has several
-    independent: ignore the correlations of the study
-    plugins: modules of your own, files or names, whose objects files may name
+    Arguments:
+        study: a study with distributions: a name, or a .toml file
+        method: default: sobol, or shapley if values are correlated
+        metrics: metric to analyse, may be repeated; default: the metrics of the study
+        samples: number of base points (sobol, default 8192) or orders (shapley, 2048)
+        configuration: configuration of the study, needed if it has several
+        independent: ignore the correlations of the study
+        overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
+        seed: random seed; default: the file's
+        confidence: confidence of all intervals; default 95%
+        maximum_failed: fraction of the runs that may fail before the study is refused; default 2%
+        threads: number of threads; default: all cores
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with every count of a long computation
+
+    Returns:
+        a Finding whose ``found`` is the Influences: indices with bands of every metric
+
+    Raises:
+        StudyError: a study that cannot be used, and more than ``maximum_failed`` of its runs fail
 
     >>> import ppafo
     >>> study, choice = "torque-task-uncertainty", {"configuration": "solenoid", "metrics": "rms_error"}

@@ -182,5 +182,4 @@ def _error(channel: ChannelAgreement, value: float) -> str:
 
 
 def _number(value: float) -> str:
-    """Format a number with three digits, or as 0."""
     return "0" if abs(value) < _WRITTEN_AS_ZERO else f"{value:.3g}"

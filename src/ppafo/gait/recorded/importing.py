@@ -233,7 +233,6 @@ def _check_enough(strides: StrideSelection, usable: list[Stride], walk: Mapping[
 
 
 def _spread(values: Sequence[float]) -> float:
-    """Return the standard deviation, 0 for a single value."""
     return float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
 
 
