@@ -266,8 +266,8 @@ def _remarks(comparison: WalkComparison) -> list[str]:
         ended = "" if time is None else f"lasts {duration_text(time)}: "
         bottle = f"bottle {supply.supply.bottle.label}: {ended}{supply.ending.message}"
     elif "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
-        walk_on_it = f"walk on it, {argument_text('bottle', PAPER_BOTTLE)}"
-        bottle = f"the supply pressure is constant here; to see how long a bottle lasts, {walk_on_it}"
+        with_bottle = argument_text("bottle", PAPER_BOTTLE)
+        bottle = f"the supply pressure is constant here; give {with_bottle} to see how long a bottle lasts"
     remarks = (
         *person_remarks(worn.scenario),
         bottle,
