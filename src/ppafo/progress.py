@@ -45,8 +45,8 @@ Report = Callable[[Progress], None]
 """Callback for the progress of a long task; may raise KeyboardInterrupt."""
 
 
-def report_nothing(_progress: Progress) -> None:
-    """Ignore a progress report."""
+def report_nothing(_progress: object) -> None:
+    """Ignore a progress report or a count."""
 
 
 @final

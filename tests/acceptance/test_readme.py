@@ -146,7 +146,7 @@ def test_a_torque_that_a_joint_cannot_give_is_said_as_printed_and_what_is_said_t
     # How it follows its reference stands between how it ended and the numbers.
     ended, verdict, blank = capsys.readouterr().out.splitlines()[:3]
     assert (ended, blank) == ("hold: completed", "")
-    assert verdict.startswith("the torque follows its reference: RMS ")
+    assert verdict.startswith("the torque follows its reference; from 2 s on: RMS ")
 
 
 def test_every_command_is_shown_or_named() -> None:

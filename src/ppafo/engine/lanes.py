@@ -30,7 +30,7 @@ from ppafo.engine.package_key import package_key
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import MadeFrom, SourceCollector
 from ppafo.engine.step.lane import SAME_MOMENT
-from ppafo.progress import time_text
+from ppafo.progress import report_nothing, time_text
 
 if TYPE_CHECKING:
     from ppafo.engine.interpreter import PythonProgram
@@ -46,6 +46,9 @@ LONGEST_UNSAID = 120.0
 
 STEPS_PER_CALL = 10_000
 """Steps per call of compiled code: some hundredths of a second, or seconds if each step takes hundreds of parts."""
+
+_BETWEEN_COUNTS = 0.5
+"""Time [s] between two counts of the runs that several threads have ended."""
 
 QUICK_STEPS = 200_000
 """Total number of steps of all runs up to which quick compilation is faster overall: a second of either."""
@@ -103,6 +106,9 @@ class BatchResult:
     states: Floats
     record: Floats
 
+
+Count: TypeAlias = Callable[[int], object]
+"""Callback from the calling thread with the number of runs that have ended since the last call."""
 
 RunnableProgram: TypeAlias = "ModuleType | PythonProgram"
 """Program whose ``advance`` advances a block of runs by some steps: compiled, or run by Python itself."""
@@ -189,6 +195,7 @@ def run_blocks(
     take: Callable[[slice, BatchResult], None],
     threads: int | None = None,
     effort: Effort = Effort.FULL,
+    count: Count = report_nothing,
 ) -> None:
     """Run a batch block by block on ``threads`` threads (all cores by default), and pass on each result immediately.
 
@@ -210,6 +217,7 @@ def run_blocks(
     # One iterator for all threads: a range iterator hands each start to one of them.
     waiting = iter(starts)
     stop = threading.Event()
+    ended: list[int] = []
 
     def work() -> None:
         steps = batch.clock.step_count
@@ -226,17 +234,26 @@ def run_blocks(
             if stop.is_set():
                 return
             take(members, block.result())
+            ended.append(members.stop - members.start)
+            if workers == 1:
+                count(ended.pop())
 
     # One block needs no pool of threads, and an interrupt reaches it at once.
     if workers == 1:
         work()
         return
-    from concurrent.futures import ThreadPoolExecutor
+    from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 
     with ThreadPoolExecutor(workers) as pool:
         try:
-            for worker in [pool.submit(work) for _ in range(workers)]:
-                worker.result()
+            working = [pool.submit(work) for _ in range(workers)]
+            is_busy = True
+            while is_busy:
+                is_busy = bool(wait(working, _BETWEEN_COUNTS, FIRST_EXCEPTION).not_done)
+                # The error of one worker is raised at once, and ends the others.
+                for worker in filter(Future.done, working):
+                    worker.result()
+                count(sum(ended.pop() for _ in range(len(ended))))
         finally:
             stop.set()
 

@@ -124,7 +124,7 @@ def read_rms_error_hold(readings: Readings) -> Floats:
 _RMS = "root-mean-square torque error"
 
 _OF_TORQUE = (
-    MetricKind("rms_error", "N m", _RMS, _NEEDED, rms_error, read_rms_error, (SQUARED_ERROR,)),
+    MetricKind("rms_error", "N m", f"{_RMS} over the whole run", _NEEDED, rms_error, read_rms_error, (SQUARED_ERROR,)),
     *(
         MetricKind(
             f"rms_error_{part_of.__name__}",
@@ -140,7 +140,7 @@ _OF_TORQUE = (
     MetricKind(
         "peak_error",
         "N m",
-        "largest absolute torque error",
+        "largest absolute torque error of the whole run",
         _NEEDED,
         peak_error,
         ReadAt(("meters.absolute_error.largest",)),

@@ -12,6 +12,7 @@ from ppafo.documents.json_text import plain
 from ppafo.errors import ParameterError
 from ppafo.parameters.device import VANE, Device
 from ppafo.parameters.loading import load_parameter_set
+from ppafo.progress import Report, report_nothing
 from ppafo.rig.preset import PREFIX, Preset, list_presets, load_preset
 from ppafo.rig.setup import ExperimentRequest, ExperimentResult
 from ppafo.rig.steady import record_open_valve, record_static_torque, record_steady_leak, record_valve_map
@@ -60,11 +61,13 @@ def record(
     device: str = _DEFAULT_DEVICE,
     overrides: Iterable[str] = (),
     valve: str | None = None,
+    progress: Report = report_nothing,
 ) -> RigRecording:
     """Run an experiment on the simulated bench; equal arguments give identical bytes.
 
     ``overrides`` are texts such as ``friction.static_torque=0.5 N m`` (device), ``run.duration=1 s`` (dynamic
-    experiments) or ``rig.pressure_sensor.noise=0 Pa_d`` (preset). Raises SimulationError if the solver fails.
+    experiments) or ``rig.pressure_sensor.noise=0 Pa_d`` (preset). ``progress`` is called every second with the number
+    of samples recorded. Raises SimulationError if the solver fails.
     """
     summary, run = find_experiment(experiment)
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= _LARGEST_SEED:
@@ -81,7 +84,7 @@ def record(
         raise ParameterError(
             f"the simulated test bench supports vane actuators only, but '{one_line(device)}' has an actuator '{kind}'"
         )
-    result = run(ExperimentRequest(preset, seed, device, valve, others))
+    result = run(ExperimentRequest(preset, seed, device, valve, others, progress))
     truth = {
         "notice": NOTICE,
         "units": UNITS,

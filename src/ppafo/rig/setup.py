@@ -17,6 +17,7 @@ from ppafo.model.plant import PlantParameters
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.effects import switches_of
+from ppafo.progress import Report, report_nothing
 from ppafo.rig.dynamics import RigPhysics
 from ppafo.rig.preset import Preset
 from ppafo.signals.recording import Recording
@@ -31,6 +32,7 @@ class ExperimentRequest:
     ``parameter_set``: name of the parameter set of the device
     ``valve``: name of the valve; None for the default valve of the set
     ``overrides``: changes of device, scenario and preset, as texts
+    ``report``: called every second with the number of samples recorded
     """
 
     preset: Preset
@@ -38,6 +40,7 @@ class ExperimentRequest:
     parameter_set: str
     valve: str | None
     overrides: tuple[str, ...]
+    report: Report = report_nothing
 
 
 @dataclass(frozen=True, slots=True)

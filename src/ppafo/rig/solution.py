@@ -7,6 +7,7 @@ solver takes very small steps through every reversal. With modes no kink lies in
 physics the rig is equation (10) exactly.
 """
 
+import time
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -26,6 +27,7 @@ from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import Openings, PlantParameters, actuator_torque
 from ppafo.model.sensors import Measurement
 from ppafo.parameters.device import Device
+from ppafo.progress import Progress, Report, report_nothing
 from ppafo.rig.dynamics import Inputs, Observables, RigNumbers, RigPhysics, RigState, VaneInputs, observables, rig_rates
 from ppafo.rig.sensors import SimulatedSensor
 from ppafo.rig.stretches import Distances, Slopes, solve_stretch
@@ -36,6 +38,8 @@ UNKNOWNS = len(RigState._fields)
 """Number of unknowns of ``RigState``; in arrays of unknowns, the unknowns of the valve follow."""
 ANGLE = RigState._fields.index("angle")
 VELOCITY = RigState._fields.index("angular_velocity")
+_BETWEEN_REPORTS = 1.0
+"""Time [s] between two progress reports."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +63,8 @@ class RigRun:
     """Dead time between controller and valve [s]."""
     hysteresis: float
     """Backlash of the valve spool, as a width in command [-]."""
+    report: Report = report_nothing
+    """Called every second with the number of samples recorded."""
 
 
 @dataclass(slots=True)
@@ -233,7 +239,12 @@ class _Solver:
         rig_run, run = self.rig_run, self.rig_run.run
         end, sample = float(rig_run.sample_times[-1]), 0
         spool, state = 0.0, self.controller.initial
+        started = reported = time.monotonic()
         while self.time < end - SAME_TIME:
+            if (now := time.monotonic()) - reported >= _BETWEEN_REPORTS:
+                counts = (self.recorded, rig_run.sample_times.size, 0, 0, now - started)
+                rig_run.report(Progress("recording on the simulated test bench", *counts, noun="samples"))
+                reported = now
             measurement = self.measure()
             reference = run.program.reference.value(run.reference, sample * rig_run.control_period)[0]
             # A constant command is decided once for the whole run; the law still has the period of its file.

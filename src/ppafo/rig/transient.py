@@ -121,6 +121,7 @@ def rig_run(scenario: Scenario, request: ExperimentRequest, highest_rate: float 
         control_period=2.0 * scenario.run.duration if scenario.controller.is_open_loop else run.period,
         command_delay=run.command_delay + preset.values["line.delay"],
         hysteresis=preset.values["valve.hysteresis"],
+        report=request.report,
     )
 
 

@@ -34,7 +34,9 @@ FAILED = "failed"
 _AT_ONCE, _SLOW_AT_ONCE = 16_384, 32
 """Largest number of runs between two progress reports: in general, and with a Python controller."""
 _FIRST_AT_ONCE, _BETWEEN_REPORTS = 1024, 3.0
-"""Largest number of runs before the first progress report, and target time between later reports [s]."""
+"""Largest number of runs of the first part, and target time of later parts [s]."""
+_BETWEEN_COUNTS = 1.0
+"""Smallest time between two reports of the runs that ended within a part [s]."""
 
 
 @final
@@ -44,19 +46,29 @@ class RunCounter:
     def __init__(self, runs: int, progress: Report | None, done: int = 0, failed: int = 0) -> None:
         self._total, self._report, self._started = max(1, runs), progress, 0.0
         self.done, self.failed, self._earlier = done, failed, 0
+        self._ended, self._reported = 0, 0.0
 
     def add(self, runs: int, failed: int) -> None:
         """Count finished runs; the reported rate excludes the first batch, whose time may include compilation."""
         self.done += runs
         self.failed += failed
+        # Those that the next part has ended meanwhile stay counted.
+        self._ended = max(0, self._ended - runs)
+        done, self._reported = self.done + self._ended, time.monotonic()
         if not self._earlier:
-            self._earlier, self._started = self.done, time.monotonic()
+            self._earlier, self._started = done, self._reported
         # A search does not know how many runs it will take: a total that follows would always say 'nearly done'.
-        while self._total < self.done:
+        while self._total < done:
             self._total *= 2
         if self._report is not None:
-            elapsed = time.monotonic() - self._started
-            self._report(Progress("", self.done, self._total, self.failed, self._earlier, elapsed))
+            elapsed = self._reported - self._started
+            self._report(Progress("", done, self._total, self.failed, self._earlier, elapsed))
+
+    def count_ended(self, runs: int) -> None:
+        """Count runs that have ended in a part that ``add`` will count as a whole; report at most every second."""
+        self._ended += runs
+        if self._ended and time.monotonic() - self._reported >= _BETWEEN_COUNTS:
+            self.add(0, 0)
 
 
 @final
@@ -134,7 +146,7 @@ def scenario_runs(
 
     def evaluate(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
         try:
-            result = run_ensemble(scenario, columns, metrics, threads=threads, gauge=gauge)
+            result = run_ensemble(scenario, columns, metrics, threads=threads, gauge=gauge, count=counter.count_ended)
         except ScenarioError as error:  # its message names the scenario
             raise StudyError(str(error)) from error
         unknown = np.full(result.status.size, np.nan)

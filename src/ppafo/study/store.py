@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.documents.json_text import json_text
+from ppafo.engine.lanes import Count
 from ppafo.errors import DataError, ScenarioError, StudyError, refused_as
 from ppafo.metrics import METRICS
+from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
 from ppafo.simulation.ensemble.columns import absolute
@@ -74,7 +76,9 @@ class StudyStore:
     folder: StudyFolder
 
     @classmethod
-    def claim(cls, study: Study, folder: StudyFolder, agreed: bool, threads: int | None) -> "StudyStore":
+    def claim(
+        cls, study: Study, folder: StudyFolder, agreed: bool, threads: int | None, report: Report
+    ) -> "StudyStore":
         """Use a folder for a study; StudyError for results of another study or version, or too little disk space."""
         names = folder.names()
         if MANIFEST in names:
@@ -86,6 +90,7 @@ class StudyStore:
             )
         else:
             check_room(study, folder, agreed)
+            report(Progress("preparing", 0, study.runs))
             # A few runs of each configuration, spread evenly: a path that cannot vary is refused at once.
             total = study.runs_of_configuration
             runs = np.unique(np.linspace(0, total - 1, min(total, _TRIED_RUNS)).astype(np.int64))
@@ -166,11 +171,13 @@ def check_types(table: "pa.Table", name: str) -> None:
             )
 
 
-def compute_chunk(study: Study, number: int, threads: int | None) -> tuple[FinishedChunk, bytes]:
+def compute_chunk(
+    study: Study, number: int, threads: int | None, count: Count = report_nothing
+) -> tuple[FinishedChunk, bytes]:
     """Compute a chunk; returns the content of its file: a row per run in SI units, nan for missing values."""
     part = chunk(study, number)
     values = drawn_values(study, np.arange(part.first, part.first + part.runs))
-    result = _result(study, part, values, threads)
+    result = _result(study, part, values, threads, count)
     columns = {
         **_columns_of_runs(study, part, values),
         **_columns_of_endings(study, part, values, result),
@@ -253,7 +260,13 @@ def note_file(number: int) -> str:
     return f"finished/chunk-{number:07d}.json"
 
 
-def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int | None) -> EnsembleResult:
+def _result(
+    study: Study,
+    part: Chunk,
+    values: dict[str, Floats],
+    threads: int | None,
+    count: Count = report_nothing,
+) -> EnsembleResult:
     """Return the results of a chunk with varied ``values`` [SI] by path; StudyError for a path that cannot vary."""
     configuration, outputs = study.configurations[part.configuration], study.outputs
     columns = varied_columns(study, configuration, values) or unvaried(configuration.scenario, part.runs)
@@ -268,6 +281,7 @@ def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int |
             threads,
             study.gauge,
             outputs.errors,
+            count,
         )
 
 

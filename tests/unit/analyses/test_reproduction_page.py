@@ -174,6 +174,12 @@ def test_figure_3_says_in_each_panel_that_it_is_synthetic(reproduction: Reproduc
     assert isinstance(evidence, SyntheticEvidence)
     figure = figure_3(evidence.torque, evidence.decay)
     assert all("synthetic" in axes.get_title(loc="left") for axes in figure.axes)
+    figure.canvas.draw()
+    for axes in figure.axes:
+        # The names stand beside the readings, not on them.
+        legend = axes.get_legend()
+        assert legend is not None
+        assert not legend.get_window_extent().overlaps(axes.get_window_extent())
     rising, falling = figure.axes[0].lines[:2]
     assert (rising.get_marker(), falling.get_marker()) == ("x", "o")
 

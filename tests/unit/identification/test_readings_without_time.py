@@ -32,7 +32,9 @@ def test_static_torque_needs_no_column_of_times(tmp_path: Path) -> None:
 
 def test_a_decay_needs_times_and_the_message_says_how_a_table_without_them_is_read(tmp_path: Path) -> None:
     columns = "angle [deg],pressure_difference [psi_d],torque [N m],direction [-]"
-    with pytest.raises(DataError, match=r'it is \'angle\'.*without times the map has time = \{ rate = "100 Hz" \}'):
+    with pytest.raises(
+        DataError, match=r'not \'angle\'; .*give the sample rate in the map: time = \{ rate = "100 Hz" \}'
+    ):
         identify(problem(tmp_path, columns, "free-decay"))
 
 
@@ -40,3 +42,32 @@ def test_a_missing_direction_is_told_the_table_that_derives_it(tmp_path: Path) -
     columns = "angle [deg],pressure_difference [psi_d],torque [N m],state [-]"
     with pytest.raises(IdentificationError, match=r"or derive it: direction.of = \"pressure_difference\""):
         identify(problem(tmp_path, columns))
+
+
+MAP = """
+[columns.bench.channels]
+pressure_difference = { column = "dp", unit = "psi_d" }
+torque = { column = "scale", unit = "kgf", times = "0.2 m" }
+direction = { column = "stroke" }
+"""
+
+
+@pytest.mark.parametrize(
+    "end", ["", 'direction = { of = "pressure_difference", threshold = "1 psi/s", window = "3 s" }']
+)
+def test_a_column_map_needs_no_times_either_unless_a_rate_is_asked_of_it(tmp_path: Path, end: str) -> None:
+    # A scale in kilograms at a lever of 0.2 m: 9.80665 N for each.
+    rows = "".join(f"{p},{t / 0.2 / 9.80665},{b}\n" for p, t, b in zip(PRESSURE, TORQUE, BRANCH, strict=True))
+    (tmp_path / "readings.csv").write_text(f"dp,scale,stroke\n{rows}", encoding="utf-8")
+    file = tmp_path / "problem.toml"
+    procedure = '[[procedure]]\nkind = "static-torque"\nrecordings = ["readings.csv"]\ncolumns = "bench"\n'
+    direction = f"[columns.bench]\n{end}\n" if end else ""
+    channels = MAP.replace('direction = { column = "stroke" }\n', "") if end else MAP
+    file.write_text(f"{HEAD}{procedure}{direction}{channels}", encoding="utf-8")
+    if end:
+        with pytest.raises(DataError, match=r'channels.time is missing; .* time = \{ rate = "100 Hz" \}'):
+            identify(file)
+        return
+    found = identify(file).found.results[0]
+    assert found["friction.static_torque"].value == pytest.approx(0.45, rel=0.03)
+    assert found["actuator.torque_constant"].value == pytest.approx(0.1 / 6894.757, rel=0.02)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError, ParameterError, PpafoError
+from ppafo.progress import Progress
 from ppafo.rig import list_presets, load_preset, record
 from ppafo.rig.experiments import EXPERIMENTS
 from ppafo.rig.folder import write_rig_recording
@@ -68,6 +69,20 @@ def test_an_experiment_records_its_channels_as_synthetic_and_reads_back(name: st
     files = write_rig_recording(tmp_path, made)
     back = read_csv(tmp_path / files[0])
     assert back == made.recording
+
+
+def test_the_samples_are_counted_while_it_records_and_stay_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ("torque-task", "ideal-laboratory", 1, "ppafo2011", SHORT["torque-task"])
+    quiet = record(*words).recording
+    monkeypatch.setattr("ppafo.rig.solution._BETWEEN_REPORTS", 0.0)
+    told: list[Progress] = []
+    assert record(*words, progress=told.append).recording == quiet
+    # A decision every millisecond, for 0.1 s.
+    assert len(told) >= 100
+    done = [progress.done for progress in told]
+    assert done == sorted(done)
+    assert {progress.total for progress in told} == {len(quiet)}
+    assert 0 < done[-1] <= len(quiet)
 
 
 @pytest.mark.parametrize("name", ["static-torque", "step-response"])

@@ -8,6 +8,7 @@ import pytest
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
 from ppafo.running import simulate
+from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats
 from ppafo.study.blocks import runs_at_once
@@ -68,6 +69,33 @@ def test_a_study_that_resumes_counts_on_from_what_is_there() -> None:
     tally.add(30, 1)
     tally.add(30, 0)
     assert [(item.done, item.failed, item.earlier) for item in seen] == [(70, 3, 70), (100, 3, 70)]
+
+
+def test_runs_are_counted_while_their_part_is_under_way_at_most_every_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[Progress] = []
+    now: list[float] = [100.0]
+    monkeypatch.setattr("ppafo.study.runs.time.monotonic", lambda: now[0])
+    tally = RunCounter(100, seen.append)
+    tally.add(0, 0)
+    for _ in range(6):
+        now[0] += 0.4
+        tally.count_ended(10)
+    # The first 50 of them are a part; 10 of the next have ended.
+    tally.add(50, 0)
+    assert [(item.done, round(item.elapsed, 6)) for item in seen] == [(0, 0.0), (30, 0.0), (60, 1.2), (60, 1.2)]
+    assert seen[-1].earlier == 30, "the first count may have waited for a compiler"
+
+
+def test_every_run_of_an_ensemble_is_counted_once_with_one_thread_and_with_several() -> None:
+    base = load_scenario("torque-task-proportional", SHORT)
+    columns = {"valve.area": np.linspace(10e-6, 12e-6, 100)}
+    for threads in (1, 2):
+        ended: list[int] = []
+        run_ensemble(base, columns, ("rms_error",), threads=threads, count=ended.append)
+        assert sum(ended) == 100
+        ended.clear()
+        run_ensemble(base, columns, ("rms_error",), threads=threads, errors=True, count=ended.append)
+        assert sum(ended) == 100, "the second run of each, with finer steps, is no further run"
 
 
 def test_the_table_has_all_rows_with_the_values_that_made_them() -> None:

@@ -20,6 +20,8 @@ from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, number_in_si
 from ppafo.progress import Report, report_nothing
+from ppafo.signals.recording import TIME
+from ppafo.storage.column_map import MappedChannel
 from ppafo.storage.comma_separated import read_csv
 from ppafo.storage.foreign import read_trials
 from ppafo.storage.reading import TEXT_SUFFIXES, read_recording
@@ -103,7 +105,7 @@ def _sources(
     """Return the recordings in a file that a problem names, read through a column map if one is given.
 
     ``parameter_set`` provides the atmosphere for gauge pressures and the gas for volume flows. ``row_time`` [s] is the
-    time between the rows of a table of text without a time column; None requires the column.
+    time between the rows of a table of text, or of a column map, without a time column; None requires the column.
     """
     atmosphere = atmospheric_pressure(parameter_set)
     if path.is_dir():
@@ -115,7 +117,12 @@ def _sources(
         return (source_of(path, read_recording(path, atmosphere=atmosphere)),)
     molar_mass = number_in_si(parameter_set, "gas.molar_mass")
     gas = "" if molar_mass is None else f"{molar_mass!r} kg/mol"
-    recordings = read_trials(path, problem.columns[columns], None, atmosphere, f"{file}:{columns}", gas)
+    column_map = problem.columns[columns]
+    # A direction from a rate, and trials that begin anew, need the times of the bench.
+    if row_time is not None and not (TIME in column_map.channels or column_map.direction or column_map.trial):
+        time = MappedChannel(rate=f"{1.0 / row_time!r} Hz")
+        column_map = column_map.model_copy(update={"channels": {TIME: time, **column_map.channels}})
+    recordings = read_trials(path, column_map, None, atmosphere, f"{file}:{columns}", gas)
     return tuple(source_of(path, recording, recording.label.removeprefix(path.stem)) for recording in recordings)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from ppafo.parameters.parts import Part
+from ppafo.parameters.parts.catalogue import RATING, figures_of
 from ppafo.report import finding
 from ppafo.report.finding import facts
 
@@ -16,14 +17,25 @@ def part_titles(parts: Iterable[Part]) -> finding.Section:
     return finding.Section("Parts", facts({part.name: part.title for part in parts}.items()), is_detail=True)
 
 
-def parts_to_check(doubtful: Iterable[tuple[Part, str]]) -> list[finding.Section]:
-    """Return the sections on figures to check before buying.
+def parts_to_check(doubtful: Iterable[tuple[Part, str]], used: Iterable[Part]) -> list[finding.Section]:
+    """Return the sections on figures to check before buying: unknown ones of the ``used`` parts, and doubtful ones.
 
-    The table has a row for each part; the page also has the reason for each doubtful figure.
+    A line for each unknown figure says that the part counts as ideal: no delay, no dead band, no pressure limit. The
+    table of doubtful figures has a row for each part; the page also has the reason for each of these figures.
     """
+    unknown = []
+    for part in {(part.group, part.name): part for part in used}.values():
+        ideal = [quantity.name for quantity in figures_of(part.group, part.kind) if quantity.default == 0.0]
+        ideal += [RATING.name] if part.group in ("valves", "actuators") else []
+        unknown += [
+            f"{part.name}: {name.replace('_', ' ')} unknown, taken as ideal"
+            for name in ideal
+            if name not in part.values
+        ]
+    sections = [finding.Section("Unknown data of the parts", remarks=unknown)] if unknown else []
     pairs = tuple(doubtful)
     if not pairs:
-        return []
+        return sections
     # A row for each part, since a person orders parts; a reason for each figure, since each has its own.
     figures_by_part: dict[str, list[str]] = {}
     reasons = []
@@ -35,6 +47,7 @@ def parts_to_check(doubtful: Iterable[tuple[Part, str]]) -> list[finding.Section
     rows = facts((name, ", ".join(figures)) for name, figures in figures_by_part.items())
     meaning = "quoted from a secondary source, or assumed; 'ppafo sets parts PART' gives the reasons"
     return [
+        *sections,
         finding.Section("Check before buying", rows, [meaning]),
         finding.Section("Why these figures are uncertain", remarks=reasons, is_detail=True),
     ]

@@ -14,6 +14,7 @@ from ppafo.parameters import load_device, load_parameter_set
 from ppafo.parameters.overrides import read_overrides, with_overrides
 from ppafo.parameters.parameter_set import SOURCE as OVERRIDE
 from ppafo.parameters.parameter_set import number_text, with_followers
+from ppafo.progress import Report, report_nothing
 from ppafo.rig import record
 from ppafo.signals import Recording
 from ppafo.simulation.declaration import quantities
@@ -113,7 +114,9 @@ class SyntheticEvidence:
     proportional: Recording
 
 
-def synthetic_evidence(tasks: Mapping[str, tuple[str, ...]], step_overrides: Sequence[str]) -> SyntheticEvidence | str:
+def synthetic_evidence(
+    tasks: Mapping[str, tuple[str, ...]], step_overrides: Sequence[str], report: Report = report_nothing
+) -> SyntheticEvidence | str:
     """Return the recordings of the rig, or an error message if its solver fails or it does not support the overrides.
 
     ``tasks`` are the overrides of the torque task for the valves ``solenoid`` and ``proportional``. The procedures of
@@ -121,7 +124,7 @@ def synthetic_evidence(tasks: Mapping[str, tuple[str, ...]], step_overrides: Seq
     """
     try:
         recorded = {
-            valve: record("torque-task", TASK_PRESET, RIG_SEED, PLANTED_SET, overrides, valve).recording
+            valve: record("torque-task", TASK_PRESET, RIG_SEED, PLANTED_SET, overrides, valve, report).recording
             for valve, overrides in tasks.items()
         }
         torque, decay = bench_figure()

@@ -297,8 +297,9 @@ def run_studies(study: str, report: Report) -> tuple[tuple[Publication, tuple[Ju
     studies = []
     for name in study_names()[1:-1] if study == ALL else (study,):
         publication, claims = load_publication(name), []
-        for claim in publication.claims:
-            report(Progress(f"{publication.name}: {claim.entry.id}"))
+        for number, claim in enumerate(publication.claims):
+            progress = Progress(f"{publication.name}: {claim.entry.id}", number, len(publication.claims), noun="claims")
+            report(progress)
             claims.append(judge(claim))
         studies.append((publication, tuple(claims)))
     return tuple(studies)

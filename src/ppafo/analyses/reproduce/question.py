@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Overrides, Word, checked
 from ppafo.plugins import Plugins, name_plugins
-from ppafo.progress import Report, report_nothing
+from ppafo.progress import Progress, Report, report_nothing
 
 if TYPE_CHECKING:
     from ppafo.analyses.reproduce.result import Reproduction, Studies
@@ -45,12 +45,14 @@ def reproduce(
     ('jmd-2016, run again', True)
     """
     name_plugins(plugins)
+    report = progress or report_nothing
+    # Loading takes a second or two.
+    report(Progress("loading the experiments"))
     from ppafo.analyses.reproduce.answer import finding_of, finding_of_studies
     from ppafo.analyses.reproduce.publication import ALL, SEED, check_study, run_studies
     from ppafo.analyses.reproduce.result import Studies
     from ppafo.analyses.reproduce.solve import reproduce_paper
 
-    report = progress or report_nothing
     study = str(study)
     # Before anything runs, which takes long.
     changes = tuple(overrides)

@@ -27,7 +27,7 @@ from ppafo.arguments import Count, Overrides, Seed, Threads, checked
 from ppafo.documents.json_text import json_text
 from ppafo.metrics import METRICS
 from ppafo.plugins import Plugins, name_plugins
-from ppafo.progress import Report
+from ppafo.progress import Progress, Report, report_nothing
 from ppafo.report.finding import Finding
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.gains import warn_of_following_gains
@@ -228,7 +228,7 @@ def sweep(
             returned object
         agreed: consent to a folder that takes much of the disk
         plugins: modules of your own, files or names, whose objects files may name
-        progress: called with every finished chunk
+        progress: called with counts of the runs
 
     Returns:
         a Finding whose ``found`` is the StudyResults: columns by name, and ``summary``
@@ -254,8 +254,10 @@ def sweep(
             warn_of_following_gains(
                 configuration.scenario, [path for path in varied if chosen.varies(path, configuration.name)]
             )
-    store = StudyStore.claim(chosen, folder, agreed, threads)
+    report = progress or report_nothing
+    store = StudyStore.claim(chosen, folder, agreed, threads, report)
     _compute_missing_chunks(store, threads, progress)
+    report(Progress("summarising", chosen.runs, chosen.runs))
     results = StudyResults(folder, read_manifest(folder), {}, kept)
     summary = _summary(chosen, results)
     if chosen.outputs.bands:
@@ -298,7 +300,7 @@ def _compute_missing_chunks(store: StudyStore, threads: int | None, progress: Re
     with ThreadPoolExecutor(1, "ppafo-writing") as writer:
         writing: Future[FinishedChunk] | None = None
         for number in missing:
-            computed = compute_chunk(study, number, threads)
+            computed = compute_chunk(study, number, threads, counter.count_ended)
             if writing is not None:
                 count(writing)
             writing = writer.submit(store.write, *computed)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Count, File, Folder, Name, Overrides, Patience, Port, Time, Whole, Word
+from ppafo.progress import Report, report_nothing
 
 if TYPE_CHECKING:
     from ppafo.cli.output import CommandOutput
@@ -20,6 +21,7 @@ def rig_simulate(
     valve: Name | None = None,
     overrides: Overrides = (),
     out: Folder = Path("out/rig"),
+    progress: Report = report_nothing,
 ) -> CommandOutput:
     """Run an experiment on the simulated test bench, and write the recording of a laboratory, marked as synthetic.
 
@@ -43,7 +45,7 @@ def rig_simulate(
     find_experiment(experiment)
     with blame_out_option():
         check_rig_folder(out, experiment)
-    rig_recording = record(experiment, preset, seed, device, overrides, valve)
+    rig_recording = record(experiment, preset, seed, device, overrides, valve, progress)
     files = write_rig_recording(out, rig_recording)
     recording = rig_recording.recording
     samples = f"{len(recording)} samples of {', '.join(recording.names)}"

@@ -270,12 +270,6 @@ def _panels(decays: tuple[FreeDecay, ...], model: Floats, slowing: Slowing) -> t
         bent = Mark("line", speeds, -slowing.at(speeds), label="fit near rest")
         rates.append(replace(bent, colour=GREY, style={"linestyle": "--", "linewidth": 1.2}))
     return (
-        Panel(TIME, Kind("Angle", "rad", "angle"), angles, "Free decay", legend="inside"),
-        Panel(
-            Kind("Angular velocity", "rad/s"),
-            Kind("Angular acceleration", "rad/s$^2$"),
-            rates,
-            "Damping",
-            legend="inside",
-        ),
+        Panel(TIME, Kind("Angle", "rad", "angle"), angles, "Free decay"),
+        Panel(Kind("Angular velocity", "rad/s"), Kind("Angular acceleration", "rad/s$^2$"), rates, "Damping"),
     )

@@ -131,5 +131,5 @@ def figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
     for result, panel in ((torque, torque.panels[0]), (decay, decay.panels[1])):
         # Of a page that shows two kinds of recordings, the mark of the figure would not say which panel is which.
         words = "" if result.kind == "measured" else f", {result.kind}"
-        panels.append(replace(panel, title=f"{panel.title}{words}", legend="inside"))
+        panels.append(replace(panel, title=f"{panel.title}{words}", legend="above"))
     return bench_figure(panels, kind_of((torque.kind, decay.kind)))

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.channels import TRACED
-from ppafo.engine.lanes import Floats
+from ppafo.engine.lanes import Count, Floats
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError
 from ppafo.metrics import MetricKind, metric_kind
 from ppafo.model.controlled import CONTROLLED
+from ppafo.progress import report_nothing
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.check import MARGIN, finer
 from ppafo.simulation.ensemble.columns import check_columns
@@ -57,6 +58,7 @@ def run_ensemble(
     threads: int | None = None,
     gauge: Collection[str] = (),
     errors: bool = False,
+    count: Count = report_nothing,
 ) -> EnsembleResult:
     """Run ``base`` once for each row of values; each run gives exactly the same result as alone.
 
@@ -67,6 +69,7 @@ def run_ensemble(
     unknown paths, metrics and channels, and for columns of different lengths; a run whose values are out of range is
     REFUSED and the others continue. Memory grows with the number of runs: use chunks of some ten thousand runs.
     ``errors`` repeats all runs with a sixteenth of the allowed error, which takes four times as long again.
+    ``count`` is called in between with the number of runs that have ended since the last call.
 
     If a Python object controls ``base``, the runs are made one after the other: some 30 ms each.
 
@@ -91,13 +94,14 @@ def run_ensemble(
         longest = max(float((intervals(batch) * (batch.clock.samples - 1)).max()) for _, batch in plan.batches)
         times = np.arange(int(longest / interval * (1.0 + _ROUNDING)) + 1, dtype=np.float64) * interval
     request = OutputRequest(metrics, tuple(dict.fromkeys(bands)), interval, times, base.controller.custom)
-    runs = MeteredRuns(checked.runs, request)
+    # The runs with finer steps take most of the time.
+    runs = MeteredRuns(checked.runs, request, report_nothing if errors else count)
     runs.run_all(plan.batches, threads)
     estimated = {}
     if errors:
         # For the metrics alone: nobody asks for the error of a trace.
         metrics_alone = OutputRequest(metrics, (), interval, np.empty(0), base.controller.custom)
-        fine = MeteredRuns(checked.runs, metrics_alone)
+        fine = MeteredRuns(checked.runs, metrics_alone, count)
         fine.run_all(plan_ensemble(checked, finer).batches, threads)
         for name, values in runs.metrics.items():
             # Where the finer run has no value this one may be wrong by anything; without a value it has no error.

@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.compilers import Effort
-from ppafo.engine.lanes import Batch, BatchResult, Floats, load_programs, run_blocks
+from ppafo.engine.lanes import Batch, BatchResult, Count, Floats, load_programs, run_blocks
 from ppafo.engine.metering import add_meters, meters_of
 from ppafo.engine.rows import group_of
 from ppafo.engine.run import NEVER_FAILED, Members
@@ -16,6 +16,7 @@ from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS, has_channels
 from ppafo.metrics.gas import WITH_ENERGY_BALANCE
 from ppafo.metrics.metric import MetricKind, Readings
+from ppafo.progress import report_nothing
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Scenario
@@ -44,8 +45,8 @@ class OutputRequest:
 class MeteredRuns:
     """Results of all runs so far: arrays that batches fill by column; nan for runs not yet made."""
 
-    def __init__(self, runs: int, request: OutputRequest) -> None:
-        self.request = request
+    def __init__(self, runs: int, request: OutputRequest, count: Count = report_nothing) -> None:
+        self.request, self._count = request, count
         self.failure_time = np.full(runs, np.nan)
         self.is_completed = np.zeros(runs, dtype=bool)
         self.too_many_parts = np.zeros(runs, dtype=bool)
@@ -75,13 +76,14 @@ class MeteredRuns:
                 self.traces[name][: len(trace), members[runs]] = trace
 
         if self.request.custom is None:
-            run_blocks(batch, store, threads)
+            run_blocks(batch, store, threads, count=self._count)
         else:
             # An object has one state, so that it cannot be in charge of two runs at a time.
             for run in range(members.size):
                 column = slice(run, run + 1)
                 single = Batch(batch.program, batch.clock, batch.parameters[:, column], batch.states[:, column])
                 store(column, run_sampled(single, self.request.custom))
+                self._count(1)
         # By the rule for a single run: valid throughout, and finite at the end. Meters stand below the rows of a plain
         # batch, and what they come to says nothing about the run.
         result = group_of("result", batch.program.state_rows(), states)

@@ -1,7 +1,7 @@
 """Verdict on a run: whether it follows its reference, the cause of a failure, and remedies that were tried."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -175,14 +175,18 @@ def following_text(result: "RecordedResult") -> str:
     if case.failure is not None:
         return ""
     if settled.ends_on_ramp:
-        error = change_text(controlled.name, settled.error)
-        return _undecided_text(scenario, f"the run ends on the ramp of its reference, with an RMS error of {error}")
+        error, since = change_text(controlled.name, settled.error), time_text(settled.start)
+        return _undecided_text(
+            scenario, f"the run ends on the ramp of its reference, with an RMS error of {error}{since}"
+        )
 
     def judged_text(name: str, number: float, limit: float | None, why: str = "") -> str:
         allowed = "" if limit is None else f" ({change_text(controlled.name, limit)} allowed{why})"
         return f"{name} {change_text(controlled.name, number)}{allowed}"
 
-    begin, rms = f"the {controlled.words} follows its reference: ", ("RMS error", settled.error)
+    # The interval stands before the errors: metrics of the same names cover the whole run.
+    begin = f"the {controlled.words} follows its reference;{time_text(settled.start)}: "
+    rms = ("RMS error", settled.error)
     if not scenario.follows_reference:
         return begin + judged_text(*rms, LARGEST_SHARE_OF_WAVE * settled.wanted)
     # The limit of on/off valves is several times wider, so the swing is reported beside the error.
@@ -192,27 +196,33 @@ def following_text(result: "RecordedResult") -> str:
     texts = judged_text(*rms, float(largest_error(settled, case.only_switches)), why), judged_text(*deviation, limit)
     # A reference just beyond reach is missed by no more than is allowed.
     beyond = torque_beyond_reach(case)
-    return f"{begin}{', '.join(texts)}{time_text(settled.start)}{'' if beyond is None else f'; {beyond.text}'}"
+    return f"{begin}{', '.join(texts)}{'' if beyond is None else f'; {beyond.text}'}"
 
 
 def _undecided_text(scenario: Scenario, reason: str) -> str:
-    """Reason why a task has no verdict, and times with which it has one."""
-    run, count = scenario.run, _SAMPLES_ADVISED
-    for times in (2.0**power for power in range(_MOST_DOUBLINGS)):
-        duration = times * run.duration
-        reference = profile_values(scenario.reference, np.linspace(0.0, duration, count))[0]
+    """Reason why a task has no verdict, and untried times with which its reference rests before the end."""
+    run, choice, count = scenario.run, scenario.reference, _SAMPLES_ADVISED
+    longer = [2.0**power * run.duration for power in range(1, _MOST_DOUBLINGS)]
+    trials = [(run.duration, choice, list[str]())]
+    trials += [(duration, choice, [f"run.duration={duration:.12g} s"]) for duration in longer]
+    if "ramp_time" in choice.settings:
+        ramp = float(f"{0.25 * run.duration:.12g}")
+        shorter = replace(choice, settings={**choice.settings, "ramp_time": ramp})
+        trials.append((run.duration, shorter, [f"reference.ramp_time={ramp!r} s"]))
+    remedy = "a reference that rests before the end of the run"
+    for duration, tried, changes in trials:
+        reference = profile_values(tried, np.linspace(0.0, duration, count))[0]
         ways = np.diff(reference) * (reference[-1] - reference[0])
-        if duration < count * run.step or (np.all(ways >= 0.0) and ways[count // 2 :].any()):
-            continue
-        changes = [f"run.duration={duration:.12g} s"] if times > 1.0 else []
-        changes += [f"run.output_interval={duration / count:.12g} s"] if run.output_interval > duration / count else []
-        return f"no verdict on the {CONTROLLED[scenario.controlled].words}: {reason}; give {override_text(changes)}"
-    return f"no verdict on the {CONTROLLED[scenario.controlled].words}: {reason}; shorten the ramp"
+        if duration >= count * run.step and not (np.all(ways >= 0.0) and ways[count // 2 :].any()):
+            finer = [f"run.output_interval={duration / count:.12g} s"] if run.output_interval > duration / count else []
+            remedy = override_text([*changes, *finer])
+            break
+    return f"no verdict on the {CONTROLLED[scenario.controlled].words}: {reason}; not tried: {remedy} should give one"
 
 
 def time_text(since: float) -> str:
-    """Words for the settled part of a run, which starts at a time [s]."""
-    return f" from {since:.3g} s on" if since > 0.0 else ""
+    """Words for the judged part: of a task from a time [s] on, of a walk, with 0, where a torque is requested."""
+    return f" from {since:.3g} s on" if since > 0.0 else " where a torque is requested"
 
 
 def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None:

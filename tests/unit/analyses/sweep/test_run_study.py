@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -155,6 +156,12 @@ def test_chunks_are_the_same_in_any_order_and_on_any_number_of_threads(small_res
         assert content == written[chunk_file(number)]
 
 
+@pytest.fixture(autouse=True)
+def counts_of_whole_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a slow computer, runs are counted within a chunk too."""
+    monkeypatch.setattr("ppafo.study.runs._BETWEEN_COUNTS", math.inf)
+
+
 class StoppedError(Exception):
     """Stands for whatever ends a process."""
 
@@ -171,6 +178,22 @@ def stopped_after(chunks: int) -> Callable[[Progress], None]:
             raise StoppedError
 
     return watch
+
+
+def test_runs_are_counted_within_a_chunk_and_the_stored_bytes_stay(
+    small_results: StudyResults, small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # As if every block of runs took a second: a chunk of a large study has thousands.
+    monkeypatch.setattr("ppafo.study.runs._BETWEEN_COUNTS", 0.0)
+    told: list[Progress] = []
+    sweep(small, out=tmp_path / "out", threads=1, progress=told.append)
+    done = [progress.done for progress in told]
+    chunks = len(list((tmp_path / "out" / "finished").iterdir()))
+    assert done == sorted(done)
+    assert done[-1] == 32
+    assert len(set(done) - {0}) == chunks
+    assert len(done) >= 2 * chunks, "each chunk once as its runs end, and once as it is written"
+    assert contents(tmp_path / "out") == contents(small_results.folder.path)
 
 
 @pytest.mark.parametrize("chunks", [1, 4, 8])
@@ -214,7 +237,9 @@ def test_damaged_chunks_are_found_and_computed_again(
     path.write_bytes(damage(path.read_bytes()))
     told: list[Progress] = []
     sweep(small, out=out, progress=told.append)
-    assert len(told) == 2, "the count at the start, and one chunk"
+    done = [progress.done for progress in told]
+    assert len(done) == 3, "the count at the start, one chunk, and the summary"
+    assert done[-1] == 32
     assert contents(out) == contents(small_results.folder.path)
 
 

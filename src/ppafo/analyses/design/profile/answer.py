@@ -282,7 +282,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 size=(5.8, 2.5),
                 is_detail=True,
             ),
-            *parts_to_check(sizing.doubtful),
+            *parts_to_check(sizing.doubtful, (*(sized.valve for sized in sizing.valves), *problem.carried)),
             finding.Section("How to read it", said=(*_READING, *method), is_detail=True),
             part_titles([sized.valve for sized in sizing.valves]),
         ),

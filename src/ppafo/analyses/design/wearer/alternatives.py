@@ -66,14 +66,15 @@ def alternatives_to(
             low.append(candidate)
     weak.sort(key=lambda candidate: -candidate.pair.torque)
     low.sort(key=lambda candidate: -candidate.pair.toes)
-    report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
-    nearest = [] if able else [_as_walked(group[0], bottle, shelf) for group in (weak, low) if group]
+    nearest = [] if able else [_as_walked(group[0], bottle, shelf, report) for group in (weak, low) if group]
     alternatives = [
-        alternative for alternative in (_thriftiest(able, bottle, shelf), *nearest) if alternative is not None
+        alternative for alternative in (_thriftiest(able, bottle, shelf, report), *nearest) if alternative is not None
     ]
     yield from alternatives
     if not able:
-        stronger = (_as_walked(candidate, bottle, shelf) for candidate in _at_more_pressure(requirements, tried))
+        stronger = (
+            _as_walked(candidate, bottle, shelf, report) for candidate in _at_more_pressure(requirements, tried)
+        )
         yield from itertools.islice(filter(None, stronger), 1)
     # A walk that ends early is no full answer: less torque for the whole time is offered beside it.
     if all(alternative.requirements.seconds < requirements.seconds for alternative in alternatives):
@@ -82,7 +83,7 @@ def alternatives_to(
         for candidate in weak:
             if candidate.pair.flow > largest_flow:
                 continue
-            alternative = _as_walked(candidate, bottle, shelf)
+            alternative = _as_walked(candidate, bottle, shelf, report)
             if alternative is not None and alternative.requirements.seconds == requirements.seconds:
                 yield alternative
                 break
@@ -125,21 +126,21 @@ def _at_more_pressure(requirements: DesignRequirements, tried: Sequence[WalkedDe
                 yield from (_Candidate(higher, strides) for strides in again if strides.has(requirements))
 
 
-def _thriftiest(able: Sequence[_Candidate], bottle: Part, shelf: AvailableParts) -> Alternative | None:
+def _thriftiest(able: Sequence[_Candidate], bottle: Part, shelf: AvailableParts, report: Report) -> Alternative | None:
     """Return the alternative with the least gas flow on a bottle; None if no candidate can walk on the bottle.
 
     Among the first few candidates, one that keeps the required toe clearance on the bottle is preferred.
     """
     fallback: Alternative | None = None
     for candidate in able[:_MOST_WALKED]:
-        alternative = _as_walked(candidate, bottle, shelf)
+        alternative = _as_walked(candidate, bottle, shelf, report)
         if alternative is not None and alternative.requirements.clearance >= candidate.requirements.clearance:
             return alternative
         fallback = alternative if fallback is None else fallback
     return fallback
 
 
-def _as_walked(candidate: _Candidate, bottle: Part, shelf: AvailableParts) -> Alternative | None:
+def _as_walked(candidate: _Candidate, bottle: Part, shelf: AvailableParts, report: Report) -> Alternative | None:
     """Return a candidate as an alternative, confirmed by a walk on a bottle; None if the walk does not provide help.
 
     The requirements are relaxed to the results of the candidate, rounded down to the digits of a command line. The pair
@@ -152,7 +153,7 @@ def _as_walked(candidate: _Candidate, bottle: Part, shelf: AvailableParts) -> Al
     if pair.toes < lesser.clearance:
         lesser = replace(lesser, toes=shown_clearance(pair.toes))
     again = next((strides for strides in few_strides(lesser, pair.valve, pair.actuator) if strides.has(lesser)), None)
-    walked = None if again is None else walk_on_bottle(again, shelf.bottle_name(bottle), lesser.seconds)
+    walked = None if again is None else walk_on_bottle(again, shelf.bottle_name(bottle), lesser.seconds, report)
     if again is None or walked is None or not walked.averages:
         return None
     # The toes come down a little as the pressure falls.

@@ -19,6 +19,7 @@ from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.simulation.gains import gains_of
+from ppafo.units.reference import with_condition
 from ppafo.walking.bottle.course import duration_text
 from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of
@@ -31,8 +32,6 @@ _HEAD = (
     "actuator",
     ("peak torque", TORQUE),
     ("lowest toes", CLEARANCE),
-    ("gas", Kind("", "kg/s", "mass flow", ".3g")),
-    ("mass of both", MASS),
 )
 _CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
 _READING = (
@@ -48,6 +47,9 @@ _READING = (
 def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
     """Return a sizing for a wearer as a finding: device with its walk, or alternatives; not passed without device."""
     requirements, device = sizing.requirements, sizing.device
+    # Flows as the user's catalogue states those of its valves.
+    units = [part.figures["nominal_flow"].unit for part in sizing.own_valves if "nominal_flow" in part.figures]
+    flow = Kind("", "kg/s", "mass flow", ".3g", given=with_condition(units[0], "ANR", sizing.gas) if units else "")
     rows = [
         (tried.valve.name, tried.actuator.name, tried.torque, tried.toes, tried.flow, tried.mass)
         for tried in sorted(sizing.tried, key=lambda tried: -tried.torque)
@@ -55,7 +57,7 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
     remarks = ["toes below 0 would drag"] if any(tried.toes < 0.0 for tried in sizing.tried) else []
     table = finding.Section(
         "Parts that were tried in a walk",
-        columns_of(_HEAD, rows),
+        columns_of((*_HEAD, ("gas", flow), ("mass of both", MASS)), rows),
         remarks=remarks,
         left=2,
         is_detail=device is not None,
@@ -76,14 +78,19 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
             table,
         )
         if device is None
-        else (*_sections(requirements, device), table, *parts_to_check(sizing.doubtful), part_titles(sizing.parts))
+        else (*_sections(requirements, device), table, part_titles(sizing.parts))
     )
+    walked = (part for tried in sizing.tried for part in (tried.valve, tried.actuator))
     return Finding(
         name="design",
         kicker="From a wearer to a device",
         title="The device",
         said=sentences,
-        parts=(*sections, finding.Section("How to read it", said=_READING, is_detail=True)),
+        parts=(
+            *sections,
+            *parts_to_check(sizing.doubtful, sizing.parts or walked),
+            finding.Section("How to read it", said=_READING, is_detail=True),
+        ),
         found=sizing,
         passed=device is not None,
     )
@@ -112,9 +119,14 @@ def _sections(requirements: DesignRequirements, device: SizedDevice) -> tuple[fi
         who_walks(walk_of(walked.scenario).wearer, walk_of(walked.scenario).gait, "as requested"),
     ]
     caption, draw = _CAPTION.format(wished=duration, lasts=lasts), partial(bottle_figure, walked)
-    masses = ((name, MASS.text(mass, ".0f")) for name, mass in device.masses.items())
+    masses = {name: MASS.text(mass, ".0f") for name, mass in device.masses.items()}
+    # The content as its catalogue states it.
+    content = device.bottle.figures.get("content")
+    if content is not None:
+        gas = walked.scenario.device.gas.species
+        masses[f"bottle {device.bottle.name}, full"] += f", of these {content.value:g} {content.unit} of {gas}"
     return (
         finding.Section("The walk on its bottle", facts(rows), remarks=remarks, code=device.command),
-        finding.Section("Masses", facts(masses)),
+        finding.Section("Masses", facts(masses.items())),
         finding.Section("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
     )

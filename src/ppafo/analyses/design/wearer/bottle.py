@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ppafo.analyses.design.wearer.available_parts import AvailableParts
 from ppafo.analyses.design.wearer.requirements import WALKS, DesignRequirements, WalkedDevice
@@ -32,8 +33,7 @@ def lightest_on_bottle(
         largest_flow = min(bottle.values["content"] / requirements.seconds, too_thirsty.get(bottle.name, math.inf))
         if pair.flow > largest_flow:
             continue
-        report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
-        walked = walk_on_bottle(pair, shelf.bottle_name(bottle), requirements.seconds)
+        walked = walk_on_bottle(pair, shelf.bottle_name(bottle), requirements.seconds, report)
         if walked is None or walking_time(walked) < requirements.seconds:
             too_thirsty[bottle.name] = lasting_flow(pair, walking_time(walked), requirements.seconds)
         elif keeps(walked, requirements):
@@ -41,10 +41,15 @@ def lightest_on_bottle(
     return None
 
 
-def walk_on_bottle(pair: WalkedDevice, bottle: str, seconds: float) -> WalkResult | None:
+def walk_on_bottle(pair: WalkedDevice, bottle: str, seconds: float, report: Report) -> WalkResult | None:
     """Walk for a time [s] or until the bottle is exhausted; None if the bottle cannot supply the device."""
+    counted = Progress(f"walking on {bottle}", 0, round(seconds), noun="s of walking")
+    report(counted)
     try:
-        return walk(load_walk(WALKS[pair.valve.kind], pair.overrides, bottle=bottle), minutes=seconds / 60.0)
+        walking = load_walk(WALKS[pair.valve.kind], pair.overrides, bottle=bottle)
+        return walk(
+            walking, minutes=seconds / 60.0, progress=lambda done, _: report(replace(counted, done=round(60.0 * done)))
+        )
     except ScenarioError:
         return None
 

@@ -232,6 +232,8 @@ class WearerSizing:
     ``healthy_toes``: toe clearance of the healthy gait [m]
     ``device``: lightest device that meets the requirements; None if there is none
     ``instead``: alternatives if there is no device
+    ``gas``: species of the gas
+    ``own_valves``: valves of the user's own catalogue; empty for the catalogue of the package
     """
 
     requirements: DesignRequirements
@@ -239,6 +241,8 @@ class WearerSizing:
     tried: tuple[WalkedDevice, ...]
     device: SizedDevice | None
     instead: tuple[str, ...]
+    gas: str = ""
+    own_valves: tuple[Part, ...] = ()
 
     @property
     def parts(self) -> list[Part]:

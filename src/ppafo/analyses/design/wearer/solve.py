@@ -78,8 +78,11 @@ def size_for_wearer(
         report(Progress(f"walking with {valve.name}", number, len(pairs), noun="pairs"))
         tried += few_strides(requirements, valve, actuator)
     lightest = lightest_on_bottle(requirements, tried, shelf, report)
+    gas = requirements.gas or walking.device.gas.species
+    own = tuple(shelf.groups["valves"].values()) if "valves" in shelf.own_groups else ()
+    sized = WearerSizing(requirements, healthy, tuple(tried), None, (), gas, own)
     if lightest is not None:
-        return WearerSizing(requirements, healthy, tuple(tried), _device(*lightest, requirements, shelf), ())
+        return replace(sized, device=_device(*lightest, requirements, shelf))
     instead = tuple(
         alternative.text(requirements) for alternative in alternatives_to(requirements, tried, shelf, report)
     )
@@ -94,7 +97,7 @@ def size_for_wearer(
             "with 'ppafo new parts my-parts --from parts', add an actuator of more torque per pressure and give "
             f"{argument_text('catalogue')}",
         )
-    return WearerSizing(requirements, healthy, tuple(tried), None, instead)
+    return replace(sized, instead=instead)
 
 
 def _device(

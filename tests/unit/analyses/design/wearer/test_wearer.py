@@ -193,6 +193,19 @@ def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assu
     assert requirements.height == pytest.approx(math.sqrt(60.0 / 22.0))
     said = text_of(finding_of(WearerSizing(requirements, 0.0052, tuple(found), None, ())))
     assert "1.651 m (assumed: a body mass index of 22 kg/m^2; give stature)" in said
+    # The valve of the paper has no data sheet: each figure that is missing is said, once.
+    unknown = [line for line in said.splitlines() if line.endswith(" unknown, taken as ideal")]
+    figures = ("dead band", "delay", "spool frequency", "slew limit", "largest pressure")
+    parts = [(valve.name, figure) for figure in figures] + [(actuator.name, "largest pressure")]
+    assert unknown == [f"{name}: {figure} unknown, taken as ideal" for name, figure in parts]
+    assert "(g/s)" in said
+    # A catalogue of one's own that states flows of valves in L/min: CO2 at 20 degC and 1 bar has 1.82 g/L.
+    own = catalogue.part("valves", "festo-mpye-5-m5-010-b")
+    sizing = WearerSizing(requirements, 0.0052, tuple(found), None, (), "CO2", (own,))
+    lines = text_of(finding_of(sizing)).splitlines()
+    assert any("gas (L/min (ANR, CO2))" in line for line in lines)
+    shown = next(line for line in lines if line.startswith(valve.name) and "unknown" not in line).split()
+    assert float(shown[-2]) == pytest.approx(found[0].flow * 1000.0 / 1.82 * 60.0, rel=0.02)
 
 
 @pytest.mark.parametrize("mass", [35.0, 95.0])
