@@ -184,7 +184,7 @@ MISTAKES = {
     "bottle.name=air-48ci-3000psi": "the device uses CO2: set gas.species=air, or choose a bottle of CO2",
     "bottle.fill=0": "must be more than 0",
     "bottle.temperature=200 K": "must be above 216.592 K",
-    "bottle.temperature=303 K": "and 224.9 g fit into it at 303 K",
+    "bottle.temperature=303 K": "only 224.9 g fit into the bottle at 303 K",
     "bottle.regulator.area=0 mm^2": "must be more than 0",
     "bottle.regulator.are=3 mm^2": "bottle.regulator.area",
     "supply.relieving=true": "must be false with a bottle",
