@@ -158,8 +158,8 @@ def _check_curves(chamber: TabulatedChamber, bends: Floats, angles: Floats, name
         is_volume = curve is chamber.lowest
         if values.min() < -rounding:
             angle = angles[0] + _CHECKED_SHARES[int(np.argmin(values))] * (angles[-1] - angles[0])
-            problem = "is negative" if is_volume else "falls with the pressure"
+            problem = "is negative" if is_volume else "decreases with pressure"
             raise ParameterError(
-                f"{file}: between its angles the curve of {name} {problem} near {math.degrees(angle):.4g} deg; smooth "
-                "the numbers, or measure more angles there"
+                f"{file}: between the measured angles the interpolated {name} {problem} near "
+                f"{math.degrees(angle):.4g} deg; smooth the volumes, or measure at more angles there"
             )

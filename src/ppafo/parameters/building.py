@@ -48,7 +48,7 @@ _SAME = 1.0e-9
 """Angle difference [rad] below which two angles count as the same."""
 _COVERED = 1.01
 """Largest ratio of supply pressure to the highest pressure of a volume table [-]."""
-_BESIDE_ANOTHER = "; the other supply is above it, and both must be on the same side of the atmosphere"
+_BESIDE_ANOTHER = "; both supplies must be on the same side of the atmosphere"
 _UNUSED_VOLUME = 1.0e-6
 """Constant volume [m^3] of chamber 2 for an actuator with one chamber; no gas flows into it."""
 _NO_LEAK = Orifice(area=0.0, discharge_coefficient=1.0)
@@ -81,7 +81,7 @@ def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
     missing = missing_values(parameter_set, name)
     if missing:
         completed = parameter_set.completed_by
-        remedy = f"use '{completed}', which completes it" if completed else "add them to the file or as overrides"
+        remedy = f"use the completed set '{completed}'" if completed else "add them to the file or as overrides"
         raise ParameterError(f"{parameter_set.file}: the device lacks {', '.join(missing)}; {remedy}")
     read, kind, numbers = _reader(parameter_set), parameter_set.valve_kinds[name], parameter_set.numbers
     species = parameter_set.texts[declaration.SPECIES_PATH].value
@@ -133,7 +133,7 @@ def contradictions(parameter_set: ParameterSet, device: Device) -> Iterator[tupl
         name = device.valve_name
         yield (
             (f"valves.{name}",),
-            f"valve '{name}', a '{valve.kind}', joins two chambers: {declaration.WHY_ONE_CHAMBER}",
+            f"valve '{name}' (kind '{valve.kind}') connects two chambers, but {declaration.WHY_ONE_CHAMBER}",
         )
     is_beyond, line = beyond_pressures(device)
     if is_beyond:
@@ -150,8 +150,8 @@ def contradictions(parameter_set: ParameterSet, device: Device) -> Iterator[tupl
     if device.supply.is_vacuum and declaration.RELIEVING_PATH in parameter_set.flags and not device.supply.relieving:
         yield (
             (declaration.RELIEVING_PATH, *SUPPLIES),
-            f"{declaration.RELIEVING_PATH} = false: gas goes from the chambers into a supply below the atmosphere; set "
-            "it to true or leave it out",
+            f"{declaration.RELIEVING_PATH} = false: a supply below the atmosphere takes gas from the chambers; set "
+            f"{declaration.RELIEVING_PATH} to true or omit the key",
         )
     if actuator.kind != VANE and is_ordered and not problem:
         is_bad, line = growth_and_problem(device)[1]
@@ -165,7 +165,7 @@ def growth_and_problem(device: Device) -> tuple[Any, Problem]:
     growth = device.actuator.displacement_per_radian if device.actuator.kind == VANE else shape_and_growth(device)[1]
 
     def line(run: int) -> str:
-        return f"chamber 1 must grow with the angle, and grows by {at(growth, run):.4g} m^3/rad at supply pressure"
+        return f"chamber 1 must grow with the angle, but changes by {at(growth, run):.4g} m^3/rad at supply pressure"
 
     return growth, (np.logical_not(growth > 0.0), line)
 
@@ -215,7 +215,7 @@ def actuator_problem(actuator: Actuator) -> str:
         f"{math.degrees(low):.4g} to {math.degrees(high):.4g} deg"
         for low, high in ((table.first_angle, table.last_angle), (stops.angle_min, stops.angle_max))
     )
-    return f"its volume table covers {measured}, but the stops are at {wanted}; extend the table or move the stops"
+    return f"the volume table covers {measured}, but the stops are at {wanted}; extend the table or move the stops"
 
 
 def beyond_pressures(device: Device) -> Problem:
@@ -238,7 +238,7 @@ def beyond_pressures(device: Device) -> Problem:
         atmosphere = at(supply.atmospheric_pressure, run)
         with shown_in(counted_from(device.units, atmosphere)):
             covered, has = (shown_text(atmosphere + each, "Pa_a", ".4g") for each in (end, at(gauge, run)))
-        return f"its volume table covers pressures {way} to {covered}, but the supply has {has}"
+        return f"the volume table covers pressures {way} to {covered}, but the supply has {has}; extend the table"
 
     return is_beyond, line
 

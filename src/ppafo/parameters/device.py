@@ -244,6 +244,6 @@ class Device:
         """Raise ParameterError if the torque is not proportional to the pressure difference, as ``what`` needs."""
         if not self.has_torque_constant:
             raise ParameterError(
-                f"{what} needs a torque that is a constant times the difference of both pressures, as a vane has it; "
-                f"'{self.name}' has an actuator '{self.actuator.kind}', whose torque depends on the angle, too"
+                f"{what} needs a torque proportional to the pressure difference, as of a vane; the torque of the "
+                f"actuator '{self.actuator.kind}' of '{self.name}' also depends on the angle"
             )

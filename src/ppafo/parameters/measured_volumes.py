@@ -110,12 +110,12 @@ def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float]]
         raise ParameterError(f"{file}: is empty; its header is 'angle [deg],pressure [kPa_g],volume_1 [mL]'")
     for separator, name in ((";", "semicolons"), ("\t", "tabs")):
         if separator in lines[0][1] and "," not in lines[0][1]:
-            raise ParameterError(f"{file}: its columns are separated by {name}; commas are needed")
+            raise ParameterError(f"{file}: columns must be separated by commas, not {name}")
     (_, header), *below = ((number, [cell.strip().strip('"') for cell in line.split(",")]) for number, line in lines)
     units = _units(header, file)
     rows = [_numbers(cells, tuple(units), f"{file}, line {number}") for number, cells in below]
     if not rows:
-        raise ParameterError(f"{file}: has a header and no line of numbers")
+        raise ParameterError(f"{file}: has a header but no rows of numbers")
     columns: dict[str, Floats] = {}
     digits: dict[str, float] = {}
     for index, (name, unit) in enumerate(units.items()):
@@ -125,7 +125,7 @@ def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float]]
         worst = int(np.argmax(np.abs(column)))
         if abs(column[worst]) > declared.largest:
             raise ParameterError(
-                f"{file}, line {below[worst][0]}: {name} = {rows[worst][index]:g} {unit} is beyond "
+                f"{file}, line {below[worst][0]}: {name} = {rows[worst][index]:g} {unit} exceeds "
                 f"{declared.largest:g} {declared.unit.removesuffix('_a')}"
             )
         columns[name] = column
@@ -153,18 +153,18 @@ def _units(header: Sequence[str], file: str) -> dict[str, str]:
                 raise ParameterError(
                     f"{file}: column '{one_line(name)[:_LONGEST]}': the table holds volumes, not torques; "
                     "integrate dV/dangle = dT/dpressure (T/p of a rigid chamber) over the angle, from the volumes at "
-                    "the first angle: lines to paste are under 'From torques' of docs/how-to/extend.md"
+                    "the first angle; docs/how-to/extend.md has the code under 'From torques'"
                 )
             shown, hint = one_line(name)[:_LONGEST], nearest_name(name, COLUMNS)
             raise ParameterError(f"{file}: unknown column '{shown}'{hint}; allowed: {', '.join(COLUMNS)}")
         if name in units:
-            raise ParameterError(f"{file}: there are two columns '{name}'")
+            raise ParameterError(f"{file}: the column '{name}' occurs twice; rename or remove one of them")
         if not bracket:
             example = f"{name} [{COLUMNS[name].example}]"
             raise ParameterError(f"{file}: column '{name}' has no unit; write for example '{example}'")
         if name == "pressure" and not unit.endswith("_g"):
             shown = one_line(unit)[:_LONGEST]
-            raise ParameterError(f"{file}: column 'pressure' is in '{shown}'; give gauge, as in kPa_g")
+            raise ParameterError(f"{file}: column 'pressure' must be in a gauge unit such as kPa_g, not '{shown}'")
         with refused_as(ParameterError, f"{file}: column '{name}'", UnitError):
             to_si(1.0, unit, COLUMNS[name].unit, 0.0)
         units[name] = unit
@@ -198,14 +198,14 @@ def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:
     """
     angles, pressures = np.unique(angle), np.unique(pressure)
     if angles.size < 2:
-        raise ParameterError(f"{file}: has one angle only, at least 2 are needed")
+        raise ParameterError(f"{file}: has one angle only; at least 2 angles are needed")
     if pressures[0] <= -STANDARD_ATMOSPHERE:
         raise ParameterError(f"{file}: pressure = {pressures[0] / 1e3:.4g} kPa_g is below a perfect vacuum")
     if pressures.size > 1 and 0.0 not in pressures:
         nearest = pressures[int(np.argmin(np.abs(pressures)))]
         raise ParameterError(
-            f"{file}: the pressure nearest to the atmosphere is {nearest / 1e3:.4g} kPa_g; volumes at 0 kPa_g, vented, "
-            "are needed too"
+            f"{file}: has no volumes of the vented actuator; add lines at 0 kPa_g (nearest pressure: "
+            f"{nearest / 1e3:.4g} kPa_g)"
         )
     _check_spacing("angle", angles, MOST_ANGLES, _NEAREST_ANGLES * float(np.ptp(angles)), file)
     _check_spacing("pressure", pressures, MOST_PRESSURES, _NEAREST_PRESSURES, file)
@@ -221,7 +221,7 @@ def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:
 def _check_spacing(name: str, values: Floats, maximum: int, nearest: float, file: str) -> None:
     """Raise ParameterError for more than ``maximum`` values in a column, or two values closer than ``nearest`` [SI]."""
     if values.size > maximum:
-        raise ParameterError(f"{file}: has {values.size} values of {name}, at most {maximum} are taken: leave some out")
+        raise ParameterError(f"{file}: has {values.size} values of {name}; at most {maximum} are allowed")
     if values.size > 1 and float(np.diff(values).min()) < nearest:
         raise ParameterError(f"{file}: two values of {name} are almost equal; merge or round them")
 
@@ -237,14 +237,15 @@ def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, 
     if volume.min() < 0.0:
         row, column = np.unravel_index(int(np.argmin(volume)), volume.shape)
         point = _point_text(angles[row], pressures[column])
-        raise ParameterError(f"{file}: {name} = {volume.min() * 1e6:.6g} mL at {point} is negative")
+        raise ParameterError(f"{file}: {name} = {volume.min() * 1e6:.6g} mL at {point} is negative; correct the volume")
     falls = np.argwhere(np.diff(volume, axis=1) < -unseen)
     if falls.size:
         row, column = falls[0]
         fall = 1e6 * (volume[row, column] - volume[row, column + 1])
         raise ParameterError(
-            f"{file}: {name} falls with the pressure at {_point_text(angles[row], pressures[column + 1])}, by "
-            f"{fall:.3g} mL in steps of {1e6 * resolution:.3g} mL; round the volumes to what was measured"
+            f"{file}: {name} decreases with pressure at {_point_text(angles[row], pressures[column + 1])}, by "
+            f"{fall:.3g} mL, more than the last digit of {1e6 * resolution:.3g} mL; round the volumes to the "
+            "resolution of the measurement"
         )
     sign, direction = (1.0, "grow") if name == "volume_1" else (-1.0, "shrink")
     wrong = np.flatnonzero(sign * np.diff(volume[:, -1]) <= -unseen)
@@ -252,7 +253,7 @@ def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, 
         wrong = np.arange(1)
     if wrong.size:
         raise ParameterError(
-            f"{file}: {name} must {direction} with the angle at the highest pressure, and does not at "
+            f"{file}: {name} must {direction} with the angle at the highest pressure, but does not at "
             f"{math.degrees(angles[wrong[0] + 1]):.6g} deg"
         )
 

@@ -91,7 +91,7 @@ def override_set(
     for override in sorted(overrides):
         path = one_path((same or {}).get(override.typed, override.typed), valve)
         if path in by_path:
-            raise error(f"overrides '{by_path[path]}' and '{override}': the same value is given twice; omit one")
+            raise error(f"overrides '{by_path[path]}' and '{override}' set the same value; remove one of them")
         by_path[path] = override
     pair = in_two_forms(by_path, forms)
     if pair is not None:
@@ -144,7 +144,7 @@ def check_valve(
     for override in sorted(overrides) if valve else ():
         if valve and of_another_valve(override.typed, valve):
             raise error(
-                f"override '{override}' has no effect with {choice}, which selects another valve; omit one of them"
+                f"override '{override}' has no effect with {choice}, which selects another valve; remove one of them"
             )
 
 
@@ -231,7 +231,8 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
     declared = parameter_set.declarations()
     if path in OF_SECOND_CHAMBER and parameter_set.has_one_chamber:
         raise ParameterError(
-            f"override '{override}' is of chamber 2, but in {parameter_set.file} {WHY_ONE_CHAMBER}; remove the override"
+            f"override '{override}' concerns chamber 2, but in {parameter_set.file} {WHY_ONE_CHAMBER}; remove the "
+            "override"
         )
     if path not in declared:
         # So that the hint knows the values of effects that no set of this run has named.

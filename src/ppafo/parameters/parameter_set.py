@@ -228,7 +228,8 @@ def atmospheric_pressure(parameter_set: ParameterSet) -> float:
     if not entry.unit.endswith("_a"):
         unit = entry.unit
         raise ParameterError(
-            f"{parameter_set.file}: {ATMOSPHERE_PATH} = {entry.value:g} {unit}: give it as an absolute pressure"
+            f"{parameter_set.file}: {ATMOSPHERE_PATH} = {entry.value:g} {unit} must be an absolute pressure, such as "
+            "'101.3 kPa_a'"
         )
     return entry_in_si(entry, parameter_set.declarations()[ATMOSPHERE_PATH], STANDARD_ATMOSPHERE)
 

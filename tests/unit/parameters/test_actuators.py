@@ -84,33 +84,42 @@ def test_a_curve_is_a_cubic_where_the_volume_is_one(angles: int) -> None:
     ("lines", "said"),
     [
         ((), "is empty"),
-        ((HEADER,), "no line of numbers"),
+        ((HEADER,), "no rows of numbers"),
         (("angel [deg],pressure [kPa_g],volume_1 [mL]", "1,2,3"), "unknown column 'angel', did you mean 'angle'?"),
         (("angle [deg],pressure [kPa_g]", "1,2"), "column 'volume_1' is missing"),
         (("angle [deg]", "1"), "columns 'pressure' and 'volume_1' are missing"),
         (("angle,pressure [kPa_g],volume_1 [mL]", "1,2,3"), "column 'angle' has no unit"),
-        (("angle [deg],pressure [kPa],volume_1 [mL]", "1,2,3"), "give gauge, as in kPa_g"),
+        (
+            ("angle [deg],pressure [kPa],volume_1 [mL]", "1,2,3"),
+            "column 'pressure' must be in a gauge unit such as kPa_g",
+        ),
         (("angle [kg],pressure [kPa_g],volume_1 [mL]", "1,2,3"), "column 'angle'"),
-        (("angle [deg],angle [deg],volume_1 [mL]", "1,2,3"), "there are two columns 'angle'"),
+        (("angle [deg],angle [deg],volume_1 [mL]", "1,2,3"), "the column 'angle' occurs twice"),
         ((HEADER, "1,2"), "line 2: has 2 values, the header has 3"),
         ((HEADER, "1,2,nan"), "line 2: volume_1 = 'nan' is not a finite number"),
         ((HEADER, "1,2,\uff13"), "line 2: volume_1 = '\uff13' is not a finite number"),
-        ((HEADER, *GOOD, "100,90,1e9"), "line 8: volume_1 = 1e+09 mL is beyond"),
+        ((HEADER, *GOOD, "100,90,1e9"), "line 8: volume_1 = 1e+09 mL exceeds"),
         ((HEADER, *GOOD[:-1]), "there is no line for 100 deg and 50 kPa_g"),
         ((HEADER, *GOOD, GOOD[0]), "has more than one line for 20 deg and 0 kPa_g; keep one"),
-        ((HEADER, *(line.replace(",0,", ",10,") for line in GOOD)), "volumes at 0 kPa_g, vented, are needed too"),
-        ((HEADER.replace(",", ";"), *GOOD), "separated by semicolons; commas are needed"),
+        (
+            (HEADER, *(line.replace(",0,", ",10,") for line in GOOD)),
+            "has no volumes of the vented actuator; add lines at 0 kPa_g",
+        ),
+        ((HEADER.replace(",", ";"), *GOOD), "columns must be separated by commas, not semicolons"),
         ((HEADER, *GOOD[:2]), "has one angle only"),
-        ((HEADER, *(line.replace(",0,", ",-1,") for line in GOOD)), "volumes at 0 kPa_g, vented, are needed too"),
+        (
+            (HEADER, *(line.replace(",0,", ",-1,") for line in GOOD)),
+            "has no volumes of the vented actuator; add lines at 0 kPa_g",
+        ),
         ((HEADER, *(line.replace(",50,", ",-150,") for line in GOOD)), "pressure = -150 kPa_g is below a perfect vac"),
         (
             (HEADER, *GOOD[:-1], "100,50,140"),
-            "volume_1 falls with the pressure at 100 deg and 50 kPa_g, by 10 mL in steps of 1 mL; round",
+            "volume_1 decreases with pressure at 100 deg and 50 kPa_g, by 10 mL, more than the last digit of 1 mL",
         ),
         ((HEADER, "20,0,-5", *GOOD[1:]), "is negative"),
         ((HEADER, *GOOD[:3], "60,50,220", *GOOD[4:]), "must grow with the angle at the highest pressure"),
-        ((HEADER, "20,0,1", "21,0,9", "22,0,9.1", "60,0,9.2"), "the curve of volume_1 is negative near"),
-        ((HEADER, *(f"{angle},0,{100 + angle}" for angle in range(20, 34))), "at most 12 are taken"),
+        ((HEADER, "20,0,1", "21,0,9", "22,0,9.1", "60,0,9.2"), "the interpolated volume_1 is negative near"),
+        ((HEADER, *(f"{angle},0,{100 + angle}" for angle in range(20, 34))), "at most 12 are allowed"),
         ((HEADER, "20,0,100", "20.0001,0,101", "60,0,120"), "almost equal"),
     ],
 )
@@ -138,7 +147,7 @@ def test_a_table_is_fitted_within_its_last_digit_and_no_further(tmp_path: Path) 
     assert np.max(np.abs(fitted - measurements.volume_1)) == pytest.approx(moved)
     assert read_actuator_table(measured(tmp_path, HEADER, *ROUNDED)).last_angle == pytest.approx(math.radians(75.0))
     exact = [f"{line}01" for line in ROUNDED]
-    with pytest.raises(ParameterError, match="falls with the pressure near"):
+    with pytest.raises(ParameterError, match="decreases with pressure near"):
         read_actuator_table(measured(tmp_path, HEADER, *exact))
     unmoved, none = within_resolution(measurements.volume_1, shares, 0.0)
     assert none == 0.0
@@ -206,7 +215,10 @@ def test_columns_and_lines_may_stand_in_any_order(tmp_path: Path) -> None:
             ("20,0,100", "20,60,130", "110,0,150", "110,60,200"),
             "covers pressures up to 161.3 kPa_a, but the supply has 166.8",
         ),
-        (("20,0,1000", "20,500,1100", "110,0,500", "110,500,1600"), "chamber 1 must grow with the angle, and grows by"),
+        (
+            ("20,0,1000", "20,500,1100", "110,0,500", "110,500,1600"),
+            "chamber 1 must grow with the angle, but changes by",
+        ),
     ],
 )
 def test_a_table_must_hold_at_supply_pressure(tmp_path: Path, lines: tuple[str, ...], said: str) -> None:
@@ -222,9 +234,9 @@ def test_a_table_must_hold_at_supply_pressure(tmp_path: Path, lines: tuple[str, 
         (
             GOOD_TO_110,
             (60.0, 900.0),
-            "actuator: its volume table covers pressures up to 66 kPa_g, but the supply has 900",
+            "actuator: the volume table covers pressures up to 66 kPa_g, but the supply has 900",
         ),
-        (SHRINKING, (490.0, 65.0), "chamber 1 must grow with the angle, and grows by -"),
+        (SHRINKING, (490.0, 65.0), "chamber 1 must grow with the angle, but changes by -"),
     ],
 )
 def test_a_run_of_a_study_that_the_table_does_not_hold_for_is_refused_as_alone(
@@ -272,7 +284,10 @@ def test_numbers_that_do_not_fit_together_are_refused(name: str, override: str, 
 
 
 def test_a_scenario_asks_no_more_of_another_actuator_than_it_can() -> None:
-    with pytest.raises(ParameterError, match=r"needs a torque that is a constant .*'cylinder-lever' has an actuator"):
+    with pytest.raises(
+        ParameterError,
+        match=r"needs a torque proportional to the pressure difference, .*'cylinder' of 'cylinder-lever' also",
+    ):
         load_scenario(EXAMPLE / "torque-task-cylinder.toml", ("controller.kind=pid_fixed_point",))
 
 

@@ -53,7 +53,7 @@ def test_the_printed_set_says_what_is_missing_and_where_it_is_completed() -> Non
     message = str(caught.value)
     for path in ("actuator.dead_volume_1", "actuator.leak.discharge_coefficient", "supply.atmospheric_pressure"):
         assert path in message
-    assert "use 'ppafo2011'" in message
+    assert "use the completed set 'ppafo2011'" in message
 
 
 @pytest.mark.parametrize(
@@ -105,4 +105,4 @@ def test_the_atmosphere_of_the_set_is_the_zero_of_its_gauge_pressures() -> None:
 
 
 def test_an_atmosphere_given_as_gauge_is_refused() -> None:
-    assert "give it as an absolute pressure" in problem_of("supply.atmospheric_pressure=0 psi_g")
+    assert "must be an absolute pressure" in problem_of("supply.atmospheric_pressure=0 psi_g")

@@ -87,7 +87,7 @@ def test_chambers_that_are_joined_by_a_valve_are_two() -> None:
     name = next(name for name, kind in vane.valve_kinds.items() if kind == "solenoid_recycling")
     numbers = {path: entry for path, entry in vane.numbers.items() if path.startswith(f"valves.{name}.")}
     joined = replace(bladder, valve_kinds={name: "solenoid_recycling"}, numbers={**bladder.numbers, **numbers})
-    with pytest.raises(PpafoError, match="joins two chambers"):
+    with pytest.raises(PpafoError, match="connects two chambers"):
         build_device(joined, name)
 
 
@@ -115,4 +115,4 @@ def test_no_number_of_a_second_chamber_varies(bladder: Scenario) -> None:
 def test_the_audit_asks_for_no_second_chamber() -> None:
     findings = {finding.id: finding for finding in ppafo.audit(str(BLADDER)).found.findings}
     assert "missing-values" not in findings
-    assert "With its chamber at supply or at atmosphere" in findings["torque-ceiling"].paragraph
+    assert "With the chamber at supply or at atmosphere" in findings["torque-ceiling"].paragraph

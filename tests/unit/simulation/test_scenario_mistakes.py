@@ -258,7 +258,7 @@ def test_a_mistake_in_the_device_names_scenario_and_set() -> None:
     message = problem_after('"ppafo2011"', '"ppafo2012"', ParameterError)
     assert "there is no parameter set 'ppafo2012', did you mean 'ppafo2011'?" in message
     message = problem_after('"ppafo2011"', '"ppafo2011-printed"', ParameterError)
-    assert "use 'ppafo2011', which completes it" in message
+    assert "use the completed set 'ppafo2011'" in message
 
 
 def test_a_set_without_the_valve_of_the_scenario_names_the_option_that_takes_its_own() -> None:

@@ -29,13 +29,13 @@ def check_virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
         yield AuditFinding(
             id=_ID,
             severity="note",
-            title="torque constant and displacement per radian agree, with the stated efficiency",
+            title="torque constant and displacement per radian agree with the stated efficiency",
             values=evidence.values_of(_TORQUE_CONSTANT, _DISPLACEMENT_PER_RADIAN, _EFFICIENCY),
             sides=(ComparedNumber("torque constant over displacement per radian", ratio, ""),),
             paragraph=(
-                f"Energy closes: the shaft gets {100.0 * ratio:.3g} % of the work p dV of the gas, and the other "
-                f"{100.0 * (1.0 - ratio):.3g} % are the stated loss. The model takes the same ratio where the shaft "
-                "drives the vane and compresses gas, where a real loss has the other sign."
+                f"Energy is balanced: the shaft gets {100.0 * ratio:.3g} % of the work p dV of the gas, and the other "
+                f"{100.0 * (1.0 - ratio):.3g} % are the stated loss. The model uses the same ratio when the shaft "
+                "compresses the gas, although a real loss then has the opposite sign."
             ),
         )
     elif abs(numbers[1] / numbers[0] - 1.0) > _TOLERANCE:
@@ -44,7 +44,7 @@ def check_virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
         yield AuditFinding(
             id=_ID,
             severity="warning",
-            title="torque constant and displacement per radian differ, against virtual work",
+            title="torque constant and displacement per radian differ, which contradicts virtual work",
             values=evidence.values_of(_TORQUE_CONSTANT, _DISPLACEMENT_PER_RADIAN, _EFFICIENCY, *gas_paths),
             sides=(
                 ComparedNumber("torque constant", torque_constant, "m^3"),
@@ -52,14 +52,14 @@ def check_virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
                 *gas_sides,
             ),
             paragraph=(
-                "A vane that turns by dtheta does the work T dtheta = (P1 - P2) dV before friction, so that the torque "
+                "A vane that turns by dtheta does the work T dtheta = (P1 - P2) dV before friction, so the torque "
                 f"constant {1e6 * torque_constant:.4g} cm^3 and the displacement per radian "
-                f"{1e6 * displacement_per_radian:.4g} cm^3/rad should be one number; the displacement is "
-                f"{displacement_per_radian / torque_constant:.2g} times the torque constant. The model takes it as it "
-                f"is: the shaft gets {100.0 * torque_constant / displacement_per_radian:.3g} % of the work p dV of the "
-                f"gas, and nothing takes up the difference, for friction has numbers of its own.{gas_text} Leave "
-                f"{_DISPLACEMENT_PER_RADIAN} out, and it follows the torque constant; or measure the volume of gas "
-                "that a full turn displaces. Until then energy and gas are uncertain by the same factor."
+                f"{1e6 * displacement_per_radian:.4g} cm^3/rad should be equal; the displacement is "
+                f"{displacement_per_radian / torque_constant:.2g} times the torque constant. In the model "
+                f"the shaft gets {100.0 * torque_constant / displacement_per_radian:.3g} % of the work p dV of the "
+                f"gas; the rest is lost without a cause, since friction is modelled separately.{gas_text} Remove "
+                f"{_DISPLACEMENT_PER_RADIAN}, which then follows the torque constant, or measure the volume displaced "
+                "over the range. Until then, energy and gas use are uncertain by the same factor."
             ),
         )
 
@@ -129,9 +129,9 @@ def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_p
         ),
         paragraph=(
             f"At {end} the volume of chamber {chamber} is {1e6 * smallest:.3g} cm^3; it is not positive over the last "
-            f"{math.degrees(empty):.3g} of {math.degrees(turn):.3g} deg. Count the volume from the end of the range "
-            f"({stop_path} = {end}) with a dead volume for line and clearance, or give a dead volume of more than "
-            f"{-1e6 * slope * travel:.3g} cm^3."
+            f"{math.degrees(empty):.3g} deg of the range of {math.degrees(turn):.3g} deg. Count the volume from the "
+            f"end of the range ({stop_path} = {end}) with a dead volume for line and clearance, or give a dead volume "
+            f"of more than {-1e6 * slope * travel:.3g} cm^3."
         ),
     )
 
@@ -152,7 +152,7 @@ def check_rotation(evidence: Evidence) -> Iterator[AuditFinding]:
     yield AuditFinding(
         id="rotation",
         severity="warning",
-        title="the vane turns further than the actuator does",
+        title="the range of angles exceeds the rated rotation of the actuator",
         values=evidence.values_of(_RATED, angles[0], angles[2]),
         sides=(
             ComparedNumber("range of angles", turn, "rad"),
@@ -160,8 +160,8 @@ def check_rotation(evidence: Evidence) -> Iterator[AuditFinding]:
         ),
         paragraph=(
             f"The range of angles is {math.degrees(turn):.3g} deg, the rated rotation is {math.degrees(rated):.3g} "
-            "deg. Either another actuator or a gear was used, or the angle is not the vane's; volumes and torque "
-            "constant then belong to another shaft. The designation of the part on the bench would settle it."
+            "deg. Either another actuator or a gear was used, or the angle is not measured at the vane; volumes and "
+            "torque constant then belong to another shaft. Check the designation of the actuator in use."
         ),
     )
 
@@ -181,16 +181,17 @@ def check_stroke(evidence: Evidence) -> Iterator[AuditFinding]:
     yield AuditFinding(
         id="stroke",
         severity="note",
-        title=f"the cylinder runs {1e3 * (longest - shortest):.4g} mm between the stops",
+        title=f"the stroke of the cylinder between the stops is {1e3 * (longest - shortest):.4g} mm",
         values=evidence.values_of(*_LEVER, *_STOPS),
         sides=(
             ComparedNumber("distance of the pins at the lower stop", shortest, "m"),
             ComparedNumber("distance of the pins at the upper stop", longest, "m"),
         ),
         paragraph=(
-            f"Its pins are {1e3 * shortest:.4g} mm apart at the lower stop and {1e3 * longest:.4g} mm at the upper: "
-            "retracted it must be no longer than the first, and extended no shorter than the second. The lever arm is "
-            f"{1e3 * first_arm:.3g} mm at the lower stop and {1e3 * last_arm:.3g} mm at the upper one."
+            f"The pins of the cylinder are {1e3 * shortest:.4g} mm apart at the lower stop and {1e3 * longest:.4g} mm "
+            "at the upper stop: the retracted length must not exceed the first distance, and the extended length must "
+            f"reach the second. The lever arm is {1e3 * first_arm:.3g} mm at the lower stop and {1e3 * last_arm:.3g} "
+            "mm at the upper stop."
         ),
     )
 
@@ -220,7 +221,7 @@ def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
     yield AuditFinding(
         id="gas-of-one-filling",
         severity="note" if agrees else "warning",
-        title=f"the measured gas of one filling {'can be' if agrees else 'is not'} what chamber 1 holds",
+        title=f"the measured gas of one filling {'fits' if agrees else 'does not fit'} the volume of chamber 1",
         values=evidence.values_of(*_VOLUME, path, _SUPPLY),
         sides=(
             ComparedNumber("gas that fills chamber 1", filled, "kg"),
@@ -228,15 +229,15 @@ def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
             ComparedNumber("volume of chamber 1 in the middle of the range", volume, "m^3"),
         ),
         paragraph=(
-            f"In the middle of its range chamber 1 has {1e6 * volume:.3g} cm^3, dead volume included, and takes "
-            f"{evidence.in_set_unit(path, filled)} of gas from atmosphere to supply; measured is "
-            f"{evidence.in_set_unit(path, used)}, which also covers what leaks across the vane. The division "
-            f"into swept and dead volume does not affect this check."
+            f"In the middle of the range chamber 1 has {1e6 * volume:.3g} cm^3, dead volume included, and takes "
+            f"{evidence.in_set_unit(path, filled)} of gas from atmospheric to supply pressure; measured are "
+            f"{evidence.in_set_unit(path, used)}, which include leakage across the vane. The division "
+            "into swept and dead volume does not affect this check."
             + (
                 ""
                 if agrees
-                else f" Would be consistent with {1e6 * _LEAST * used / density:.3g} cm^3 or more, or with a longer "
-                "task."
+                else f" Consistent would be a volume of {1e6 * _LEAST * used / density:.3g} cm^3 or more, or a task "
+                "with several fillings."
             )
         ),
     )
@@ -262,8 +263,8 @@ def check_rounded_table(evidence: Evidence) -> Iterator[AuditFinding]:
             values=(),
             sides=(ComparedNumber("largest move", moved, "m^3"), ComparedNumber("last digit", digit, "m^3")),
             paragraph=(
-                f"Between the angles of {parameter_set.actuator_file} the curves through its numbers would be "
-                f"negative or fall with the pressure. They are shifted by {1e6 * moved:.2g} mL at most, "
+                f"Between the angles of {parameter_set.actuator_file} the interpolated volumes would be negative or "
+                f"decrease with pressure. The volumes are shifted by {1e6 * moved:.2g} mL at most, "
                 f"within the rounding step of {1e6 * digit:.2g} mL of the file. Give more digits to avoid this."
             ),
         )

@@ -43,7 +43,7 @@ def check_choked_flow(evidence: Evidence) -> Iterator[AuditFinding]:
         agrees = digits.low * (1.0 - _ROUNDING) <= value <= digits.high * (1.0 + _ROUNDING)
         quantity = evidence.declared[path]
         verdict = "agree to the reported digits" if agrees else f"differ by {100.0 * (reported / value - 1.0):+.2g} %"
-        remedy = "" if agrees else f" Would be consistent with {value:.5g}, or with other gas data."
+        remedy = "" if agrees else f" Use {value:.5g}, or other gas data."
         yield AuditFinding(
             id=path.rpartition(".")[2].replace("_", "-"),
             severity="note" if agrees else "error",
@@ -54,7 +54,7 @@ def check_choked_flow(evidence: Evidence) -> Iterator[AuditFinding]:
                 ComparedNumber("from the gas data", value, quantity.unit),
             ),
             paragraph=(
-                f"Reported is {evidence.in_set_unit(path, reported)}; the gas data give {value:.5g} "
+                f"The reported value is {evidence.in_set_unit(path, reported)}; the gas data give {value:.5g} "
                 f"{quantity.unit}".rstrip()
                 + f". The two {verdict}.{remedy}"
             ),
@@ -72,9 +72,9 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[AuditFinding]:
         return
     correct = choked_flow_constant(k, gas.specific_gas_constant, gas.temperature)
     values = evidence.values_of(_EXPONENT, _C1, *GAS_PATHS)
-    title = "the reported exponent inside C1 is not the exponent of choked flow"
+    title = "the reported exponent in C1 is not the exponent of choked flow"
     if exponent is None:
-        text = f"The formula '{formula}' cannot be read as arithmetic in k; the right exponent is (k + 1)/(k - 1)."
+        text = f"The formula '{formula}' is not an arithmetic expression in k; the correct exponent is (k + 1)/(k - 1)."
         yield AuditFinding("choked-flow-exponent", "warning", title, values, (), text)
         return
     # C1 contains the square root of the power, hence half the difference of the exponents.
@@ -82,7 +82,7 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[AuditFinding]:
     reported, agreement = evidence.number(_C1), ""
     if reported is not None:
         nearer = "second" if abs(reported - correct) < abs(reported - literal) else "first"
-        agreement = f", and the reported C1 of {reported:.4g} s/m is the {nearer} of the two"
+        agreement = f", and the reported C1 of {reported:.4g} s/m is closer to the {nearer} value"
     yield AuditFinding(
         id="choked-flow-exponent",
         severity="error",
@@ -95,7 +95,7 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[AuditFinding]:
         paragraph=(
             f"The reported exponent {formula} is {exponent:.4g} and gives C1 = {literal:.4g} s/m; the exponent "
             f"(k + 1)/(k - 1) = {expected:.4g} gives {correct:.4g} s/m{agreement}. "
-            f"Would be consistent with the exponent (k + 1)/(k - 1)."
+            "Use the exponent (k + 1)/(k - 1)."
         ),
     )
 

@@ -44,13 +44,13 @@ def check_flow(evidence: Evidence) -> Iterator[AuditFinding]:
                     ComparedNumber("Cd A that gives the reported flow", consistent, "m^2"),
                 ),
                 paragraph=(
-                    f"Fully open at {pressure} the valve '{flow.name}' passes "
-                    f"{evidence.in_set_unit(flow_path, flow.predicted)} by Cd A = {flow.coefficient:.4g} x "
-                    f"{evidence.in_set_unit(area_path, flow.area)}, reported is {reported}: a factor "
-                    f"{flow.predicted / flow.measured:.3g}. Would be consistent with Cd A = "
-                    f"{1e6 * consistent:.4g} mm^2, that is Cd = {consistent / flow.area:.3g} with the reported "
+                    f"Fully open at {pressure}, valve '{flow.name}' passes "
+                    f"{evidence.in_set_unit(flow_path, flow.predicted)} with Cd A = {flow.coefficient:.4g} x "
+                    f"{evidence.in_set_unit(area_path, flow.area)}, but the reported flow is {reported}: a factor of "
+                    f"{flow.predicted / flow.measured:.3g}. Consistent would be Cd A = "
+                    f"{1e6 * consistent:.4g} mm^2, which is Cd = {consistent / flow.area:.3g} with the reported "
                     f"area, or {evidence.in_set_unit(area_path, consistent / flow.coefficient)} with the reported "
-                    f"Cd; or with {evidence.in_set_unit(flow_path, flow.predicted)} as the flow."
+                    f"Cd; or a flow of {evidence.in_set_unit(flow_path, flow.predicted)}."
                 ),
             )
     yield from _check_shared_coefficient(evidence, flows)
@@ -94,18 +94,18 @@ def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> It
         yield AuditFinding(
             id=f"one-coefficient-{first.name}-{other.name}",
             severity="error",
-            title=f"one Cd cannot give the reported flows of '{first.name}' and '{other.name}'",
+            title=f"the reported flows of '{first.name}' and '{other.name}' contradict their common Cd",
             values=evidence.values_of(*_paths(first.name)[:3], *_paths(other.name)[:3]),
             sides=(
                 ComparedNumber("ratio of the areas", area_ratio, ""),
                 ComparedNumber("ratio of the reported flows", flow_ratio, ""),
             ),
             paragraph=(
-                f"With one discharge coefficient {first.coefficient:.4g} flow goes as area: '{first.name}' must pass "
-                f"{area_ratio:.3g} times what '{other.name}' passes, the reported flows are as {flow_ratio:.3g} to 1. "
-                "Would be consistent with a coefficient of its own for each: "
+                f"With the common discharge coefficient {first.coefficient:.4g}, flow is proportional to area: "
+                f"'{first.name}' must pass {area_ratio:.3g} times the flow of '{other.name}', but the reported flows "
+                f"have a ratio of {flow_ratio:.3g}. Consistent would be discharge coefficients of "
                 f"{first.measured / first.per_area / first.area:.3g} "
-                f"and {other.measured / other.per_area / other.area:.3g}; or with two flows, measured one by one."
+                f"and {other.measured / other.per_area / other.area:.3g}, or other flows, measured separately."
             ),
         )
 
@@ -140,9 +140,9 @@ def check_sonic_flow(evidence: Evidence) -> Iterator[AuditFinding]:
                 ComparedNumber("sonic conductance that gives the reported flow", consistent, "m^3/(s Pa)"),
             ),
             paragraph=(
-                f"Fully open the valve '{name}' passes {evidence.in_set_unit(flow, predicted)} by its sonic "
-                f"conductance, reported is {evidence.in_set_unit(flow, measured)}: a factor "
-                f"{predicted / measured:.3g}. Would be consistent with a sonic conductance of "
-                f"{evidence.in_set_unit(size, consistent)}, or with the other flow."
+                f"Fully open, valve '{name}' passes {evidence.in_set_unit(flow, predicted)} with its sonic "
+                f"conductance, but the reported flow is {evidence.in_set_unit(flow, measured)}: a factor of "
+                f"{predicted / measured:.3g}. Consistent would be a sonic conductance of "
+                f"{evidence.in_set_unit(size, consistent)}, or a flow of {evidence.in_set_unit(flow, predicted)}."
             ),
         )

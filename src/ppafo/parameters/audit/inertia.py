@@ -46,10 +46,10 @@ def check_inertia(evidence: Evidence) -> Iterator[AuditFinding]:
             ),
             paragraph=(
                 f"Inertia {evidence.in_set_unit(_INERTIA, stated)} times {abs(float(ratio.value)):g} {ratio.unit} is "
-                f"{evidence.in_set_unit(product, expected)}, reported is {evidence.in_set_unit(product, number)}: "
-                f"a factor {number / expected:.3g}. Would be consistent with an inertia of "
-                f"{evidence.in_set_unit(_INERTIA, needed)}, or with {evidence.in_set_unit(product, expected)} as the "
-                f"{name}."
+                f"{evidence.in_set_unit(product, expected)}, but the reported {name} is "
+                f"{evidence.in_set_unit(product, number)}: a factor of {number / expected:.3g}. Consistent would be an "
+                f"inertia of {evidence.in_set_unit(_INERTIA, needed)}, or a {name} of "
+                f"{evidence.in_set_unit(product, expected)}."
             ),
         )
     # Only if both products disagree with the reported inertia.
@@ -87,8 +87,8 @@ def _one_inertia(
     reconciling = shifted[0] if shifted else _middle(common)
     reconciling_text = evidence.in_set_unit(_INERTIA, reconciling)
     slip = (
-        f" {reconciling_text} is the reported {evidence.in_set_unit(_INERTIA, reported)} with the decimal point moved: "
-        "either the inertia or both products are wrong, and only a measurement of the inertia can decide."
+        f" {reconciling_text} is the reported {evidence.in_set_unit(_INERTIA, reported)} with a shifted decimal point: "
+        "either the inertia or both products are wrong; measure the inertia to decide."
         if shifted
         else ""
     )
@@ -104,7 +104,7 @@ def _one_inertia(
             ComparedNumber("highest that agrees", common.high, "kg m^2"),
         ),
         paragraph=(
-            f"Within the reported digits both products hold for any inertia from "
+            f"Within the reported digits, both products agree with any inertia from "
             f"{evidence.in_set_unit(_INERTIA, common.low)} to {evidence.in_set_unit(_INERTIA, common.high)}.{slip}"
         ),
     )

@@ -65,14 +65,14 @@ def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[AuditFin
     if area is not None and min(area) > 0.0:
         conductance = orifice_conductance(Orifice(*area), gas)
         flow = conductance * upstream * isentropic_flow_function(ratio, gas.heat_capacity_ratio)
-        form, origin = AREA_FORM, "by its Cd A"
+        form, origin = AREA_FORM, "according to Cd A"
     elif sonic is not None and min(sonic) > 0.0 and sonic[1] < 1.0:
         conductance = orifice_conductance(SonicOrifice(*sonic), gas)
         flow = conductance * upstream * iso6358_flow_function(ratio, sonic[1])
         form = SONIC_FORM
         origin = (
-            f"of {gas.species} by its sonic conductance, which counts for air as in ISO 6358 and is converted: "
-            "another gas passes sqrt(R_air / R) times as much mass at the same temperature"
+            f"of {gas.species} according to the sonic conductance, which counts for air as in ISO 6358 and is "
+            "converted: the mass flow of another gas is sqrt(R_air / R) times the flow of air at the same temperature"
         )
     else:
         return
@@ -90,8 +90,8 @@ def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[AuditFin
             ComparedNumber("conductance", conductance, "kg/(s Pa)"),
         ),
         paragraph=(
-            f"Fully open from {pressures} it passes {_GRAMS * flow:#.3g} g/s {origin}. Compare this with the data "
-            "sheet."
+            f"Fully open from {pressures}, valve '{name}' passes {_GRAMS * flow:#.3g} g/s {origin}. Compare this flow "
+            "with the data sheet."
         ),
     )
 
@@ -112,8 +112,8 @@ def check_bores(evidence: Evidence) -> Iterator[AuditFinding]:
                 values=evidence.values_of(path, f"valves.{valve}.discharge_coefficient"),
                 sides=(ComparedNumber("area", area, "m^2"), ComparedNumber(f"bore of {name}", bore, "m^2")),
                 paragraph=(
-                    f"A bore of {name} has {1e6 * bore:.4g} mm^2, the valve {1e6 * area:.4g} mm^2. An orifice within a "
-                    "valve is smaller than its ports: the discharge coefficient stands for everything between them, "
-                    "and only its product with the area has a meaning."
+                    f"A bore of {name} has {1e6 * bore:.4g} mm^2, the valve {1e6 * area:.4g} mm^2. The orifice in a "
+                    "valve is smaller than the ports: the discharge coefficient then includes all losses between the "
+                    "ports, and only the product of coefficient and area is meaningful."
                 ),
             )

@@ -29,7 +29,7 @@ _INTERVALS = 200
 """Number of pressure intervals in the integration of a filling time."""
 _ANGLES = 40
 """Number of angle intervals between the stops for an actuator's torque."""
-_LIMIT = "A reference above that cannot be followed by any valve or controller."
+_LIMIT = "No valve or controller can follow a reference above this torque."
 
 
 def check_torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
@@ -69,7 +69,7 @@ def check_vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
             continue
         depth, chamber = evidence.atmosphere() - pressure, 1 if path == _SUPPLIES[0] else 2
         effect = "lowers" if chamber == 1 else "raises"
-        doubt = f" If {entry.value:g} {entry.unit} was read from a gauge, write '_g' for '_a'."
+        doubt = f" If {entry.value:g} {entry.unit} was read from a gauge, write '_g' instead of '_a'."
         yield AuditFinding(
             id=f"vacuum-{chamber}",
             severity="warning" if entry.unit.endswith("_a") else "note",
@@ -77,8 +77,8 @@ def check_vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
             values=evidence.values_of(path, ATMOSPHERE_PATH),
             sides=(ComparedNumber("depth of the vacuum", depth, "Pa"),),
             paragraph=(
-                f"A valve that joins chamber {chamber} to it draws its gas out, and the room fills it again: that "
-                f"{effect} the torque.{doubt if entry.unit.endswith('_a') else ''}"
+                f"A valve that connects chamber {chamber} to this supply evacuates the chamber, and ambient air "
+                f"refills the chamber: evacuation {effect} the torque.{doubt if entry.unit.endswith('_a') else ''}"
             ),
         )
 
@@ -91,7 +91,7 @@ def _ceiling_by_angle(evidence: Evidence) -> Iterator[AuditFinding]:
         device = build_device(evidence.parameter_set)
     except ParameterError:
         return
-    chambers = "its chamber at supply or" if device.actuator.has_one_chamber else "one chamber at supply and the other"
+    chambers = "the chamber at supply or" if device.actuator.has_one_chamber else "one chamber at supply and the other"
     lowest, highest = float(device.actuator.angle_min), float(device.actuator.angle_max)
     angles = [lowest + (highest - lowest) * number / _ANGLES for number in range(_ANGLES + 1)]
     downward, upward = zip(*(torque_reach(device, angle) for angle in angles), strict=True)
@@ -100,8 +100,8 @@ def _ceiling_by_angle(evidence: Evidence) -> Iterator[AuditFinding]:
         largest = max(torques)
         angle = math.degrees(angles[torques.index(largest)])
         texts.append(
-            f"{evidence.torque(largest, '#.3g')} {direction} at {angle:.3g} deg, and "
-            f"{evidence.torque(min(torques), '#.3g')} at least"
+            f"{evidence.torque(largest, '#.3g')} {direction} at {angle:.3g} deg (over the range at least "
+            f"{evidence.torque(min(torques), '#.3g')})"
         )
         sides.append(ComparedNumber(f"most {direction}", largest, "N m"))
         ceiling = max(ceiling, largest)
@@ -115,7 +115,7 @@ def _ceiling_by_angle(evidence: Evidence) -> Iterator[AuditFinding]:
         sides=tuple(sides),
         paragraph=(
             f"With {chambers} at atmosphere the actuator gives {' and '.join(texts)}, before friction. "
-            f"{'Static friction is more: the joint cannot move.' if sticks else _LIMIT}"
+            f"{'Static friction is larger: the joint cannot move.' if sticks else _LIMIT}"
         ),
     )
 
@@ -127,12 +127,12 @@ def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Sever
         unit = shown_unit("Pa_d")
     if static is not None and static >= ceiling:
         needed = f"{from_si(static / constant, unit, 'Pa_d'):.4g} {unit}"
-        return "error", f" Static friction of {evidence.torque(static)} is more: the vane cannot move below {needed}."
+        return "error", f" Static friction of {evidence.torque(static)} is larger: the vane cannot move below {needed}."
     if demand is not None and demand > ceiling:
         needed = f"{from_si(demand / constant, unit, 'Pa_d'):.4g} {unit.removesuffix('_d')}_g"
         return "warning", (
-            f" The requested {evidence.torque(demand)} lie above it, so that every valve and controller keeps an "
-            f"error of {evidence.torque(demand - ceiling)}; it would take {needed} of supply, or a smaller request."
+            f" The required {evidence.torque(demand)} exceed this ceiling, so every valve and controller leaves an "
+            f"error of {evidence.torque(demand - ceiling)}; raise the supply to {needed}, or require less torque."
         )
     return "note", f" {_LIMIT}"
 
@@ -161,9 +161,9 @@ def check_published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
                 ComparedNumber("published", torque, "N m"),
             ),
             paragraph=(
-                f"At {evidence.in_set_unit(paths[1], pressure)} the vane gives {evidence.torque(at_rest)}, published "
-                f"are {evidence.torque(torque)}. This checks the torque constant "
-                f"alone, as the volume has no influence at rest. {note}"
+                f"At {evidence.in_set_unit(paths[1], pressure)} the vane gives {evidence.torque(at_rest)}; the "
+                f"published torque is {evidence.torque(torque)}. This checks only the torque constant, since the "
+                f"volume has no influence at rest. {note}"
             ).rstrip(),
         )
         if name == "walking":
@@ -191,10 +191,10 @@ def _while_walking(evidence: Evidence, torque: float, pressure: float) -> Iterat
             ),
             sides=(ComparedNumber("time to fill", time, "s"), ComparedNumber("time of push-off", _PUSH_OFF, "s")),
             paragraph=(
-                f"At toe-off chamber 1 has {1e6 * volume:.3g} cm^3. Through the open valve '{valve}' "
-                f"{100.0 * _REACHED:.0f} % of the {evidence.torque(torque)} that were published of walking take "
-                f"{1e3 * time:.0f} ms; push-off lasts about {1e3 * _PUSH_OFF:.0f} ms. The valves of that publication "
-                "may have been others."
+                f"At toe-off chamber 1 has {1e6 * volume:.3g} cm^3. Through the open valve '{valve}', "
+                f"{100.0 * _REACHED:.0f} % of the published walking torque of {evidence.torque(torque)} is reached in "
+                f"{1e3 * time:.0f} ms; push-off lasts about {1e3 * _PUSH_OFF:.0f} ms. The published walks may have "
+                "used other valves."
             ),
         )
 

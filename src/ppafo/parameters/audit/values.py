@@ -33,12 +33,12 @@ def check_statements(evidence: Evidence) -> Iterator[AuditFinding]:
         yield AuditFinding(
             id=f"{path.replace('.', '-').replace('_', '-')}-against-statement",
             severity="error",
-            title=f"{path} is not what '{entry.key}' states",
+            title=f"{path} differs from the statement '{entry.key}'",
             values=evidence.values_of(path),
             sides=(),
             paragraph=(
-                f"{path} is {number_text(entry)} and names '{entry.key}', which has {stated_number}. Give that "
-                "number, or the key of the statement that is meant (ppafo reproduce --list)."
+                f"{path} is {number_text(entry)} and refers to '{entry.key}', which has {stated_number}. Give that "
+                "number, or the key of another statement ('ppafo reproduce --list')."
             ),
         )
 
@@ -77,12 +77,12 @@ def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
         yield AuditFinding(
             id="missing-values",
             severity="warning",
-            title=f"no device yet: {count_of(len(paths), 'value')} {are} missing",
+            title=f"incomplete device: {count_of(len(paths), 'value')} {are} missing",
             values=(),
             sides=(),
             paragraph=(
-                f"A device needs more: {', '.join(paths)}. Add {them} to the file or as overrides. "
-                "What rests on missing values is not audited."
+                f"Missing for a device: {', '.join(paths)}. Add {them} to the file or as overrides. "
+                "Checks that need missing values were skipped."
             ),
         )
 
@@ -102,10 +102,10 @@ def check_contradictions(evidence: Evidence) -> Iterator[AuditFinding]:
         yield AuditFinding(
             id=paths[0].replace(".", "-").replace("_", "-"),
             severity="error",
-            title="values that contradict each other, so that no run can be made",
+            title="contradictory values prevent a run",
             values=evidence.values_of(*paths),
             sides=(),
-            paragraph=f"A run refuses the device: {line}.",
+            paragraph=f"No run is possible: {line}.",
         )
 
 
@@ -141,27 +141,27 @@ def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
                 ComparedNumber("taken literally", 1.0 / value, quantity.unit),
             ),
             paragraph=(
-                f"{path} = {number_text(entry)} is meant as: {quantity.summary}. That has the unit {quantity.unit}; "
-                f"the reported unit {entry.unit} belongs to the reciprocal. Invert the ratio and keep the number: "
-                f"taken literally it would be {1.0 / value:.3g} {quantity.unit}."
+                f"{path} = {number_text(entry)} is declared as: {quantity.summary} [{quantity.unit}]. The reported "
+                f"unit {entry.unit} belongs to the reciprocal. Invert the ratio and keep the number: "
+                f"taken literally, the value would be {1.0 / value:.3g} {quantity.unit}."
             ),
         )
     if foreign:
         numbers, declared = evidence.parameter_set.numbers, evidence.declared
         described = "; ".join(
-            f"{path} = {number_text(numbers[path])}, where {declared[path].unit or 'a plain number'} is needed "
+            f"{path} = {number_text(numbers[path])} must have the unit {declared[path].unit or '-'} "
             f"({declared[path].summary})"
             for path in foreign
         )
         yield AuditFinding(
             id="dimensions",
             severity="error",
-            title="values whose unit does not fit their equation",
+            title="values with a unit that does not fit the equation",
             values=evidence.values_of(*foreign),
             sides=tuple(ComparedNumber(path, evidence.number(path) or 0.0, "as given, base units") for path in foreign),
             paragraph=(
-                f"{described}. Give the same number in the unit that is needed, if only the unit was "
-                f"misreported; the other checks use the number as it stands."
+                f"{described}. If only the unit was misreported, give the same number in the required unit; "
+                "the other checks use the number unchanged."
             ),
         )
 
@@ -213,7 +213,7 @@ def check_gas_data(evidence: Evidence) -> Iterator[AuditFinding]:
             title=f"no data for the gas '{name}'",
             values=evidence.values_of("gas.species"),
             sides=(),
-            paragraph=f"The gas '{name}' is not one of {', '.join(SPECIES)}; name one of these.",
+            paragraph=f"The gas '{name}' is unknown; available: {', '.join(SPECIES)}.",
         )
         return
     tabulated = {"gas.molar_mass": species.molar_mass, "gas.heat_capacity_ratio": species.heat_capacity_ratio}
@@ -230,7 +230,7 @@ def check_gas_data(evidence: Evidence) -> Iterator[AuditFinding]:
                 paragraph=(
                     f"{path} is {evidence.in_set_unit(path, value)}, but {evidence.text('gas.species')} has "
                     f"{evidence.in_set_unit(path, expected)} ({species.source}). "
-                    "Give that value, or name the gas in use."
+                    "Give this value, or name the gas that is used."
                 ),
             )
 
@@ -269,7 +269,7 @@ def check_ideal_gas(evidence: Evidence) -> Iterator[AuditFinding]:
         paragraph=(
             f"With the second virial coefficient {1e6 * virial:.3g} cm^3/mol the real-gas factor at "
             f"{evidence.in_set_unit(_SUPPLY, pressure)} is {compressibility:.4f}: the ideal gas law {counts} the mass "
-            f"in a full chamber by {100.0 * abs(error):.2g} %. A real-gas factor in equation (3) corrects it, where "
-            "gas use matters to that precision."
+            f"in a full chamber by {100.0 * abs(error):.2g} %. Use a real-gas factor in equation (3) if "
+            "gas use is needed more precisely."
         ),
     )

@@ -168,7 +168,11 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     changes = override_set(read_overrides(overrides), forms=FILLS)
     for path, override in changes.items():
         if path not in PATHS:
-            of_file = "; its name or file determines the gas" if "gas" in path.split(".") else nearest_name(path, PATHS)
+            of_file = (
+                "; choose the gas by the name or file of the bottle"
+                if "gas" in path.split(".")
+                else nearest_name(path, PATHS)
+            )
             raise ParameterError(f"override '{override}': a bottle has no value '{path}'{of_file}")
         with refused_as(ParameterError, f"override '{override}'", UnitError):
             value, unit = split_quantity(override.text)
@@ -237,7 +241,7 @@ def _check_content(bottle: Bottle, file: str) -> None:
     if bottle.mass >= largest_mass:
         volume = bottle.entries["bottle.volume"]
         fill = "bottle.gas_mass" if "bottle.gas_mass" in bottle.entries else "bottle.fill_pressure"
-        limit = "liquid would fill it at" if is_wet else "the property table ends at"
+        limit = "liquid fills the bottle at" if is_wet else "the property table ends at"
         raise ParameterError(
             f"{file}: {GRAMS_PER_KILOGRAM * bottle.mass:.4g} g of {fluid.name} do not fit into "
             f"{format_quantity(volume.value, volume.unit)} at {temperature:g} K: {limit} "
@@ -249,7 +253,7 @@ def _check_content(bottle: Bottle, file: str) -> None:
         unit = bottle.entries["regulator.set_pressure"].unit
         raise ParameterError(
             f"{file}: the full bottle has {shown_text(content.pressure, 'Pa_a', '.4g', unit=unit)} at "
-            f"{temperature:g} K, but its regulator needs {shown_text(required, 'Pa_a', '.4g', unit=unit)}, the sum of "
+            f"{temperature:g} K, but the regulator needs {shown_text(required, 'Pa_a', '.4g', unit=unit)}, the sum of "
             "regulator.set_pressure and regulator.pressure_margin; lower one of them"
         )
 

@@ -43,7 +43,7 @@ def load_fluid(name: str) -> Fluid:
     available = list_fluids()
     if name not in available:
         raise ParameterError(
-            f"there is no property table of '{name}'{nearest_name(name, available)}; available: {', '.join(available)}"
+            f"there is no property table for '{name}'{nearest_name(name, available)}; available: {', '.join(available)}"
         )
     content = json.loads((_TABLES / f"{name}{_SUFFIX}").read_text(encoding="utf-8"))
     table = FluidTable(
@@ -64,8 +64,8 @@ def check_temperature(path: str, temperature: float, fluid: Fluid, file: str) ->
     coldest, hottest = fluid.table.temperatures[0], fluid.table.temperatures[-1]
     if not coldest < temperature <= hottest:
         raise ParameterError(
-            f"{file}: {path} = {temperature:g} K: the properties of {fluid.name} are known above {coldest:g} K "
-            f"and up to {hottest:g} K"
+            f"{file}: {path} = {temperature:g} K: must be above {coldest:g} K and at most {hottest:g} K, the range "
+            f"of the properties of {fluid.name}"
         )
 
 
@@ -96,7 +96,7 @@ def filled_mass(values: Mapping[str, float], entries: Mapping[str, Entry], fluid
         return values["bottle.gas_mass"]
     missing = [path for path in by_pressure if path not in values]
     if missing:
-        raise ParameterError(f"{file}: {said_missing(missing)} beside {given[0]}")
+        raise ParameterError(f"{file}: {said_missing(missing)}, which {given[0]} requires")
     pressure, temperature = (values[path] for path in by_pressure)
     check_temperature("bottle.fill_temperature", temperature, fluid, file)
     # Above the saturated vapour the rest is liquid: pressure and temperature then leave the mass open.
@@ -105,8 +105,8 @@ def filled_mass(values: Mapping[str, float], entries: Mapping[str, Entry], fluid
         path = "bottle.fill_pressure"
         limit = f"{shown_text(highest, 'Pa_a', '.4g', unit=entries[path].unit)} at {temperature:g} K"
         raise ParameterError(
-            f"{file}: {path}: {fluid.name} is gas up to {limit}; give bottle.gas_mass instead"
+            f"{file}: {path}: {fluid.name} is liquid above {limit}; give bottle.gas_mass instead"
             if has_liquid(fluid.table)
-            else f"{file}: {path}: the table of {fluid.name} ends at {limit}"
+            else f"{file}: {path}: the property table of {fluid.name} ends at {limit}; give a lower pressure"
         )
     return values["bottle.volume"] * gas_density(fluid.table, temperature, pressure)

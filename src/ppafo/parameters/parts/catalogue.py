@@ -280,14 +280,16 @@ def _part(file: str, group: str, name: str, parsed: Any) -> Part:
     if group == "valves" and sorted(map(len, forms_given)) != [0, 2]:
         raise ParameterError(
             f"{where}: needs either area and discharge_coefficient or sonic_conductance and critical_ratio, "
-            f"it has {', '.join(forms_given[0] + forms_given[1]) or 'none of them'}"
+            f"but has {', '.join(forms_given[0] + forms_given[1]) or 'none of them'}"
         )
     values = {}
     for key, figure in figures.items():
         shown = f"{where}.{key} = {figure.value:g} {figure.unit}"
         # A guess without its reason cannot be checked by the next reader.
         if figure.origin in _NEEDS_A_REASON and not figure.note.strip():
-            raise ParameterError(f"{where}.{key}.note is missing; a figure that is {figure.origin} needs a reason")
+            raise ParameterError(
+                f"{where}.{key}.note is missing; give the reason for a figure with origin '{figure.origin}'"
+            )
         # Data sheets give gauge pressures at sea level.
         values[key] = allowed_number(shown, figure, declared[key])
     if "torque_constant" in values:

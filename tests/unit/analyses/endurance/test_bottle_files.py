@@ -54,10 +54,13 @@ def test_a_value_is_replaced_and_a_pressure_replaces_a_mass() -> None:
         ("bottle.volume=1 kg", "does not fit"),
         ("bottle.volume", "PATH=VALUE"),
         ("bottle.volume=0 L", "must be at least"),
-        ("bottle.volume=300 cm^3", "255 g of CO2 do not fit into 300 cm^3 at 298 K: liquid would fill it at 213.8 g"),
+        (
+            "bottle.volume=300 cm^3",
+            "255 g of CO2 do not fit into 300 cm^3 at 298 K: liquid fills the bottle at 213.8 g",
+        ),
         ("bottle.volume=0.3 L", "g; set bottle.gas_mass or room.temperature lower, or bottle.volume higher"),
-        ("room.temperature=40 degC", "known above 216.592 K and up to 303.9 K"),
-        ("regulator.set_pressure=70 bar_g", "its regulator needs 7"),
+        ("room.temperature=40 degC", "must be above 216.592 K and at most 303.9 K"),
+        ("regulator.set_pressure=70 bar_g", "the regulator needs 7"),
         ("regulator.set_pressure=50 psi", "needs the kind of pressure"),
     ],
 )
@@ -71,7 +74,7 @@ def test_overrides_that_cannot_be_are_refused_in_one_line(override: str, words: 
     ("old", "new", "words"),
     [
         ("[bottle.volume]", "[bottle.volumen]", "unknown key 'bottle.volumen', did you mean 'volume'"),
-        ('value = "CO2"', 'value = "C02"', "no property table of 'C02', did you mean 'CO2'"),
+        ('value = "CO2"', 'value = "C02"', "no property table for 'C02', did you mean 'CO2'"),
         ('unit = "J/K"', 'unit = "J"', "bottle.wall_heat_capacity = 400 J"),
         ("schema_version = 1", "schema_version = 2", "schema_version"),
         (

@@ -102,7 +102,7 @@ def test_a_part_that_is_not_there_is_answered_with_the_nearest() -> None:
             "content = 99 mm: unit 'mm' does not fit",
         ),
         ("value = 99.0", "value = -1.0", "content = -1 g: must be more than 0 g and at most 100000 g"),
-        ('note = "scaled"', "", "empty_mass.note is missing; a figure that is assumed needs a reason"),
+        ('note = "scaled"', "", "empty_mass.note is missing; give the reason for a figure with origin 'assumed'"),
         ("unknown = []", 'unknown = ["contents"]', "there is no figure 'contents', did you mean 'content'?"),
         ("unknown = []", 'unknown = ["content"]', "'content' has a value in this part"),
         ('origin = "datasheet"', 'origin = "datashet"', "'datashet' is not allowed, did you mean 'datasheet'?"),
