@@ -118,7 +118,7 @@ def delay_remarks(walk: MeanStride) -> list[str]:
         delay, which = float(np.mean([late[name] for name in names])), " and ".join(names)
         timing = "late" if delay > 0.0 else "early"
         remarks.append(
-            f"{which}: about {1000.0 * abs(delay):.0f} ms {timing} relative to {other}, judged by healthy walking; "
+            f"{which}: about {1000.0 * abs(delay):.0f} ms {timing} relative to {other}, compared with healthy walking; "
             f"check clocks and filters, or add {-delay:+.3f} s to the times of {which}"
         )
     return remarks

@@ -94,7 +94,7 @@ def test_several_plates_of_one_foot_are_summed_and_named(tmp_path: Path) -> None
     assert_true(found.gait)
     assert len(found.curves["vertical_force"].strides) == 2
     assert (
-        "vertical force: sum of the contacts of this foot, judged by the lean of the shank, on "
+        "vertical force: sum of the contacts of this foot, from the lean of the shank, on "
         "'1_ground_force_vy' (1), '2_ground_force_vy' (1)"
     ) in found.remarks
 

@@ -125,8 +125,8 @@ def test_events_subject_and_loads_of_a_trial_are_taken_from_the_file(trial: Tria
     for line in (
         "body mass 62 kg, from trial.c3d",
         "stature 1.71 m, from trial.c3d",
-        "column 'RAnkleMoment.x' was read in N mm/kg, judged by its magnitude: the file states 'N mm'",
-        "column 'RGroundReactionForce.z' was read in N/kg, judged by its magnitude: the file states 'N'",
+        "column 'RAnkleMoment.x' was read in N mm/kg, from its magnitude: the file states 'N mm'",
+        "column 'RGroundReactionForce.z' was read in N/kg, from its magnitude: the file states 'N'",
         "shank_angle, knee_forward, knee_up: missing outside 0.64 to 3.71 s (recording: 0.57 to 3.76 s)",
         "ankle_moment, vertical_force: missing in 68 % of the recording, where no plate measured this foot",
         "vertical_force covers 1 of 2 strides",
@@ -155,7 +155,7 @@ def test_the_unit_of_a_moment_is_seen_from_its_size(trial: Trial, unit: str, sca
     found = import_gait([trial(moment_unit=unit, moment_scale=scale)], ImportSettings())
     assert_true(found)
     said = [line for line in found.remarks if "AnkleMoment" in line]
-    assert [f"was read in {read}, judged by its magnitude" in line for line in said] == [True] * bool(read)
+    assert [f"was read in {read}, from its magnitude" in line for line in said] == [True] * bool(read)
 
 
 def test_a_moment_that_no_unit_explains_is_refused_with_what_is_allowed(trial: Trial) -> None:

@@ -82,9 +82,9 @@ def force_of_plates(
                 total = Signal(table.file, table.time, force + other_plates)
                 chosen.append(f"'{name}' ({len(contacts)})")
     if total is None:
-        return None, ["vertical force: no plate measured this foot, judged by the lean of the shank"] if names else []
+        return None, ["vertical force: no plate measured this foot, from the lean of the shank"] if names else []
     return total, [
-        f"vertical force: sum of the contacts of this foot, judged by the lean of the shank, on {', '.join(chosen)}"
+        f"vertical force: sum of the contacts of this foot, from the lean of the shank, on {', '.join(chosen)}"
     ]
 
 

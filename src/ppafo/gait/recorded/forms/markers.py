@@ -254,7 +254,7 @@ def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tup
             f"{kind} of walking; give its unit in a gait map: {known}"
         )
     was = f"the file states {stated!r}" if stated in _FACTORS[kind] else "the file states no unit"
-    return fitting[0], [f"column '{name}' was read in {fitting[0] or 'body weights'}, judged by its magnitude: {was}"]
+    return fitting[0], [f"column '{name}' was read in {fitting[0] or 'body weights'}, from its magnitude: {was}"]
 
 
 def is_trc(path: str | Path) -> bool:
