@@ -11,14 +11,14 @@ import re
 import site
 import sys
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from ppafo.errors import KindError
-from ppafo.wording import one_line
+from ppafo.wording import nearest_name, one_line
 
 Plugins = Iterable[str | Path]
 """Plug-ins as files (``laws.py``) or module names (``my_laws.hysteresis``)."""
@@ -137,6 +137,21 @@ def object_of(word: str) -> Any:
         # Not asked by getattr, which may call a function of the module.
         raise AttributeError(f"module '{module}' has no attribute '{name}'")
     return getattr(loaded, name)
+
+
+def nearest_kind(name: str, allowed: Iterable[str], kind_type: type = object) -> str:
+    """Return a hint as ``nearest_name`` does, also of components in modules that the user named: ``module:OBJECT``."""
+    words = list(allowed)
+    for plugin in named_plugins():
+        # A broken module is refused where one of its objects is named.
+        with suppress(Exception):
+            for key, item in vars(_imported(plugin.module, plugin.folder)).items():
+                own_name = getattr(item, "name", None) if type(item).__module__.startswith("ppafo.") else None
+                if isinstance(own_name, str) and isinstance(item, kind_type):
+                    words.append(f"{plugin.module}:{key}")
+                    if own_name == name:
+                        return f", did you mean '{words[-1]}'?"
+    return nearest_name(name, words)
 
 
 def _remedy(module: str) -> str:

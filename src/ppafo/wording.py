@@ -144,6 +144,16 @@ def subject_text(scenario: str) -> str:
     return _configuration.get() or scenario
 
 
+def changed_text(overrides: Iterable[str]) -> str:
+    """Return the statement of a result on the values that overrides changed; empty without overrides.
+
+    >>> changed_text(["valve.area=9 mm^2", "run.duration=2 s"])
+    'values changed: valve.area=9 mm^2, run.duration=2 s'
+    """
+    listed = ", ".join(overrides)
+    return f"values changed: {listed}" if listed else ""
+
+
 def override_text(overrides: Iterable[str]) -> str:
     """Format overrides as their caller writes them: command-line words, or a Python argument.
 

@@ -10,6 +10,7 @@ from ppafo.cli import output
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, CommandOutput
 from ppafo.documents.json_text import json_text, plain
 from ppafo.units.shown import in_units, shown_in
+from ppafo.wording import changed_text
 
 if TYPE_CHECKING:
     from ppafo.report.finding import Finding
@@ -44,13 +45,14 @@ def simulate(
     with output.blame_out_option():
         check_result_folder(folder)
 
+    from ppafo.simulation.numbers import changes_in
     from ppafo.simulation.simulate import simulate as run_scenario
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 
     with shown_in(loaded.device.shown):
         warn_of_coarse_pairs([loaded])
         report = assessed(run_scenario(loaded), check)
-        tracking = report.tracking
+        tracking, changed = report.tracking, list(changes_in(loaded))
         # A reference that is not followed makes the result useless, and a check fails.
         is_useless = tracking is not None and tracking.is_useless
         passes = report.check is None or (report.check.is_determined and not is_useless)
@@ -62,6 +64,7 @@ def simulate(
                 "tracking": None if tracking is None else {**plain(tracking), "sentence": tracking.sentence},
                 "gains": plain(report.gains),
                 "metrics": {name: plain(metric) for name, metric in report.result.metrics.items()},
+                **({"overrides": changed} if changed else {}),
                 **({} if report.error is None else {"error": plain(report.error)}),
                 **({} if report.check is None else {"check": report.check.document()}),
                 "folder": str(folder),
@@ -84,12 +87,14 @@ class _RunReport:
 
     @property
     def verdict(self) -> list[str]:
-        """Sentences on tracking, switching frequency, and replaced values of the set."""
+        """Sentences on tracking, switching frequency, replaced values of the set, and changed values."""
+        from ppafo.simulation.numbers import changes_in
         from ppafo.simulation.tracking.pair_step import unlimited_switching
 
+        scenario = self.result.scenario
         sentence = self.result.following if self.tracking is None else self.tracking.sentence
-        replaced = self.result.scenario.origin.replaced
-        return [said for said in (sentence, unlimited_switching(self.result), replaced) if said]
+        sentences = (sentence, unlimited_switching(self.result), scenario.origin.replaced)
+        return [said for said in (*sentences, changed_text(changes_in(scenario))) if said]
 
     @property
     def usage(self) -> list[str]:
@@ -158,7 +163,6 @@ def finding_of(report: _RunReport) -> "Finding[None]":
     result, check = report.result, report.check
     scenario, status = result.scenario, result.status
     device = f"device '{scenario.device.name}', valve '{scenario.device.valve_name}'"
-    changed = f"; values changed for this run: {', '.join(scenario.origin.overrides)}"
     rows = [
         (metric_words(name), metric_text(metric.value, metric.unit), metric.summary)
         for name, metric in result.metrics.items()
@@ -167,7 +171,7 @@ def finding_of(report: _RunReport) -> "Finding[None]":
         name="run",
         kicker=f"A run of {scenario.run.duration:g} s",
         title=scenario.name,
-        said=(" ".join(scenario.description.split()), f"{device}{changed if scenario.origin.overrides else ''}"),
+        said=(" ".join(scenario.description.split()), device),
         parts=(
             Section(remarks=(*(() if status.is_completed else (f"The run {status.message}",)), *report.verdict)),
             Section("Metrics", columns_of(("Metric", "Value", "The run"), rows), left=3),

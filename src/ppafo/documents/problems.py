@@ -1,6 +1,6 @@
 """Problems of a document as one-line text: key, value, allowed values and nearest name."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from types import UnionType
 from typing import Annotated, Any, TypeGuard, Union, get_args, get_origin
@@ -8,6 +8,7 @@ from typing import Annotated, Any, TypeGuard, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
+from ppafo.plugins import nearest_kind
 from ppafo.wording import nearest_name, one_line, said_missing
 
 NAME = r"^[a-z0-9][a-z0-9_-]*$"
@@ -136,7 +137,7 @@ def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
             return f"{assignment} is not allowed{_allowed_words(detail['input'], words)}"
         case "union_tag_invalid":
             kind = detail["ctx"]["tag"]
-            words = _allowed_words(kind, detail["ctx"]["expected_tags"])
+            words = _allowed_words(kind, detail["ctx"]["expected_tags"], nearest_kind)
             return f"{key.path}.kind = {quote(kind)} is not known{words}"
         case "string_pattern_mismatch" if detail["loc"][-1] == "[key]":
             # Pydantic marks a name that is the key of a table.
@@ -158,10 +159,10 @@ def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
     return f"{assignment}: must {one_line(requirement)}"
 
 
-def _allowed_words(word: object, allowed: str) -> str:
+def _allowed_words(word: object, allowed: str, nearest: Callable[[str, list[str]], str] = nearest_name) -> str:
     """Return the message ending for an unknown word: nearest and allowed words; pydantic separates these by commas."""
     words = [item.strip(" '") for item in allowed.split(",")]
-    return f"{nearest_name(str(word), words)}; allowed: {', '.join(words)}"
+    return f"{nearest(str(word), words)}; allowed: {', '.join(words)}"
 
 
 def _tables_with(name: str, model: type[BaseModel]) -> list[str]:

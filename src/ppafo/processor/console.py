@@ -26,12 +26,7 @@ class Console:
         self._unread = b""
         try:
             self._process = subprocess.Popen(
-                command,
-                cwd=folder,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                bufsize=0,
+                command, cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, bufsize=0
             )
         except OSError as error:
             raise SimulationError(f"{self._name} cannot be run: {reason(error)}") from error

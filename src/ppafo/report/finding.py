@@ -21,6 +21,7 @@ from ppafo.report.writing import align_columns, inline_figure, render_page
 from ppafo.signals import RecordingKind
 from ppafo.units.shown import in_units, units_in_force
 from ppafo.version import __version__
+from ppafo.wording import changed_text
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -169,9 +170,7 @@ class LivePart:
     remark: str = ""
 
 
-def _units_of(finding: "Finding[Any]", *_: Any, **__: Any) -> Mapping[str, str]:
-    """Return the display units of a finding; further arguments are ignored."""
-    return finding.units
+_in_own_units = in_units(lambda finding, *_, **__: finding.units)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -190,6 +189,7 @@ class Finding(Generic[T_co]):
     - ``kind``: origin of the numbers: simulated, synthetic or measured
     - ``page``: function that makes a special page from the drawn figures
     - ``units``: display units by SI unit, by default the ones active at creation
+    - ``overrides``: values that the caller changed, stated after the opening sentences; JSON has them if there are any
     """
 
     name: str
@@ -205,6 +205,7 @@ class Finding(Generic[T_co]):
     kind: RecordingKind = "simulated"
     page: Callable[[Mapping[str, bytes]], bytes] | None = None
     units: Mapping[str, str] = field(default_factory=units_in_force)
+    overrides: Sequence[str] = ()
 
     @property
     def figures(self) -> dict[str, Section]:
@@ -229,13 +230,14 @@ class Finding(Generic[T_co]):
         page = html.escape(files_of(self)[REPORT].decode())
         return f'<iframe srcdoc="{page}" width="100%" height="700" style="border: 0"></iframe>'
 
-    @in_units(_units_of)
+    @_in_own_units
     def to_dict(self) -> dict[str, Any]:
         """Return the data printed with ``--json``, as plain data in SI units."""
         document = getattr(self.found, "json_document", None)
-        return dict(plain(self.found) if document is None else document())
+        given = {"overrides": list(self.overrides)} if self.overrides else {}
+        return given | dict(plain(self.found) if document is None else document())
 
-    @in_units(_units_of)
+    @_in_own_units
     def plot(self, name: str | None = None, width: float | str | None = None) -> "matplotlib.figure.Figure":
         """Return a figure of the report by name, by default the first; raises ArgumentError if there is none.
 
@@ -265,10 +267,10 @@ class Finding(Generic[T_co]):
         write_marked_folder(Path(folder), files_of(self), self.command or self.name)
 
 
-@in_units(_units_of)
+@_in_own_units
 def text_of(finding: Finding[Any]) -> str:
     """Return the report as text: opening sentences and sections, without the sections meant for the page only."""
-    blocks = ["\n".join(finding.said)]
+    blocks = ["\n".join(filter(None, (*finding.said, changed_text(finding.overrides))))]
     for section in finding.parts:
         if section.is_detail:
             continue
@@ -278,7 +280,7 @@ def text_of(finding: Finding[Any]) -> str:
     return "\n\n".join(block for block in blocks if block)
 
 
-@in_units(_units_of)
+@_in_own_units
 def files_of(finding: Finding[Any]) -> dict[str, bytes]:
     """Return text, JSON, page, figures and further files of a report by name; this draws the figures."""
     return {
@@ -288,7 +290,7 @@ def files_of(finding: Finding[Any]) -> dict[str, bytes]:
     }
 
 
-@in_units(_units_of)
+@_in_own_units
 def page_files(finding: Finding[Any]) -> dict[str, bytes]:
     """Return page, figures and further files of a report by name; this draws the figures."""
     files = {name: content() for name, content in finding.files.items()}
@@ -308,6 +310,7 @@ def page_files(finding: Finding[Any]) -> dict[str, bytes]:
         parts.append((section, heads, inline_figure(on_page[section.name]) if section.name else ""))
     values = {
         "finding": finding,
+        "changed": changed_text(finding.overrides),
         "parts": parts,
         "origin": _ORIGINS[finding.kind],
         "versions": f"ppafo {__version__}",

@@ -151,8 +151,5 @@ def with_line(device: Device, plant: PlantParameters, preset: Preset) -> tuple[P
     )
     shorter = plant._replace(dead_volume_1=plant.dead_volume_1 - volume, dead_volume_2=plant.dead_volume_2 - volume)
     return shorter, ExactOrifice(
-        conductance=conductance,
-        is_iso6358=0.0,
-        number=gas.heat_capacity_ratio,
-        linear_ratio=device.flow.linear_ratio,
+        conductance=conductance, is_iso6358=0.0, number=gas.heat_capacity_ratio, linear_ratio=device.flow.linear_ratio
     )

@@ -63,8 +63,7 @@ _SIGNALS = {
 }
 
 
-def _units_of(estimate: "ErrorEstimate | Check") -> Mapping[str, str]:
-    return estimate.units
+_in_own_units = in_units(lambda estimate: estimate.units)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +89,7 @@ class ErrorEstimate:
     units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
 
     @property
-    @in_units(_units_of)
+    @_in_own_units
     def sentence(self) -> str:
         """Errors of angle, pressures, temperatures and metrics in display units."""
         from ppafo.report.display_units import metric_change
@@ -191,7 +190,7 @@ class Check:
         separation = [] if self.parts_at is None else [f"The runs separate at t = {self.parts_at:.4g} s."]
         return " ".join([f"Numerically sensitive: {' Also: '.join(sentences)}", self.error.sentence, *separation])
 
-    @in_units(_units_of)
+    @_in_own_units
     def __repr__(self) -> str:
         """Return the table of all changes in display units, and the sentence."""
         from ppafo.report.display_units import metric_change, metric_level

@@ -21,8 +21,9 @@ from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
 from ppafo.parameters.parameter_set import Entry
+from ppafo.plugins import nearest_kind
 from ppafo.simulation.document import REFERENCE_OF, controlled_in, kind_at
-from ppafo.simulation.motion_kind import MOTIONS, MotionSection, is_walk
+from ppafo.simulation.motion_kind import MOTIONS, MotionKind, MotionSection, is_walk
 from ppafo.simulation.scenario import (
     FreeMotion,
     GasModel,
@@ -34,7 +35,6 @@ from ppafo.simulation.scenario import (
     SupplyLine,
 )
 from ppafo.units import to_si
-from ppafo.wording import nearest_name
 
 *RUN, ACCURACY = quantities_of(RunSettings)
 FREE = quantities_of(FreeMotion)
@@ -241,7 +241,7 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
         is_known = not kind or kind in MOTIONS
     if not is_known:
         known = tuple(MOTIONS)
-        hint = nearest_name(kind, known)
+        hint = nearest_kind(kind, known, MotionKind)
         raise ScenarioError(f"{file}: motion.kind = {quote(kind)} is not known{hint}; allowed: {', '.join(known)}")
     sections: dict[str, Kinds[Any]] = {"controller": CONTROLLERS, "reference": PROFILES}
     motion = section_of(document)

@@ -1,7 +1,7 @@
 """Numbers of a scenario by dotted path: their declarations, and their replacement by columns for many runs."""
 
 from collections import deque
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import fields, replace
 from typing import Any, TypeVar
 
@@ -24,7 +24,7 @@ from ppafo.parameters.declaration import (
 from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.effects import number_under, part_of
 from ppafo.parameters.graph import Graph, holding, in_other_forms, left, paths_in, resolved
-from ppafo.parameters.overrides import one_path
+from ppafo.parameters.overrides import one_path, read_overrides
 from ppafo.simulation.declaration import LOCKED_ANGLE, changes_reach
 from ppafo.simulation.scenario import (
     Control,
@@ -37,6 +37,8 @@ from ppafo.simulation.scenario import (
     Sensors,
     SupplyLine,
 )
+from ppafo.units import SI
+from ppafo.units.shown import in_units, written_text
 
 _Item = TypeVar("_Item")
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
@@ -114,6 +116,20 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declarations of all numbers of a scenario and its device, by path; both forms of each orifice."""
     device = scenario.device
     return device_numbers(device) | of_its_chambers(scenario.motion.motion_kind.quantities(scenario), device)
+
+
+@in_units(lambda scenario, *_, **__: scenario.device.shown)
+def changes_in(scenario: Scenario, *others: Scenario, overrides: Iterable[str] | None = None) -> tuple[str, ...]:
+    """Return overrides of scenarios as texts, by default the first scenario's own; SI numbers in their display unit."""
+    declared = {path: item for each in (*others, scenario) for path, item in declared_numbers(each).items()}
+    texts = []
+    for override in read_overrides(scenario.origin.overrides if overrides is None else overrides):
+        number, unit, _ = override.text.partition(f" {SI}")
+        # An override of one of several configurations has its name before the path.
+        quantity = declared.get(chosen_path(override.typed.rpartition(":")[2], scenario)) if unit else None
+        shown_value = override.text if quantity is None else written_text(float(number), quantity.unit)
+        texts.append(f"{override.typed}={shown_value}")
+    return tuple(texts)
 
 
 def of_its_chambers(by_path: Mapping[str, _Item], device: Device) -> dict[str, _Item]:

@@ -16,10 +16,12 @@ from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_to
 from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
 from ppafo.simulation import at_hand
+from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario, scenario_document
 from ppafo.units.shown import in_units
 from ppafo.version import __version__
+from ppafo.wording import changed_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -84,8 +86,7 @@ class DeferredResult:
         return DeferredResult, (self(),)
 
 
-def _units_of(result: "Result", *_: object, **__: object) -> Mapping[str, str]:
-    return result.scenario.device.shown
+_in_own_units = in_units(lambda result, *_, **__: result.scenario.device.shown)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -132,7 +133,7 @@ class Result:
         said = (sentence, unlimited_switching(self), coarse_pair(self.scenario), self.scenario.origin.replaced)
         return tuple(sentence for sentence in said if sentence)
 
-    @in_units(_units_of)
+    @_in_own_units
     def __repr__(self) -> str:
         """Return name, status, duration and one line per metric, in display units."""
         from ppafo.report.display_units import name_lines
@@ -141,15 +142,15 @@ class Result:
         head = f"Result of '{scenario.name}', {scenario.run.duration:g} s: {status.message or status.kind}"
         return "\n".join([head, *name_lines(self.metrics)])
 
-    @in_units(_units_of)
+    @_in_own_units
     def __str__(self) -> str:
         """Return the output of ``ppafo simulate``: status, verdict, warnings and metrics in the units of the device."""
         from ppafo.report.display_units import metrics_lines
 
-        said = filter(None, (self.following, *self.warnings))
+        said = filter(None, (self.following, *self.warnings, changed_text(changes_in(self.scenario))))
         return "\n".join([f"{self.scenario.name}: {self.status.kind}", *said, "", *metrics_lines(self.metrics)])
 
-    @in_units(_units_of)
+    @_in_own_units
     def plot(self, width: float | str | None = None) -> "Figure":
         """Return a figure of angle, pressures, torque, command and gas; ``.savefig(...)`` saves it.
 
@@ -165,7 +166,7 @@ class Result:
         with drawn_at(width):
             return shown(recording_figure(self.recording, self.scenario.name, remark, valve, joint))
 
-    @in_units(_units_of)
+    @_in_own_units
     def error(self) -> "ErrorEstimate":
         """Return the estimated time-stepping error [SI], from a second run with a sixteenth of the allowed error.
 
@@ -177,7 +178,7 @@ class Result:
 
         return estimated_error(self, results_of(self.scenario, [finer(plan_run(self.scenario))])[0])
 
-    @in_units(_units_of)
+    @_in_own_units
     def check(self) -> "Check":
         """Return the repeatability of this run: with finer steps, and with perturbed start and measurements.
 

@@ -7,11 +7,13 @@ from typing import Any
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import StudyError, UnitError, refused_as
 from ppafo.metrics import METRICS
+from ppafo.metrics.metric import MetricKind
 from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.plugins import nearest_kind
 from ppafo.simulation.ensemble.running import lacking, offered
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import parse_quantity
-from ppafo.wording import first_twice, nearest_name
+from ppafo.wording import first_twice
 
 _OUTCOME_LEVELS = {"Pa": "Pa_a", "-": ""}
 _DIFFERENCES = {"Pa": "Pa_d", "-": ""}
@@ -22,7 +24,8 @@ def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
     for name in metrics:
         if name not in METRICS:
             known = offered(scenario)
-            raise StudyError(f"there is no metric '{name}'{nearest_name(name, known)}; available: {', '.join(known)}")
+            hint = nearest_kind(name, known, MetricKind)
+            raise StudyError(f"there is no metric '{name}'{hint}; available: {', '.join(known)}")
         reason = lacking(scenario, METRICS[name])
         if reason:
             raise StudyError(f"scenario '{scenario.name}' has no '{name}': {reason}")

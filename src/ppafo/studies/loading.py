@@ -19,7 +19,7 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.ensemble.running import lacking
-from ppafo.simulation.numbers import chosen_path
+from ppafo.simulation.numbers import changes_in, chosen_path
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import ShiftedDistribution
 from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, with_noise
@@ -144,7 +144,7 @@ def _load(
             document["sample"] |= given
     parsed = validate(declared.StudyFile, document, source.file, StudyError)
     with refused_as(StudyError, source.file, StudyError):
-        return _build(parsed, document, source)
+        return _build(parsed, document, source, changes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,10 +165,12 @@ def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[
     return kind.parse(source.text, source.file), source
 
 
-def _build(parsed: declared.StudyFile, document: dict[str, Any], source: _StudySource) -> Study:
+def _build(
+    parsed: declared.StudyFile, document: dict[str, Any], source: _StudySource, changes: tuple[str, ...]
+) -> Study:
     """Build the study of a parsed study file in SI units; StudyError for a study that cannot be run.
 
-    ``document`` is the file as plain data, which the study keeps.
+    ``document`` is the file as plain data with the caller's ``changes``; the study keeps both.
     """
     repeated = first_twice([configuration.name for configuration in parsed.configurations])
     if repeated is not None:
@@ -225,6 +227,7 @@ def _build(parsed: declared.StudyFile, document: dict[str, Any], source: _StudyS
         only={entry.path: entry.only for entry in parsed.vary if entry.only},
         document=document,
         text=source.text,
+        changes=changes_in(*scenarios, overrides=changes),
     )
 
 

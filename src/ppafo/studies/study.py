@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from ppafo.metrics import METRICS
 from ppafo.model.controlled import CONTROLLED
 from ppafo.parameters.parameter_set import chosen_units
 from ppafo.simulation.ensemble.running import lacking, offered
+from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Distribution
@@ -146,7 +148,7 @@ class Study:
     not vary in all. ``document`` is the study file as plain data, with changes from the command line; ``text`` is the
     file in bytes, empty for a study from data. Paths in ``gauge`` hold gauge pressures [Pa] relative to the atmosphere
     of each run, all others absolute ones. ``given`` maps a path to the unit in which its values were given, if not the
-    package's own.
+    package's own. ``changes`` are the caller's overrides.
     """
 
     name: str
@@ -165,6 +167,7 @@ class Study:
     text: bytes
     gauge: frozenset[str] = frozenset()
     given: Mapping[str, str] = field(default_factory=dict)
+    changes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return name, number of runs, configurations and varied paths."""
@@ -269,6 +272,21 @@ def configurations_with(configurations: Sequence[Configuration], overrides: Iter
             refused[0] + (f"; for '{name}' alone: {override_text([f'{name}:PATH=VALUE'])}" if name else "")
         )
     return tuple(changed)
+
+
+def changes_of(
+    configurations: Sequence[Configuration], study: Study | None, overrides: Iterable[str]
+) -> tuple[str, ...]:
+    """Return the caller's overrides of compared configurations; of one configuration alone as ``NAME:PATH=VALUE``.
+
+    Overrides in the file of a ``study``, whose configurations are compared, are not among them.
+    """
+    if study is not None:
+        return *study.changes, *changes_in(*(each.scenario for each in configurations), overrides=overrides)
+    own = [(each.name, text) for each in configurations for text in changes_in(each.scenario)]
+    uses = Counter(text for _, text in own)
+    common = {text for text, count in uses.items() if count == len(configurations)}
+    return tuple(dict.fromkeys(text if text in common else f"{name}:{text}" for name, text in own))
 
 
 def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:

@@ -68,6 +68,7 @@ def manifest(study: Study) -> dict[str, Any]:
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,
         **requested,
+        **({"overrides": list(study.changes)} if study.changes else {}),
         "sha256": hashlib.sha256(json.dumps(requested, sort_keys=True).encode()).hexdigest(),
         "runs": study.runs,
         "runs_of_configuration": study.runs_of_configuration,

@@ -178,10 +178,7 @@ def compute_chunk(
     part = chunk(study, number)
     values = drawn_values(study, np.arange(part.first, part.first + part.runs))
     result = _result(study, part, values, threads, count)
-    columns = {
-        **_columns_of_runs(study, part, values),
-        **_columns_of_endings(study, part, values, result),
-    }
+    columns = {**_columns_of_runs(study, part, values), **_columns_of_endings(study, part, values, result)}
     outputs = study.outputs
     for name in outputs.metrics:
         metric = METRICS[name]
@@ -238,9 +235,7 @@ def _columns_of_endings(
             judged.oscillates, _PLAIN, "1 where the loop oscillates, empty where that is not known"
         ),
         FOLLOWS: TableColumn(
-            judged.follows,
-            _PLAIN,
-            "1 where the run follows its reference, 0 where not, empty where that is not known",
+            judged.follows, _PLAIN, "1 where the run follows its reference, 0 where not, empty where that is not known"
         ),
     }
 

@@ -28,10 +28,7 @@ from ppafo.validation.search import CauseSearch, SizedCause
 from ppafo.validation.settings import ReplaySettings
 from ppafo.wording import argument_text
 
-_TIMES = {
-    "milliseconds read as seconds": (1.0e3, "ms"),
-    "seconds read as milliseconds": (1.0e-3, "s"),
-}
+_TIMES = {"milliseconds read as seconds": (1.0e3, "ms"), "seconds read as milliseconds": (1.0e-3, "s")}
 """Clock rate [-] that corrects misread times, and the correct unit, by kind of mistake."""
 
 _LESS = 0.5

@@ -16,9 +16,10 @@ from ppafo.errors import KindError, ScenarioError, refused_as
 from ppafo.model.declaration import Quantity
 from ppafo.model.fault_catalogue import PLANT_FAULTS, PlantFault
 from ppafo.model.shut_off import SHUT_OFF
+from ppafo.plugins import nearest_kind
 from ppafo.simulation.declaration import PERIOD, RATE, SENSORS, TEXTS, THERMAL, THERMAL_GAS, DeclaredContent, line_paths
 from ppafo.simulation.document import kind_at
-from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, WALK, is_walk
+from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, WALK, MotionKind, is_walk
 from ppafo.simulation.schema import (
     controller_table,
     file_model,
@@ -30,7 +31,6 @@ from ppafo.simulation.schema import (
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
 from ppafo.walking.preparation import DISTORTED, FROZEN
 from ppafo.walking.wearer import WEARER
-from ppafo.wording import nearest_name
 
 SUMMARY = "the device on a leg that walks along a prescribed gait"
 """Description of the motion of a walk."""
@@ -167,7 +167,8 @@ def _check_motion(kind: object, place: str) -> None:
     if not is_known:
         # The motions of a vane are named too: the file may be meant for one.
         known = tuple(MOTIONS)
-        raise ScenarioError(f"{place} is unknown{nearest_name(str(kind), known)}; allowed: {', '.join(known)}")
+        hint = nearest_kind(str(kind), known, MotionKind)
+        raise ScenarioError(f"{place} is not known{hint}; allowed: {', '.join(known)}")
 
 
 def _texts(_document: Mapping[str, Any]) -> tuple[str, ...]:

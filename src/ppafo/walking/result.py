@@ -19,6 +19,7 @@ from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation import at_hand
 from ppafo.simulation.motion_kind import Measured
+from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.tracking import Tracking, following_text, tracking_in
@@ -50,6 +51,7 @@ from ppafo.walking.strides import (
     walk_metrics,
 )
 from ppafo.walking.task_sequence_plan import PlannedSequence, pace_in_time
+from ppafo.wording import changed_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -156,9 +158,7 @@ WALK_FORMAT = "ppafo walk"
 """Format name in saved walk results, by which analyses recognise them."""
 
 
-def _units_of(walked: "WalkResult | Scenario", *_: Any) -> Mapping[str, str]:
-    scenario = walked if isinstance(walked, Scenario) else walked.scenario
-    return scenario.device.shown
+_in_own_units = in_units(lambda walked, *_, **__: walked.scenario.device.shown)
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
@@ -213,7 +213,7 @@ class WalkResult:
         strides = self.metrics.get("strides")
         return None if strides is None or strides.value == 0.0 else tracking_in(self)
 
-    @in_units(_units_of)
+    @_in_own_units
     def torque_sentence(self, verdict: Tracking | None) -> str:
         """Sentence on the torque: whether it follows its reference; "" if not judged.
 
@@ -229,7 +229,7 @@ class WalkResult:
         enough = "" if self.is_helped else ": fewer than half"
         return f"help in {int(self.helped.sum())} of {self.helped.size} strides{enough}"
 
-    @in_units(_units_of)
+    @_in_own_units
     def __repr__(self) -> str:
         """Return name, status, duration and a line for each metric, in display units."""
         from ppafo.report.display_units import name_lines
@@ -237,12 +237,12 @@ class WalkResult:
         head = f"Walk '{self.scenario.name}', {self.recording.time[-1] / 60.0:.3g} min: {self.status.message}"
         return "\n".join([head, *name_lines(self.metrics)])
 
-    @in_units(_units_of)
+    @_in_own_units
     def __str__(self) -> str:
         """Return status, verdict and metrics in display units, as printed by ``ppafo simulate``."""
         from ppafo.report.display_units import metrics_lines
 
-        verdict = [self.scenario.origin.replaced]
+        verdict = [self.scenario.origin.replaced, changed_text(changes_in(self.scenario))]
         if self.status.is_completed:
             verdict += [self.torque_sentence(self.tracking), "" if self.is_helped else self.help_text]
             toes = self.metrics.get("lowest_toes")
@@ -251,7 +251,7 @@ class WalkResult:
         verdict = [line for line in verdict if line]
         return "\n".join([f"{self.scenario.name}: {self.status.kind}", *verdict, "", *metrics_lines(self.metrics)])
 
-    @in_units(_units_of)
+    @_in_own_units
     def plot(self, width: float | str | None = None) -> "Figure":
         """Return a figure of the mean stride and of the healthy gait; ``.savefig(...)`` writes the figure to a file.
 
@@ -291,7 +291,7 @@ def result_of_walk(scenario: Scenario, run: Run, outcome: BatchResult, supply: S
     return _result(scenario, run, time, record, status, supply)
 
 
-@in_units(_units_of)
+@in_units(lambda scenario, *_: scenario.device.shown)
 def _result(
     scenario: Scenario,
     run: Run,

@@ -148,11 +148,7 @@ def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
         lead += f"{comparison.draws:,} draws of {values}{beside}, the same for all; each "
         lead += f"interval with {100.0 * comparison.confidence:g} % confidence"
     pareto = Section(
-        "Error against gas",
-        panels=partial(_pareto_panels, comparison),
-        name="pareto",
-        caption=_PARETO,
-        is_detail=True,
+        "Error against gas", panels=partial(_pareto_panels, comparison), name="pareto", caption=_PARETO, is_detail=True
     )
     change = Section(
         "Spread of the change",
@@ -307,13 +303,10 @@ def _change_panels(comparison: ComparisonResult) -> list[Panel]:
 
 def _colours(task: TaskComparison) -> dict[str, str]:
     """Return a colour for each configuration: colours of the valves if all differ, else of the palette in order."""
-    of_valves = [look_of_valve(case.scenario.device.valve.kind).colour for case in task.cases]
-    chosen = (
-        of_valves
-        if len(set(of_valves)) == len(of_valves)
-        else [COLOURS[row % len(COLOURS)] for row in range(len(of_valves))]
-    )
-    return dict(zip((case.configuration for case in task.cases), chosen, strict=True))
+    colours = [look_of_valve(case.scenario.device.valve.kind).colour for case in task.cases]
+    if len(set(colours)) < len(colours):
+        colours = [COLOURS[row % len(COLOURS)] for row in range(len(colours))]
+    return dict(zip((case.configuration for case in task.cases), colours, strict=True))
 
 
 def _pareto(comparison: ComparisonResult, task: TaskComparison) -> Panel:

@@ -84,7 +84,7 @@ def compare(
     from ppafo.analyses.compare.solve import DrawSettings, compared
     from ppafo.arguments.conversion import taken_tasks
     from ppafo.studies.draws import study_of
-    from ppafo.studies.study import choose_configurations
+    from ppafo.studies.study import changes_of, choose_configurations
     from ppafo.units.shown import shown_in
 
     requested = DrawSettings(draws, seed, confidence, maximum_failed, threads, progress)
@@ -92,9 +92,9 @@ def compare(
     loaded = study_of(study) if study is not None else None
     chosen = choose_configurations(configurations or None, loaded, overrides)
     comparison = compared(chosen, baseline, taken_tasks(tasks), loaded, requested)
-    device = comparison.tasks[0].cases[0].scenario
+    device, of_study = comparison.tasks[0].cases[0].scenario, None if configurations else loaded
     with shown_in(device.device.shown if loaded is None else loaded.shown_for(device)):
-        finding = finding_of(comparison)
+        finding = replace(finding_of(comparison), overrides=changes_of(chosen, of_study, overrides))
     if not check:
         return finding
     is_steady = all(case.follows for task in comparison.tasks for case in task.cases)

@@ -122,9 +122,8 @@ def compared(
             f"draws = {draws.requested}: nothing in this comparison is random; omit draws, or give a study or "
             "sensors with noise"
         )
-    seed = draws.seed
-    if seed is None:
-        seed = DEFAULT_SEED if study is None else study.sample.seed
+    seed_of_study = DEFAULT_SEED if study is None else study.sample.seed
+    seed = seed_of_study if draws.seed is None else draws.seed
     drawn: dict[tuple[str, str], _DrawnRuns] = {}
     if uncertainty.drawn:
         if study is not None:

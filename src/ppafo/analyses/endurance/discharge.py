@@ -309,14 +309,7 @@ def _solve_interval(
         # It ends the interval where it falls through 0.
         event.terminal, event.direction = True, -1.0
     solution = solve_ivp(
-        rates,
-        (start, end),
-        values,
-        method="LSODA",
-        events=events,
-        dense_output=True,
-        rtol=_RELATIVE,
-        atol=_ABSOLUTE,
+        rates, (start, end), values, method="LSODA", events=events, dense_output=True, rtol=_RELATIVE, atol=_ABSOLUTE
     )
     if solution.status < 0:
         raise SimulationError(f"the simulation of the bottle failed at {solution.t[-1]:.4g} s: {solution.message}")

@@ -119,9 +119,9 @@ def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -
     with the device, or a whole task sequence.
 
     >>> import ppafo
-    >>> endurance = ppafo.endurance_of_walk(ppafo.walk("solenoid", minutes=0.1))
+    >>> endurance = ppafo.endurance_of_walk(ppafo.walk("solenoid", minutes=0.1), bottle="co2-25g")
     >>> print(f"{endurance.discharge.walking_time / 60.0:.1f} min: {endurance.discharge.ending.kind}")
-    5.2 min: frozen
+    0.4 min: frozen
     """
     gas = walk_gas(result)
     # A walk that takes no gas lasts for ever on any bottle.

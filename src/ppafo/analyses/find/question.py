@@ -65,10 +65,13 @@ def find(
     rms_error is 0.3427 N m there (bracketed to 3e-05 psi)
     """
     name_plugins(plugins)
+    from dataclasses import replace
+
     from ppafo.analyses.find.answer import finding_of
     from ppafo.analyses.find.solve import outermost
     from ppafo.loading import scenario_or_load
     from ppafo.parameters.parameter_set import units_of_texts
+    from ppafo.simulation.numbers import changes_in
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.studies.study import with_overrides
 
@@ -77,4 +80,5 @@ def find(
     # As in 'supply.pressure=2..6 bar_g' and 'final_error <= 30 N cm'.
     given = units_of_texts((vary.rpartition("..")[2], such_that.rpartition("=")[2]))
     with shown_in({**base.device.shown, **given}):
-        return finding_of(outermost(base, vary, such_that, highest, grid, threads, progress))
+        found = finding_of(outermost(base, vary, such_that, highest, grid, threads, progress))
+        return replace(found, overrides=changes_in(base))

@@ -19,6 +19,7 @@ from ppafo.report.finding import Column, Finding, Section, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
+from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, with_control
 from ppafo.units.shown import in_units, quantity_of_unit
@@ -44,22 +45,16 @@ class _StepResponses:
     ``amplitudes`` (steps,): step heights of the command [-]
     ``times``: time after the step [s]
     ``runs``, ``linear`` (steps, times): torque change from the steady state [N m]
+    ``errors`` (steps,): largest torque difference between runs and linear model [N m]
+    ``sizes`` (steps,): largest torque change of the runs [N m]
     """
 
     amplitudes: Floats
     times: Floats
     runs: Floats
     linear: Floats
-
-    @property
-    def errors(self) -> Floats:
-        """Largest torque difference between runs and linear model for each step [N m]."""
-        return np.asarray(np.max(np.abs(self.runs - self.linear), axis=1))
-
-    @property
-    def sizes(self) -> Floats:
-        """Largest torque change for each step [N m]."""
-        return np.asarray(np.max(np.abs(self.runs), axis=1))
+    errors: Floats
+    sizes: Floats
 
 
 def can_step(model: LinearModel) -> bool:
@@ -89,7 +84,9 @@ def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> _StepRes
     row = [variable.name for variable in model.outputs].index("torque")
     system = StateSpace(model.a, model.b[:, [column]], model.c[[row]], model.d[[row]][:, [column]])
     linear = amplitudes[:, None] * step(system, T=times)[1]
-    return _StepResponses(amplitudes, times, np.array(runs) - still, linear)
+    changes = np.array(runs) - still
+    errors, sizes = (np.max(np.abs(difference), axis=1) for difference in (changes - linear, changes))
+    return _StepResponses(amplitudes, times, changes, linear, errors, sizes)
 
 
 def _value_at_point(model: LinearModel, name: str) -> float:
@@ -200,6 +197,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         ],
         found=model,
         files={"linearise.npz": partial(_arrays, model)},
+        overrides=changes_in(model.scenario),
     )
 
 

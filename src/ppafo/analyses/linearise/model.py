@@ -54,9 +54,11 @@ class OmittedDelays:
     period: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class LoopMargins:
     """Margins of the control loop, closed by the scenario's PID; None where a crossover does not exist.
+
+    Angles are in rad and frequencies in Hz, as in JSON; the report has degrees.
 
     ``is_stable``: True if the closed loop of the linear model is stable (Nyquist criterion)
     ``gain_margin``: factor on all gains at which the loop becomes unstable [-]
@@ -74,6 +76,16 @@ class LoopMargins:
     gain_crossover: float | None
     bandwidth: float | None
     peak_sensitivity: float
+
+    def __repr__(self) -> str:
+        """Return the margins with the units of their attributes; the phase margin in degrees too, as in the report."""
+        units = dict.fromkeys(("phase_crossover", "gain_crossover", "bandwidth"), " Hz")
+        units["phase_margin"] = f" rad ({np.degrees(self.phase_margin or 0.0):.3g} deg)"
+        shown = (
+            f"{name}={value:.4g}{units.get(name, '')}" if isinstance(value, float) else f"{name}={value}"
+            for name, value in asdict(self).items()
+        )
+        return f"LoopMargins({', '.join(shown)})"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

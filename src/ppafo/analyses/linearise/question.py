@@ -34,7 +34,8 @@ def linearise(
         plugins: modules of your own, files or names, whose objects files may name
 
     Returns:
-        a Finding whose ``found`` is a LinearModel: matrices, signals, poles and margins
+        a Finding whose ``found`` is a LinearModel: matrices and signals in SI units, poles [1/s], and margins, of which
+        ``phase_margin`` is in rad (in the report in degrees), crossovers and bandwidth in Hz
 
     Raises:
         ScenarioError: a time outside the run, a scenario without equilibrium, and a valve that is on or off

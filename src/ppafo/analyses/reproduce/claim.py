@@ -8,12 +8,7 @@ from ppafo.parameters.publications.publication import paper_entries
 from ppafo.report.writing import format_reported_quantity, quantity
 
 Verdict = Literal[
-    "consistent",
-    "inconsistent_as_reported",
-    "met_by_fitted_settings",
-    "plausible",
-    "undetermined",
-    "not_testable",
+    "consistent", "inconsistent_as_reported", "met_by_fitted_settings", "plausible", "undetermined", "not_testable"
 ]
 VERDICTS: dict[Verdict, str] = {verdict: verdict.replace("_", " ") for verdict in get_args(Verdict)}
 """Verdicts on a claim, in words; only the first two follow from reported numbers alone."""

@@ -72,6 +72,8 @@ def sensitivity(
     confidence
     """
     name_plugins(plugins)
+    from dataclasses import replace
+
     from ppafo.analyses.sensitivity.answer import finding_of
     from ppafo.analyses.sensitivity.methods import METHODS
     from ppafo.analyses.sensitivity.solve import DEFAULT_SAMPLES, SensitivitySettings, analyse
@@ -97,4 +99,5 @@ def sensitivity(
     warn_of_coarse_pairs([base.scenario])
     runs = scenario_runs(base.scenario, with_companions(requested, base.scenario), tally, used.gauge, threads)
     with shown_in(chosen.shown_for(base.scenario)):
-        return finding_of(analyse(runs, used, by, settings, f"{chosen.name}, {base.name}", base.scenario, requested))
+        found = analyse(runs, used, by, settings, f"{chosen.name}, {base.name}", base.scenario, requested)
+        return replace(finding_of(found), overrides=chosen.changes)

@@ -127,6 +127,7 @@ def _finding_of(sets: Sequence[AuditedSet], is_whole: bool) -> Finding[Any]:
         passed=not any(audited_set.counts["error"] for audited_set in sets),
         kind="measured",
         command="sets audit",
+        overrides=first.overrides,
     )
 
 

@@ -110,6 +110,7 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
         ),
         found=results,
         passed=summary["completed"] > 0,
+        overrides=document.get("overrides", ()),
     )
 
 

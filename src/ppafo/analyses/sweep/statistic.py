@@ -5,6 +5,7 @@ intervals stay valid although the estimate is examined repeatedly.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +109,8 @@ def estimate(
     runs = scenario_runs(base.scenario, metrics, RunCounter(rule.first, progress), uncertainty.gauge, threads)
     with shown_in(chosen.shown_for(base.scenario)):
         seed = chosen.sample.seed if seed is None else seed
-        return draw_until(runs, uncertainty, metric, parsed, rule, seed, metrics[1:])
+        found = draw_until(runs, uncertainty, metric, parsed, rule, seed, metrics[1:])
+        return replace(found, overrides=chosen.changes)
 
 
 def draw_until(

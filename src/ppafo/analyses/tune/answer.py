@@ -171,6 +171,7 @@ def finding_of(tuned: Tuned) -> Finding[Tuned]:
         found=tuned,
         passed=after.is_feasible and not after.useless,
         files={"overrides.txt": pasted.encode},
+        overrides=problem.changes,
     )
 
 
@@ -181,7 +182,8 @@ def verdict(problem: Problem, before: GainResult, after: GainResult) -> str:
         failing = percentage(after.share_without_value, 3)
         return f"{name}: with the best gains found, {failing} of the runs fail, oscillate, or lack a required metric"
     if after.off:
-        beyond = f"the tracking limits are exceeded by {percentage(after.off, 3)}"
+        where = _in_draws(problem, after.share_off)
+        beyond = f"the tracking limits are exceeded by {percentage(after.off, 3)}{where}"
         why = f"{after.useless or beyond}{_by_ceiling(problem, after)}"
         return f"{name}: no gains within the bounds let the loop follow its reference; with the best gains found, {why}"
     if not after.is_feasible_in_search:
@@ -194,13 +196,19 @@ def verdict(problem: Problem, before: GainResult, after: GainResult) -> str:
         )
     if after.useless:
         return f"{name}: with the best gains found, {after.useless}"
-    return f"{name}: {_change(before, after)}"
+    return f"{name}: {_change(problem, before, after)}"
 
 
-def _change(before: GainResult, after: GainResult) -> str:
+def _in_draws(problem: Problem, fraction: float) -> str:
+    """Return the end of a clause on a fraction of the draws; empty without draws."""
+    return "" if problem.spread is None else f" in {percentage(fraction, 2)} of the draws"
+
+
+def _change(problem: Problem, before: GainResult, after: GainResult) -> str:
     """Return a sentence on the improvement, for gains that satisfy all constraints."""
     if before.off:
-        return f"the loop follows its reference, unlike with the previous gains; objective {after.objective:.4g}"
+        missed = f"with the previous gains it did not{_in_draws(problem, before.share_off)}"
+        return f"the loop follows its reference, {missed}; objective {after.objective:.4g}"
     if not before.is_feasible:
         return (
             "the gains found satisfy all constraints, which the previous gains did not; objective "
@@ -221,10 +229,9 @@ def _by_ceiling(problem: Problem, after: GainResult) -> str:
     ceiling = after.torque_ceiling
     if not ceiling.explains:
         return ""
-    where = "" if problem.spread is None else f" in {percentage(ceiling.fraction, 2)} of the draws"
     return (
         "; the torque ceiling is the cause: the reference requires more torque than the actuator gives at the supply "
-        f"pressure{where}, which no gains can change"
+        f"pressure{_in_draws(problem, ceiling.fraction)}, which no gains can change"
     )
 
 

@@ -18,6 +18,7 @@ from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, r
 from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.plugins import Plugins, name_plugins
+from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats, LogUniformBetween, UniformBetween
 from ppafo.studies.draws import Uncertainty, uncertainty_of
@@ -206,7 +207,8 @@ class Spread:
 class Problem:
     """Tuning problem: gains with bounds, objective, constraints and effort for one scenario.
 
-    ``spread`` is None for the nominal device with noise-free sensors.
+    ``spread`` is None for the nominal device with noise-free sensors. ``overrides`` are all of the scenario, of which
+    ``changes`` are the caller's.
     """
 
     name: str
@@ -218,6 +220,7 @@ class Problem:
     constraints: tuple[MetricLimit, ...]
     spread: Spread | None
     effort: SearchEffort
+    changes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return name, scenario and searched parameters."""
@@ -351,6 +354,7 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
             constraints=tuple(limits),
             spread=spread,
             effort=parsed.effort,
+            changes=changes_in(scenario, overrides=overrides),
         )
 
 

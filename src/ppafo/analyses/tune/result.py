@@ -77,6 +77,7 @@ class GainResult:
     ``fresh_violation``, ``fresh_share_without_value``: violation and fraction over fresh draws, or in the search
         without draws
     ``off``: fraction by which the runs exceed the tracking limits; 0 if they follow their reference
+    ``share_off``: fraction of all draws, of the search and fresh, in which the run does not follow its reference
     ``torque_ceiling``: draws in which the reference is out of reach
     ``share_of_noise``: fraction of the variance over fresh draws that is due to sensor noise, by metric
     ``metrics``, ``result``: metrics and result of one run of the nominal device
@@ -89,6 +90,7 @@ class GainResult:
     objective: float
     violation: float
     off: float
+    share_off: float
     share_without_value: float
     fresh_violation: float
     fresh_share_without_value: float

@@ -259,9 +259,8 @@ def _is_settled(costs: Floats) -> bool:
 
 def _metrics_of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> CandidateMetrics:
     """Run one set of gains over the draws and return its metrics."""
-    return _metrics_of_candidates(
-        runs, problem, {gain.path: np.array([gains[gain.path]]) for gain in problem.searched}, draws
-    )
+    values = {gain.path: np.array([gains[gain.path]]) for gain in problem.searched}
+    return _metrics_of_candidates(runs, problem, values, draws)
 
 
 def _metrics_of_candidates(
@@ -318,10 +317,8 @@ def _evaluate(
         fresh = spread.uncertainty.random_columns(spread.draws, FRESH_DRAWS, spread.seed)
         over_fresh = _metrics_of_gains(runs, problem, gains, fresh)
         if spread.uncertainty.has_noise:
-            renoised = _metrics_of_gains(runs, problem, gains, with_new_noise(fresh)).metrics
-            for name, values in renoised.items():
-                share = noise_interval(over_fresh.metrics[name][0], values[0], _NOISE_CONFIDENCE)
-                if share is not None:
+            for name, values in _metrics_of_gains(runs, problem, gains, with_new_noise(fresh)).metrics.items():
+                if share := noise_interval(over_fresh.metrics[name][0], values[0], _NOISE_CONFIDENCE):
                     noise[name] = share
     scores, fresh_scores = (judge(metrics, problem, scales) for metrics in (in_search, over_fresh))
     result = simulate(scenario_with(problem, gains))
@@ -333,6 +330,7 @@ def _evaluate(
         objective=float(scores.objective[0]),
         violation=float(scores.violation[0]),
         off=float(max(scores.off[0], fresh_scores.off[0])),
+        share_off=float(np.mean(np.concatenate([in_search.off, over_fresh.off], axis=1) > 0.0)),
         share_without_value=float(scores.without_value[0]),
         fresh_violation=float(fresh_scores.violation[0]),
         fresh_share_without_value=float(fresh_scores.without_value[0]),
@@ -389,8 +387,6 @@ def _values(metrics: Mapping[str, Floats], problem: Problem) -> dict[str, float]
 
     A metric is nan if a run does not have it.
     """
-    less = {goal.metric: goal.weight > 0.0 for goal in problem.goals}
-    less |= {
-        constraint.metric: constraint.is_most for constraint in problem.constraints if constraint.metric not in less
-    }
+    less = {constraint.metric: constraint.is_most for constraint in problem.constraints}
+    less |= {goal.metric: goal.weight > 0.0 for goal in problem.goals}
     return {name: float(problem.bad_end(metrics[name], less[name])[0]) for name in problem.metrics}

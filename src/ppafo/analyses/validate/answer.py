@@ -103,8 +103,6 @@ def finding_of(validation: Validation) -> Finding[Validation]:
             f"Not everything here was measured: {', '.join(KIND_WORDS[kind] for kind in unmeasured)}. Agreement with "
             "such a recording shows how well two models agree, not how well the model agrees with a device."
         )
-    if validation.overrides:
-        sentences.append(f"values changed: {', '.join(validation.overrides)}")
     method = (
         f"The model with the valve '{validation.device.valve_name}' was run with the inputs of each recording, from "
         "the state of its first samples. A residual is measured - model. Percentages are of the full range: the "
@@ -125,6 +123,7 @@ def finding_of(validation: Validation) -> Finding[Validation]:
         found=validation,
         passed=validation.passes,
         kind=next(iter(kinds)) if len(kinds) == 1 else "measured",
+        overrides=validation.overrides,
         files={
             f"{name}-replayed.csv": partial(marked_csv_bytes, agreement.model.resample(agreement.measured.time))
             for name, agreement in pairs

@@ -28,6 +28,7 @@ from ppafo.report.kind import Kind
 from ppafo.report.live_parts import live_part
 from ppafo.running import tried
 from ppafo.simulation.gains import gains_of
+from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import UNITS
 from ppafo.simulation.tracking import Tracking
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -210,13 +211,12 @@ def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
     torque = worn.torque_sentence(verdict)
     gains = "" if in_force is None else in_force.sentence
     first_lines = [benefit_sentence(comparison), torque, configuration.origin.replaced, gains]
-    gait, overrides = motion.gait, configuration.origin.overrides
+    gait = motion.gait
     title = f" ({gait.title})" if gait.title else ""
     set_up = (
         configuration.description,
         f"device '{configuration.device.name}', gait '{gait.name}'{title}",
         law_of(configuration).summary,
-        f"values changed for this walk: {', '.join(overrides)}" if overrides else "",
     )
     ended = f"{configuration.name}: {worn.status.kind}, {strides} of {motion.gait.name}{along}"
     segments, supply = {}, worn.supply
@@ -254,6 +254,7 @@ def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
             **({} if supply is None else {"bottle.csv": lambda: marked_csv_bytes(supply.recording)}),
         },
         live=partial(live_part, [configuration]),
+        overrides=changes_in(configuration),
     )
 
 

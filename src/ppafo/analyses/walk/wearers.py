@@ -9,6 +9,7 @@ import numpy as np
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, versions, walk_document
 from ppafo.report.finding import Finding, Section, columns_of
 from ppafo.signals.recording import Floats
+from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import UNITS
 from ppafo.units.shown import in_units
 from ppafo.walking.figures.population import population_figure
@@ -70,6 +71,7 @@ def wearers_finding(population: Population) -> Finding[dict[str, Any]]:
         passed=not population.diverged,
         files={"wearers.csv": partial(csv_of, columns)},
         command="walk",
+        overrides=changes_in(configuration),
     )
 
 

@@ -17,13 +17,7 @@ from ppafo.control.controllers.damped_proportional import DampedGains, TorqueSlo
 from ppafo.control.kind import DEAD_BAND, BelievedBand, ControllerKind
 from ppafo.control.torque_loop import LEAD, LEARNING_GAIN, beyond_dead_band
 from ppafo.control.walking import assistance
-from ppafo.control.walking.assistance import (
-    ASSISTING_QUANTITIES,
-    Assistance,
-    TorqueProfile,
-    TorqueRequest,
-    assess,
-)
+from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, TorqueProfile, TorqueRequest, assess
 from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
@@ -185,12 +179,7 @@ def update(
     command = beyond_dead_band(opening, parameters.dead_band)
     command, watch = assistance.valve_command(assessment, command, period)
     following: _EventDampedLearningState = parts.state(
-        phase=phase,
-        clock=assessment.clock,
-        safety=watch,
-        request=assessment.request,
-        law=law,
-        table=table,
+        phase=phase, clock=assessment.clock, safety=watch, request=assessment.request, law=law, table=table
     )
     return command, following
 
@@ -199,12 +188,7 @@ KIND = ControllerKind(
     name="event_damped_learning",
     summary="Event-based torque profiles for each phase, tracked by damped control that learns the push-off.",
     source=f"the paper, figure 1A (phases); {damped_proportional.DAMPED_PROPORTIONAL.source}",
-    quantities=(
-        *damped_proportional.GAIN_QUANTITIES,
-        *quantities_of(LearningRules),
-        DEAD_BAND,
-        *ASSISTING_QUANTITIES,
-    ),
+    quantities=(*damped_proportional.GAIN_QUANTITIES, *quantities_of(LearningRules), DEAD_BAND, *ASSISTING_QUANTITIES),
     parameters=_EventDampedLearningParameters,
     initial=_EventDampedLearningState(),
     update=update,

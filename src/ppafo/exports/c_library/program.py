@@ -283,9 +283,5 @@ def metrics_entry(exported: ExportedProgram, collector: SourceCollector, boundar
         "Readings = namedtuple('Readings', ['meters', 'course', 'samples'])",
     ]
     return "\n".join(
-        [
-            *rows,
-            boundary.head("metrics", parameters_of_metrics),
-            *indent(composed_lines(lines, collector.needs)),
-        ]
+        [*rows, boundary.head("metrics", parameters_of_metrics), *indent(composed_lines(lines, collector.needs))]
     )

@@ -18,9 +18,10 @@ from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.table import MotionTable, cut_table, fill_gaps, without_lost_markers
 from ppafo.gait.recorded.walk import walk_signals
 from ppafo.kinds import Kinds
+from ppafo.plugins import nearest_kind
 from ppafo.storage.frames import written_as_csv
 from ppafo.units import format_quantity
-from ppafo.wording import nearest_name, one_line
+from ppafo.wording import one_line
 
 # The forms of gait recordings, tables of files in any of them, and the one map of files that come without one.
 
@@ -48,9 +49,8 @@ def form_of(path: str | Path, name: str = "") -> GaitForm:
     if name:
         form = FORMS.get(name)
         if form is None:
-            raise DataError(
-                f"there is no gait format '{one_line(name)}'{nearest_name(name, FORMS)}; available: {', '.join(FORMS)}"
-            )
+            hint = nearest_kind(name, FORMS, GaitForm)
+            raise DataError(f"there is no gait format '{one_line(name)}'{hint}; available: {', '.join(FORMS)}")
         return form
     # Any form may know the suffix: forms of other packages are loaded before it is refused.
     FORMS.load_all()

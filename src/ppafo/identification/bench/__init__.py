@@ -8,12 +8,4 @@ from ppafo.identification.bench.valve_map import valve_map
 from ppafo.identification.bench.vane_leak import vane_leak
 from ppafo.identification.tolerances import Tolerances
 
-__all__ = [
-    "BenchResult",
-    "Tolerances",
-    "free_decay",
-    "open_valve_flow",
-    "static_torque",
-    "valve_map",
-    "vane_leak",
-]
+__all__ = ["BenchResult", "Tolerances", "free_decay", "open_valve_flow", "static_torque", "valve_map", "vane_leak"]

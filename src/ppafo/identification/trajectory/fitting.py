@@ -133,12 +133,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     report(Progress(f"trajectory fit: {len(free)} numbers, {len(runs)} recordings"))
     blocks = blocks_of(runs, numbers, start)
     fitted = fit_residuals(
-        lambda points: residuals_of(runs, numbers, points),
-        free,
-        blocks,
-        problem.confidence,
-        report,
-        is_motion=True,
+        lambda points: residuals_of(runs, numbers, points), free, blocks, problem.confidence, report, is_motion=True
     )
     conflict = conflict_in_words(fitted, "the model is incomplete") or _wandering(fitted, numbers)
     # Tolerances are marginalised: their rows are left out, their share of the variance stays.

@@ -58,12 +58,7 @@ def check_flow(evidence: Evidence) -> Iterator[AuditFinding]:
 
 def _paths(name: str) -> tuple[str, ...]:
     valve, reported = f"valves.{name}", f"reported.valves.{name}"
-    return (
-        f"{valve}.area",
-        f"{valve}.discharge_coefficient",
-        f"{reported}.mass_flow",
-        f"{reported}.flow_pressure",
-    )
+    return (f"{valve}.area", f"{valve}.discharge_coefficient", f"{reported}.mass_flow", f"{reported}.flow_pressure")
 
 
 def _flow(evidence: Evidence, name: str) -> _ValveFlow | None:

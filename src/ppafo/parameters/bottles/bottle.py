@@ -35,7 +35,7 @@ from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import Figure
 from ppafo.units import format_quantity, split_quantity
 from ppafo.units.shown import shown_text
-from ppafo.wording import nearest_name, said_missing
+from ppafo.wording import changed_text, nearest_name, said_missing
 
 PAPER_BOTTLE = "paper-co2-9oz"
 FILE = TomlKind("bottle", "bottle", resources.files("ppafo.parameters.bottles") / "files", ParameterError)
@@ -180,8 +180,8 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
         for other in other_forms(path, FILLS):
             entries.pop(other, None)
         entries[path] = Entry(value=value, unit=unit, origin="assumed", source=SOURCE)
-    bottle, changed = _build(parsed, entries, file), ", ".join(map(str, changes.values()))
-    return replace(bottle, title=f"{bottle.title} (values changed: {changed})") if changes else bottle
+    bottle, changed = _build(parsed, entries, file), changed_text(map(str, changes.values()))
+    return replace(bottle, title=f"{bottle.title} ({changed})") if changes else bottle
 
 
 def _entries_of(parsed: Any) -> dict[str, Entry]:

@@ -10,11 +10,14 @@ import jsonschema
 import pytest
 
 import ppafo
+from ppafo.analyses.tune import solve
 from ppafo.analyses.tune.answer import verdict
 from ppafo.analyses.tune.problem import json_schema, list_tunings, load_tuning
 from ppafo.analyses.tune.question import tune
 from ppafo.analyses.tune.result import Tuned
 from ppafo.errors import StudyError
+from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.simulate import simulate_many
 from ppafo.simulation.tracking.rule import settled_task
 from ppafo.studies.varying import value_at
 
@@ -106,6 +109,33 @@ def test_a_goal_above_the_ceiling_of_some_draws_is_missed_and_the_ceiling_is_nam
     assert always.after.is_feasible
     assert always.after.torque_ceiling.fraction == 0.0
     assert CEILING not in always.verdict
+
+
+def test_gains_that_follow_in_most_draws_are_said_to_miss_in_the_share_of_the_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(solve, "FRESH_DRAWS", 8)
+    gains = ["controller.proportional_gain=0.1 1/(N m)", "controller.integral_gain=0.2 1/(N m s)"]
+    document = changed(
+        overrides=["reference.level=4 N m", "run.duration=2 s", "reference.ramp_time=0.5 s"],
+        robust={"study": "torque-task-uncertainty", "draws": 16},
+        effort={"starts": 1, "generations": 1, "candidates_per_gain": 4},
+    )
+    problem = load_tuning(document, gains)
+    assert problem.spread is not None
+    drawn = problem.spread.uncertainty.random_columns(0, 24, problem.spread.seed)
+    draws = [{path: float(column[row]) for path, column in drawn.items()} for row in range(24)]
+    runs = simulate_many([with_numbers(problem.scenario, draw) for draw in draws])
+    missed = sum(run.tracking is not None and run.tracking.is_useless for run in runs)
+    assert missed == 1
+    finding = tune(problem)
+    before, after = finding.found.before, finding.found.after
+    assert (before.share_off, after.share_off) == (missed / 24, 0.0)
+    assert "with the previous gains it did not in 4.2 % of the draws" in finding.found.verdict
+    assert finding.to_dict()["before"]["share_off"] == before.share_off
+    assert f"values changed: {gains[0]}, {gains[1]}" in str(finding)
+    beyond = replace(after, off=0.3, share_off=0.25)
+    assert verdict(problem, before, beyond).endswith("limits of tracking are exceeded by 30 % in 25 % of the draws")
 
 
 def test_what_only_the_draws_of_the_search_keep_is_not_kept() -> None:
@@ -262,7 +292,7 @@ def test_gains_with_which_the_loop_rests_beside_its_reference_are_not_recommende
     assert lazy.tracking is not None
     assert lazy.metrics["gas_supplied"].value < finding.found.after.values["gas_supplied"]
     assert finding.found.after.result.tracking is None
-    assert "the loop follows its reference, unlike with the previous gains" in finding.found.verdict
+    assert "the loop follows its reference, with the previous gains it did not" in finding.found.verdict
     never = tune(tuning | {"search": [tuning["search"][0] | {"maximum": "0.01 1/(N m)"}]})
     assert not never.passed
     assert "no gains within the bounds let the loop follow its reference" in never.found.verdict

@@ -1,0 +1,84 @@
+"""Results state the values that overrides changed: in the text, on the page and in JSON."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import ppafo
+from ppafo.analyses.sweep.answer import load_study_results
+from ppafo.cli.main import main
+from ppafo.report.finding import REPORT, Finding, files_of
+
+TASK, STUDY = "torque-task-proportional", "torque-task-uncertainty"
+SHORT = "run.duration=1.5 s"
+BOTH = ("torque-task-proportional", "torque-task-solenoid")
+ASKED: dict[str, Callable[[list[str]], Finding[Any]]] = {
+    "compare": lambda changes: ppafo.compare(BOTH, overrides=changes),
+    "compare, of a study": lambda changes: ppafo.compare(study=STUDY, draws=32, overrides=changes),
+    "estimate": lambda changes: ppafo.estimate(
+        STUDY, metric="rms_error", configuration="proportional", draws=256, overrides=changes
+    ),
+    "find": lambda changes: ppafo.find(
+        TASK, vary="reference.level=1..3 N m", such_that="follows", grid=3, overrides=changes
+    ),
+    "linearise": lambda changes: ppafo.linearise(TASK, at="1 s", overrides=changes),
+    "sensitivity": lambda changes: ppafo.sensitivity(
+        STUDY, configuration="proportional", metrics="rms_error", samples=64, overrides=changes
+    ),
+    "sweep": lambda changes: ppafo.sweep(STUDY, draws=2, overrides=changes),
+}
+
+
+@pytest.mark.parametrize("question", ASKED)
+def test_an_answer_states_what_was_changed_for_it(question: str) -> None:
+    finding = ASKED[question]([SHORT])
+    opening = str(finding).split("\n\n")[0].splitlines()
+    assert opening[-1] == f"values changed: {SHORT}"
+    assert finding.to_dict()["overrides"] == [SHORT]
+    assert "Values changed: <code>run.duration</code>=1.5" in files_of(finding)[REPORT].decode()
+
+
+def test_an_answer_about_values_as_they_are_states_no_change() -> None:
+    finding = ppafo.compare(BOTH)
+    assert "values changed" not in str(finding)
+    assert "overrides" not in finding.to_dict()
+
+
+def test_a_change_of_one_configuration_names_it() -> None:
+    changes = [SHORT, "torque-task-solenoid:valve.area=9 mm^2"]
+    assert f"values changed: {SHORT}, {changes[1]}\n" in str(ppafo.compare(BOTH, overrides=changes))
+    loaded = {"slow": ppafo.load_scenario(TASK, [SHORT, "reference.ramp_time=0.5 s"]), "fast": TASK}
+    compared = ppafo.compare(loaded, overrides=["reference.level=3 N m"])
+    words = f"slow:{SHORT}, slow:reference.ramp_time=0.5 s, reference.level=3 N m"
+    assert f"values changed: {words}\n" in str(compared)
+
+
+def test_results_of_a_study_state_its_changes_when_they_are_read_again(tmp_path: Path) -> None:
+    study = ppafo.load_study(STUDY, [SHORT, "solenoid:sensors.delay=3 ms"], draws=2)
+    ppafo.sweep(study, out=tmp_path / "study")
+    read = str(load_study_results(tmp_path / "study"))
+    assert f"values changed: {SHORT}, solenoid:sensors.delay=3 ms\n" in read
+
+
+def test_numbers_from_python_are_stated_in_the_units_of_the_device() -> None:
+    # 401,325 Pa are 3 bar above the standard atmosphere, and 0.1 rad are 18/pi degrees.
+    changes = {"supply.pressure": 401325.0, "reference": {"amplitude": 0.1}, "run.duration": 2}
+    servo = ppafo.simulate("cylinder-servo", changes)
+    words = "values changed: supply.pressure=3 bar_g, reference.amplitude=5.72957795 deg, run.duration=2 s"
+    assert words in str(servo).splitlines()
+
+
+@pytest.mark.parametrize("name", ["cylinder-servo", "off"])
+def test_a_run_states_its_changes_in_text_and_json(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["simulate", name, "--set", "run.duration=6 s", "--set", "supply.pressure=4 bar_g", "--out", str(tmp_path)]
+    assert main(words) == 0
+    assert "values changed: run.duration=6 s, supply.pressure=4 bar_g" in capsys.readouterr().out.splitlines()
+    page = (tmp_path / "report.html").read_text()
+    assert "<code>supply.pressure</code>=4 bar_g" in page
+    assert main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["overrides"] == ["run.duration=6 s", "supply.pressure=4 bar_g"]
