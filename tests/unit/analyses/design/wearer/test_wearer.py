@@ -105,7 +105,7 @@ def test_toes_may_be_asked_to_drag_no_more_than_the_ground_and_no_device_lifts_t
     high = sized(2.5, 0.2, toes=0.05)
     assert high.device is None
     said = text_of(finding_of(high))
-    assert "No device in the catalogue can do this. Alternatives:" in said
+    assert "No device in the catalogue meets these requirements. Alternatives:" in said
     (lower,) = (line for line in high.instead if line.startswith("lower toes: "))
     offered = float(re.search(r"toes (\S+) mm", lower)[1])  # type: ignore[index]
     again = sized(2.5, 0.2, toes=1e-3 * offered).device
@@ -238,7 +238,7 @@ def test_a_device_for_a_child_is_found_once_the_stature_that_is_asked_for_is_giv
     finding = ppafo.design(**wanted, stature=stature)
     assert isinstance(finding.found, WearerSizing)
     assert finding.found.device is not None
-    assert ("extrapolated here: set measured segments" in text_of(finding)) == (stature < 1.45)
+    assert ("extrapolated here: give the measured segments" in text_of(finding)) == (stature < 1.45)
 
 
 @pytest.mark.usefixtures("little")
@@ -267,7 +267,7 @@ def test_without_any_alternative_the_nearest_pair_and_what_to_do_are_said(
     finding = ppafo.design(**wanted, catalogue=file)
     assert not finding.passed
     assert "none: of the pairs tried mine with " in text_of(finding)
-    assert "give catalogue with an actuator of more torque per pressure" in text_of(finding)
+    assert "add an actuator of more torque per pressure and give catalogue" in text_of(finding)
 
 
 PARTS = """
