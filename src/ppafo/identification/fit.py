@@ -18,7 +18,7 @@ from scipy.stats import t as student
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.conflict import Conflict, conflict_of, too_smooth
-from ppafo.identification.intervals import interval_ends, unidentified
+from ppafo.identification.intervals import better_point, interval_ends, linear_limits, unidentified
 from ppafo.identification.noise import HIGHEST_ORDER, Noise
 from ppafo.identification.residuals import FitRuns, FitVariable, Indices, ResidualBlock, Residuals
 from ppafo.identification.whitened import Linear, cost_of, linear_at
@@ -94,6 +94,8 @@ _AT_BOUND = 1.0e-6
 """Distance from a bound [-], absolute below 1 and relative above, up to which a variable is at it."""
 _SHOWN = 0.01
 """Least contribution to the variance [-] for which a tolerance is listed."""
+_CONTINUED = 3
+"""Largest number of times that the search continues from a better point of a profile."""
 _OTHER_STARTS = 32
 """Number of further start points tried."""
 
@@ -150,13 +152,19 @@ def fit(
 def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
     """Return the fit with intervals and consistency tests that the search from a scaled point finds."""
     point, outliers = _search(runs, start)
-    end = _settle(runs, point, outliers)
-    point, linear = end.point, end.linear
-    sensors, jacobian, errors = linear.sensors, linear.rows[:, 1:], linear.rows[:, 0]
-    covariance = linear.root @ linear.root.T
-    # Samples less what the numbers took: a tolerance that the readings do not move takes none.
-    freedom = max(len(errors) - float(np.sum(jacobian * (jacobian @ covariance))), 1.0)
-    low, high = interval_ends(runs, point, linear, float(student.ppf(0.5 + 0.5 * confidence, freedom)))
+    for continued in range(_CONTINUED + 1):
+        end = _settle(runs, point, outliers)
+        point, linear = end.point, end.linear
+        sensors, jacobian, errors = linear.sensors, linear.rows[:, 1:], linear.rows[:, 0]
+        covariance = linear.root @ linear.root.T
+        # Samples less what the numbers took: a tolerance that the readings do not move takes none.
+        freedom = max(len(errors) - float(np.sum(jacobian * (jacobian @ covariance))), 1.0)
+        limits = linear_limits(runs, point, linear, float(student.ppf(0.5 + 0.5 * confidence, freedom)))
+        better = better_point(runs, limits, linear) if continued < _CONTINUED else None
+        if better is None:
+            break
+        point = better
+    low, high = interval_ends(runs, limits, linear)
     # At a bound that the squares would leave a number is no longer free, and no group can move it there.
     gradient = errors @ jacobian + np.square(runs.prior) * (point - runs.start)
     near = _AT_BOUND * np.maximum(1.0, np.abs(point))

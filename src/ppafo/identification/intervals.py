@@ -6,7 +6,8 @@ squares over all other variables is larger by t^2, with Student's factor t (prof
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -15,7 +16,7 @@ from ppafo.identification.residuals import FitRuns
 from ppafo.identification.whitened import Linear, cost_of, squares_of, whitened_errors
 from ppafo.signals.recording import Floats
 
-_TRIES, _CORRECTIONS, _LINEARISATIONS = 6, 3, 4
+_TRIES, _CORRECTIONS, _LINEARISATIONS = 8, 3, 4
 """Largest numbers of trial points per limit, of steps with the Jacobian of the estimate, of steps with a new one."""
 
 _SHARES = 0.5 ** np.arange(4.0)[:, None]
@@ -27,8 +28,17 @@ _STILL = 0.3
 _FURTHER = 1.3
 """Least factor by which a trial limit is moved outwards while the recordings are still explained [-]."""
 
-_NARROW = 0.1
-"""Width of the bracket of a limit, relative to its distance from the estimate [-], at which interpolation is linear."""
+_REACHED = 0.01
+"""Largest relative difference between the profile at a limit and Student's factor [-]."""
+
+_LEAST_PART = 0.1
+"""Least distance of a trial limit from the ends of its bracket, as a fraction of the bracket [-]."""
+
+_SCANNED = (0.25, 0.5, 0.75)
+"""Distances from the estimate at which a bent profile is scanned, as fractions of the linear limit [-]."""
+
+_LOWER = 0.1
+"""Decrease of the squares [-] from which another point is a better estimate."""
 
 _BENT = 1.1
 """Least ratio of profile and linear limits [-] for which the profile is followed."""
@@ -39,65 +49,115 @@ _UNKNOWN = 0.5
 """Standard error of a combination of relative variables [-] above which it is not identifiable."""
 
 
-def interval_ends(runs: FitRuns, point: Floats, linear: Linear, times: float) -> tuple[Floats, Floats]:
-    """Return scaled lower and upper confidence limits: ``times`` standard errors, or wider for nonlinear laws.
+class LinearLimits(NamedTuple):
+    """Scaled confidence limits ``low`` and ``high`` of the linear law, at ``times`` standard errors, about an estimate.
 
-    Only intervals of unknowns without a prior are widened. A limit that the samples do not determine is the bound.
+    ``least`` is the sum of squares at the estimate ``point``. ``reached`` are, for each side of an unknown without a
+    prior, the minimum of the squares at the limit and the point of the minimum, by variable and direction (-1, 1).
     """
+
+    point: Floats
+    least: float
+    times: float
+    low: Floats
+    high: Floats
+    reached: Mapping[tuple[int, int], tuple[float, Floats]]
+
+    def parted(self, squares: float) -> float:
+        """Return the distance from the estimate in standard errors [-] that a sum of squares means."""
+        return math.sqrt(max(squares - self.least, 0.0))
+
+    def is_wider(self, squares: float) -> bool:
+        """Return whether the recordings still explain a linear limit with this sum of squares."""
+        return self.parted(squares) * _BENT < self.times
+
+
+def linear_limits(runs: FitRuns, point: Floats, linear: Linear, times: float) -> LinearLimits:
+    """Return the limits of the linear law about a scaled ``point``, with the profile likelihood at them."""
     covariance = linear.root @ linear.root.T
     wide = times * np.sqrt(np.diag(covariance))
     low, high = np.maximum(point - wide, runs.low), np.minimum(point + wide, runs.high)
     least = cost_of(runs, runs.residuals_at(point), point, linear)
-    sides = [(number, ends) for number in np.flatnonzero(runs.prior == 0.0).tolist() for ends in (low, high)]
+    limits = LinearLimits(point, least, times, low, high, reached := {})
+    sides = [(number, direction) for number in np.flatnonzero(runs.prior == 0.0).tolist() for direction in (-1, 1)]
     fixed = [number for number, _ in sides]
-    offsets = np.array([ends[number] - point[number] for number, ends in sides])
+    offsets = np.array([(low if direction < 0 else high)[number] - point[number] for number, direction in sides])
     straight = point[:, None] + covariance[:, fixed] / covariance[fixed, fixed] * offsets
     squares, points = _least_beside(runs, straight, fixed, linear)
-    for side, (number, ends) in enumerate(sides):
-        bound = float((runs.low if ends is low else runs.high)[number])
-        if offsets[side] != 0.0:
-            at_limit = float(squares[side]), points[:, side]
-            ends[number] = _end(runs, point, least, linear, number, bound, at_limit, times)
+    for column in np.flatnonzero(offsets).tolist():
+        reached[sides[column]] = float(squares[column]), points[:, column]
+        if limits.parted(float(squares[column])) > _BENT * times:
+            reached[sides[column]] = _least_along(runs, points[:, [column]], fixed[column], linear)
+    return limits
+
+
+def better_point(runs: FitRuns, limits: LinearLimits, linear: Linear) -> Floats | None:
+    """Return a scaled point with fewer squares than the estimate, from a scan of the bent profiles; None if none has.
+
+    A law with events, such as a break-away, has steps in its squares, between which a search may end anywhere. Limits
+    about such an end would depend on the start of the search.
+    """
+    lowest, best = limits.least - _LOWER, None
+    bent = [number for (number, _), (squares, _) in limits.reached.items() if limits.is_wider(squares)]
+    for number in dict.fromkeys(bent):
+        for end in (limits.low[number], limits.high[number]):
+            reached = limits.point
+            for share in _SCANNED:
+                moved = reached.copy()
+                moved[number] = limits.point[number] + share * (end - limits.point[number])
+                squares, reached = _least_along(runs, moved[:, None], number, linear)
+                if squares < lowest:
+                    lowest, best = squares, reached
+    return best
+
+
+def interval_ends(runs: FitRuns, limits: LinearLimits, linear: Linear) -> tuple[Floats, Floats]:
+    """Return scaled lower and upper confidence limits: the limits of the linear law, or wider for nonlinear laws.
+
+    Only intervals of unknowns without a prior are widened. A limit that the samples do not determine is the bound.
+    """
+    low, high = limits.low.copy(), limits.high.copy()
+    for (number, direction), at_limit in limits.reached.items():
+        ends, bounds = (high, runs.high) if direction > 0 else (low, runs.low)
+        ends[number] = _end(runs, limits, linear, number, float(bounds[number]), at_limit)
     return low, high
 
 
 def _end(
-    runs: FitRuns,
-    point: Floats,
-    least: float,
-    linear: Linear,
-    number: int,
-    bound: float,
-    straight: tuple[float, Floats],
-    times: float,
+    runs: FitRuns, limits: LinearLimits, linear: Linear, number: int, bound: float, at_limit: tuple[float, Floats]
 ) -> float:
     """Return one confidence limit of a variable, between the limit of the linear law and the bound.
 
-    ``least`` is the sum of squares at the estimate; ``straight`` is the sum of squares near the linear limit, and the
-    point at which it is reached.
+    ``at_limit`` is the sum of squares at the linear limit, and the point at which it is reached. Each trial limit
+    starts from the best of the nearest points inside and outside, so that no event lies between it and all its starts.
     """
+    point, times = limits.point, limits.times
+    squares, reached = at_limit
+    if not limits.is_wider(squares):
+        return float(reached[number])
     inner, near = point, 0.0
-    outer: Floats | None = None
-    far, (squares, reached) = math.inf, straight
-    if math.sqrt(max(squares - least, 0.0)) > _BENT * times:
-        squares, reached = _least_along(runs, reached, number, linear)
+    outer, far = point, math.inf
     for _ in range(_TRIES):
-        # By how many standard errors priors and samples tell this point from the estimate.
-        parted = math.sqrt(max(squares - least, 0.0))
-        if parted * (_BENT if inner is point else 1.0) < times:
+        parted = limits.parted(squares)
+        if abs(parted - times) < _REACHED * times:
+            return float(reached[number])
+        if parted < times:
             inner, near = reached, parted
             if float(inner[number]) == bound:
                 return bound
-        elif inner is point:
-            return float(reached[number])
         else:
             outer, far = reached, parted
-        if outer is not None and abs(outer[number] - inner[number]) < _NARROW * abs(inner[number] - point[number]):
-            break
-        further = min(max(times / max(near, 0.1), _FURTHER), 2.0)
-        tried = point + further * (inner - point) if outer is None else 0.5 * (inner + outer)
-        squares, reached = _least_along(runs, np.clip(tried, runs.low, runs.high), number, linear)
-    if outer is None:
+        if outer is point:
+            further = min(max(times / max(near, 0.1), _FURTHER), 2.0)
+            starts = (point + further * (inner - point))[:, None]
+        else:
+            # Beyond which no run succeeds the profile says nothing, and the bracket is halved.
+            share = (times - near) / (far - near) if math.isfinite(far) else 0.5
+            middle = inner + min(max(share, _LEAST_PART), 1.0 - _LEAST_PART) * (outer - inner)
+            starts = np.stack([middle, inner, outer], axis=1)
+            starts[number] = middle[number]
+        squares, reached = _least_along(runs, np.clip(starts.T, runs.low, runs.high).T, number, linear)
+    if outer is point:
         return bound
     share = (times - near) / (far - near)
     return float(inner[number] + share * (outer[number] - inner[number]))
@@ -130,14 +190,17 @@ def _least_beside(runs: FitRuns, points: Floats, fixed: list[int], linear: Linea
     return least, best
 
 
-def _least_along(runs: FitRuns, point: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
-    """Return the minimum of the squares with one variable of a scaled point fixed, and the point of the minimum.
+def _least_along(runs: FitRuns, starts: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
+    """Return the minimum of the squares with one variable fixed, and the point of the minimum.
 
-    The other variables take Gauss-Newton steps within their bounds, each with a new Jacobian, because far from the
-    estimate its Jacobian leads out of a curved valley. The minimum is infinite if no run succeeds.
+    The search begins at the best of the scaled points ``starts`` (numbers, points). The other variables take
+    Gauss-Newton steps within their bounds, each with a new Jacobian, because far from the estimate its Jacobian leads
+    out of a curved valley. The minimum is infinite if no run succeeds.
     """
-    errors = whitened_errors(runs, runs.residuals_at_points(point[:, None]), linear)
-    squares = float(squares_of(runs, errors, point[:, None])[0])
+    all_errors = whitened_errors(runs, runs.residuals_at_points(starts), linear)
+    all_squares = squares_of(runs, all_errors, starts)
+    best = int(np.argmin(np.where(np.isfinite(all_squares), all_squares, np.inf)))
+    point, errors, squares = starts[:, best], all_errors[:, [best]], float(all_squares[best])
     if not math.isfinite(squares):
         return math.inf, point
     others = np.delete(np.arange(len(point)), number)

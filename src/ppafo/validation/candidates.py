@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.constants import PASCALS_PER_PSI
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form
 from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
+from ppafo.simulation.recorded.misread_units import misread_units
 from ppafo.simulation.recorded.usual_errors import (
     ANGLE_ERRORS,
     PRESSURE_ERRORS,
@@ -35,20 +35,6 @@ from ppafo.validation.settings import ReplaySettings
 def _sensed(names: Iterable[str], kind: str, about: float, size: float) -> ModelChange:
     """Return a change in which sensors have an error of one ``kind``: gain about a value, zero offset or delay."""
     return ModelChange(dict.fromkeys(names, replace(SensorModel(about=about), **{kind: size})))
-
-
-_MISREAD_UNITS = {
-    "kPa read as psi": PASCALS_PER_PSI / 1.0e3,
-    "psi read as kPa": 1.0e3 / PASCALS_PER_PSI,
-    "bar read as psi": PASCALS_PER_PSI / 1.0e5,
-    "psi read as bar": 1.0e5 / PASCALS_PER_PSI,
-    "kPa read as bar": 1.0e2,
-    "bar read as kPa": 1.0e-2,
-}
-"""Factor [-] on the true pressure for each pair of true unit and unit assumed when reading the file."""
-
-_CONVERTED = "", "Pa", "Pa_a", "Pa_g"
-"""Declared units of pressures that were already converted to SI, so that the original unit is unknown."""
 
 
 def _groups(names: Collection[str]) -> Iterator[tuple[tuple[str, ...], str, str]]:
@@ -76,16 +62,13 @@ def exchanges(
     """
     atmosphere = device.supply.atmospheric_pressure
     for channels, group, verb in _groups(names):
-        declared = frozenset[str]().union(*(units.get(name, ()) for name in channels))
-        for unit, factor in _MISREAD_UNITS.items() if units.keys() & set(channels) else ():
-            if not declared <= {*_CONVERTED, *(f"{unit.rpartition(' ')[2]}{kind}" for kind in ("", "_a", "_g"))}:
-                continue
-            words = f"{group} {verb} to be {unit}"
-            change = partial(_sensed, channels, "gain", atmosphere)
-            yield CandidateCause(words, words, change, (factor,), is_of_unit=True)
+        yield from _units(channels, f"{group} {verb}", "Pa", units, atmosphere)
         for kind, zero in (("gauge read as absolute", -atmosphere), ("absolute read as gauge", atmosphere)):
             words = f"{group} {verb} to be {kind}"
             yield CandidateCause(words, words, partial(_sensed, channels, "zero", 0.0), (zero,), is_of_unit=True)
+    for name, unit in ((ANGLE, "rad"), (EXTERNAL_TORQUE, "N m")):
+        if name in names:
+            yield from _units((name,), f"{name} seems", unit, units, 0.0)
     has_both = PRESSURE_1 in names and PRESSURE_2 in names
     if has_both:
         yield CandidateCause(
@@ -104,6 +87,18 @@ def exchanges(
         middle = 0.5 * (device.actuator.angle_min + device.actuator.angle_max)
         words = "the angle seems to be counted from the other end"
         yield CandidateCause("end of angle", words, partial(_sensed, [ANGLE], "gain", middle), (-1.0,))
+
+
+def _units(
+    channels: tuple[str, ...], seems: str, si_unit: str, units: Mapping[str, AbstractSet[str]], zero: float
+) -> Iterator[CandidateCause]:
+    """Yield the unit mistakes of a sensor group that moves; ``zero`` [SI] is the true value of a reading of zero."""
+    stated = set[str]().union(*(units.get(name, ()) for name in channels))
+    for mistake in misread_units(si_unit, stated) if units.keys() & {*channels} else ():
+        name = f"{seems} to be {mistake.in_words}"
+        words = f"{name}: the unit is probably wrong, by a factor of {mistake.larger_factor}"
+        change = partial(_sensed, channels, "gain", zero)
+        yield CandidateCause(name, words, change, (mistake.factor,), is_of_unit=True)
 
 
 def _both_ways(*sizes: float) -> tuple[float, ...]:

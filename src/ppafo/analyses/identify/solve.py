@@ -14,7 +14,8 @@ from ppafo.identification.procedures import PROCEDURES, ProcedureContext, Proced
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, source_of
 from ppafo.identification.tolerances import tolerances_of
 from ppafo.identification.trajectory.layout import ExperimentSection
-from ppafo.identification.trajectory.section import SectionContext, solve_section
+from ppafo.identification.trajectory.section import SectionContext, TrajectoryOutcome, solve_section
+from ppafo.identification.unit_check import with_wrong_units
 from ppafo.parameters.audit import findings_of
 from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
@@ -64,6 +65,9 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         for task in tasks:
             context = ProcedureContext(current, valve, task.label, tolerances)
             result = run_procedure(task.sources, task.procedure, context)
+            known = {item.path: number_in_si(current, item.path) for item in result.estimates}
+            recordings = [source.recording for source in task.sources]
+            result = replace(result, estimates=with_wrong_units(result.estimates, known, recordings))
             results.append(result)
             # The next procedure leans on what this one found; the new set is made of the old one at the end.
             current = with_estimates(current, result.estimates).parameter_set
@@ -80,12 +84,27 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
                 used=used,
                 tolerances=tolerances,
             )
-            trajectory = solve_section(problem.trajectory, section, progress)
+            trajectory = _with_wrong_units(solve_section(problem.trajectory, section, progress), current)
             estimates += trajectory.fit.estimates
         new_set = with_estimates(before, estimates, valve)
         identification = Identification(problem.name, tuple(results), trajectory, before, new_set)
         described = replace(new_set, parameter_set=_described_set(identification, problem))
         return replace(identification, new_set=described)
+
+
+def _with_wrong_units(outcome: TrajectoryOutcome, parameter_set: ParameterSet) -> TrajectoryOutcome:
+    """Return a trajectory fit whose values have the verdict of a wrong unit where such a mistake explains them.
+
+    The start of a number, which a person may give, is expected like the value of the set: the nearer of both counts.
+    """
+    fit, known = outcome.fit, dict[str, float | None]()
+    starts = {number.free.name: number.free.start for number in fit.numbers if not number.is_logarithm}
+    for path, value in fit.values.items():
+        expected = [item for item in (number_in_si(parameter_set, path), starts.get(path)) if item and item > 0.0]
+        ratios = {max(item / value, value / item): item for item in expected if value > 0.0}
+        known[path] = ratios[min(ratios)] if ratios else None
+    recordings = [experiment.recording for experiment in fit.problem.experiments]
+    return replace(outcome, fit=replace(fit, estimates=with_wrong_units(fit.estimates, known, recordings)))
 
 
 _ROW_TIMES = dict.fromkeys(("static-torque", "open-valve-flow", "valve-map"), 1.0)
